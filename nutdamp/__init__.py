@@ -1,15 +1,16 @@
 """Nutation-damping planner for spinning spacecraft.
 
 One stream runs through the package: spacecraft file -> Spacecraft -> scheme -> Schedule -> flight -> report.
-As a library it is these few names, of which `nutdamp.library` tells more; each is loaded on first use.
+As a library it is these few names, of which `nutdamp.api` tells more; each is loaded on first use.
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nutdamp import errors
+    from nutdamp.api import *
     from nutdamp.errors import NutdampError
-    from nutdamp.library import *
+
 
 __all__ = [
     "Budget",
@@ -63,7 +64,7 @@ if not TYPE_CHECKING:  # or else a type checker would believe in any name
 
         if name == "errors":
             return import_module("nutdamp.errors")
-        value = getattr(import_module("nutdamp.errors" if name == "NutdampError" else "nutdamp.library"), name)
+        value = getattr(import_module("nutdamp.errors" if name == "NutdampError" else "nutdamp.api"), name)
         globals()[name] = value
         return value
 

@@ -6,7 +6,7 @@ import sys
 def main() -> None:
     """Entry point of the command; ends quietly where it is interrupted before there is anything to interrupt."""
     try:
-        from nutdamp.cli.root import main as run
+        from nutdamp.cli.main import main as run
 
         run()
     except KeyboardInterrupt:

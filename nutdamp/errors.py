@@ -1,8 +1,12 @@
-"""What can go wrong, as data: the command line turns it into messages and exit statuses in one place."""
+"""What can go wrong, as data: the command line turns it into messages and exit statuses in one place.
+
+Lists and spans as sentences have them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 
@@ -161,3 +165,13 @@ class TooShort(Infeasible):
 
     def __str__(self) -> str:
         return f"{self.why}; {self.cure}" if self.cure else self.why
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """``a``, ``a and b``, ``a, b and c``; ``last`` takes the place of "and"."""
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def span(least: float, most: float, unit: str) -> str:
+    """``0.2 s to 5 s``, or ``at least 0.2 s`` where there is no ``most``."""
+    return f"at least {least:.4g} {unit}" if math.isinf(most) else f"{least:.4g} {unit} to {most:.4g} {unit}"

@@ -17,7 +17,7 @@ from support.pages import unpictured
 from support.planner import Planner
 from support.process import Run, apart, within
 
-from nutdamp import schemes
+from nutdamp.schemes import planner
 
 # The same examples in every run, however slow the machine: a failure in CI is a failure here.
 settings.register_profile(
@@ -47,7 +47,7 @@ def planned() -> Planner:
 @pytest.fixture
 def plans_shared(planned: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands and library calls of this test take their schedules from `planned`."""
-    monkeypatch.setattr(schemes, "schedule", planned.schedule)
+    monkeypatch.setattr(planner, "schedule", planned.schedule)
 
 
 @pytest.fixture

@@ -1,1 +1,0 @@
-"""The command line. Each command is one thin module: load, call, show; errors end in `nutdamp.cli.boundary`."""

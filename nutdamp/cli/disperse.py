@@ -1,4 +1,7 @@
-"""``nutdamp disperse``: fly one schedule in many dispersed cases."""
+"""``nutdamp disperse``: fly one schedule in many dispersed cases.
+
+What ``nutdamp disperse --loop`` does: fly the closed loop of the file in many dispersed cases.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +12,113 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from nutdamp.cli.boundary import interruption, leave
-from nutdamp.cli.common import Input, plot_options, quiet_option, require_dispersions, spacecraft_argument
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.job import Job, Output, begin
-from nutdamp.cli.parameters import FILE, Count, EndTime
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
+from nutdamp.cli.job import (
+    Input,
+    Job,
+    Output,
+    begin,
+    plot_options,
+    quiet_option,
+    require_dispersions,
+    require_loop,
+    spacecraft_argument,
+)
+from nutdamp.cli.main import interruption, leave
+from nutdamp.cli.options import FILE, Aim, Count, EndTime, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
-from nutdamp.schemes import Options
+from nutdamp.schemes.catalogue import Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
-    from nutdamp.dispersion.statistics import Array
-    from nutdamp.dispersion.study import Collect, Results, Study
+    from nutdamp.control_loop.dispersion import CollectLoops, LoopResults, LoopStudy
     from nutdamp.errors import CannotWrite
+    from nutdamp.montecarlo.statistics import Array
+    from nutdamp.montecarlo.study import Collect, Results, Study
+
+
+class Requested(NamedTuple):
+    """What the command line says."""
+
+    samples: int
+    seed: int
+    until: float | None
+    case: int | None
+    worst: int
+    csv: str | None
+    json: str | None
+    plot: str | None
+
+
+def disperse_loop(job: Job, requested: Requested) -> None:
+    """Fly the loops and show what becomes of them, or of one case."""
+    require_loop(job.spacecraft)
+    require_dispersions(job.spacecraft)
+
+    from nutdamp.control_loop.dispersion import loop_study
+    from nutdamp.views.loop_cases import loop_cases_json
+    from nutdamp.views.loop_cases_tables import loop_cases_screen
+
+    study = loop_study(job.spacecraft, requested.until, seed=requested.seed)
+    if requested.case is not None:
+        _one(job, study, requested.case - 1, requested.json)
+        return
+    count = study.expect_affordable(requested.samples)
+    if study.alone:
+        what = f"{study.alone}: the cases fly one by one, and look at about {count:,} samples"
+        job.remark(f"{what}, which takes {study.price_alone(requested.samples)}")
+    results, stopped_by = _flown(study, requested, job.quiet)
+    data = partial(loop_cases_json, results, worst=requested.worst)
+    screen = partial(loop_cases_screen, results, worst=requested.worst)
+    job.deliver([(requested.json, data), (requested.plot, partial(_loop_picture, results))], screen)
+    if stopped_by is not None and results.done < results.requested:
+        say(f"interrupted: {results.done} of {results.requested} cases are done")
+        sys.exit(128 + stopped_by)
+    leave(missed=results.meets_requirement is False)
+
+
+def _loop_picture(results: LoopResults) -> Figure:
+    from nutdamp.figures.loop_cases import loop_cases_figure
+
+    return loop_cases_figure(results)
+
+
+def _flown(study: LoopStudy, requested: Requested, quiet: bool) -> tuple[LoopResults, int | None]:
+    """The cases, with a bar, and the signal that ended them, if any; where that is before the first, raise."""
+    from nutdamp.cli.job import progress, stoppable
+    from nutdamp.control_loop.dispersion import LoopResults, run
+    from nutdamp.files.tabular import whole_file
+    from nutdamp.views.loop_cases import LoopCasesWriter
+
+    results = LoopResults(study, requested.samples)
+    with stoppable() as stopped, progress("flying", requested.samples, quiet=quiet) as watch:
+
+        def fly(collect: CollectLoops | None) -> None:
+            run(results, watch=watch, stopped=stopped, collect=collect)
+            if not results.done and stopped.number is not None:
+                raise interruption(stopped.number)  # so that no file is written
+
+        if requested.csv is None:
+            fly(None)
+        else:
+            with whole_file(requested.csv) as stream:
+                fly(LoopCasesWriter(stream, study).write)
+    return results, stopped.number
+
+
+def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
+    """Show a single case."""
+    from nutdamp.views.loop_cases import loop_case_json
+    from nutdamp.views.loop_cases_tables import loop_case_screen
+
+    flown = study.fly([study.case(case)])
+    job.deliver([(json, partial(loop_case_json, study, case, flown))], partial(loop_case_screen, study, case, flown))
+
 
 SAMPLES = 20_000
-"""Cases where nothing else is said: as `nutdamp.dispersion.SAMPLES`, without loading numpy."""
+"""Cases where nothing else is said: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
 
 FIGURES = ("overview", "cases", "momentum", "budget")
 """What --plot draws."""
@@ -84,15 +175,15 @@ def command(
         _expect_loop(flown, {"threads": threads, "figure": figure != FIGURES[0]})
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     if looped:
-        from nutdamp.cli.disperse_loop import Requested, disperse_loop
+        pass  # MERGED
 
         disperse_loop(job, Requested(samples, seed, until, case, worst, csv, json, plot))
         return
     require_dispersions(job.spacecraft)
     plan = plan_or_read(job, flown, options)
 
-    from nutdamp.dispersion import study_of
-    from nutdamp.files.dispersion_json import dispersion_json
+    from nutdamp.montecarlo.study import study_of
+    from nutdamp.views.dispersion_json import dispersion_json
 
     study = study_of(plan.spacecraft, plan.pulses, seed=seed)
     if note := study.lightening_error:
@@ -111,13 +202,13 @@ def command(
 
 
 def _picture(results: Results, figure: str, scheme: str) -> Figure:
-    from nutdamp.presentation import figures
+    from nutdamp.figures import dispersion
 
-    return figures.dispersion_figure(figure, results, scheme=scheme)
+    return dispersion.dispersion_figure(figure, results, scheme=scheme)
 
 
 def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
-    from nutdamp.presentation.dispersion_tables import dispersion_screen
+    from nutdamp.views.dispersion_tables import dispersion_screen
 
     return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
 
@@ -139,9 +230,9 @@ class Run(NamedTuple):
 
 def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet: bool) -> Run:
     """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
-    from nutdamp.cli.progress import progress, stoppable
-    from nutdamp.dispersion.study import Results, run, threads_here
+    from nutdamp.cli.job import progress, stoppable
     from nutdamp.errors import CannotWrite
+    from nutdamp.montecarlo.study import Results, run, threads_here
 
     results = Results(study, samples)
     unsaved: list[CannotWrite] = []
@@ -166,8 +257,8 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
     if csv is None:
         fly_all(None)
         return
-    from nutdamp.files.output import whole_file
-    from nutdamp.files.samples_csv import SamplesWriter, check_room
+    from nutdamp.files.samples import SamplesWriter, check_room
+    from nutdamp.files.tabular import whole_file
 
     check_room(csv, study, samples)
     full: OSError | None = None
@@ -191,8 +282,8 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
 
 def _one_case(job: Job, study: Study, case: int, scheme: str, json: str | None) -> None:
     """Show a single case."""
-    from nutdamp.files.dispersion_json import case_json
-    from nutdamp.presentation.dispersion_tables import case_screen
+    from nutdamp.views.dispersion_json import case_json
+    from nutdamp.views.dispersion_tables import case_screen
 
     draws = study.draws_of(case)
 

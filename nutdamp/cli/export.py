@@ -1,4 +1,7 @@
-"""``nutdamp export``: a plan in the formats that flight dynamics reads."""
+"""``nutdamp export``: a plan in the formats that flight dynamics reads.
+
+``nutdamp import``: a spacecraft file from a message of flight dynamics.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,14 @@ import shlex
 
 import click
 
-from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.job import begin, deliver
-from nutdamp.cli.parameters import FILE, EndTime, Named
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
+from nutdamp.cli.job import Input, begin, deliver, expect_outputs, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.main import leave
+from nutdamp.cli.options import FILE, Aim, EndTime, Named, PlanningCommand, goal_options
+from nutdamp.cli.screen import say
 from nutdamp.errors import printable
-from nutdamp.files.exchange import FORMATS, MESSAGES, export_text, lacking
-from nutdamp.schemes import Options
+from nutdamp.schemes.catalogue import Options
+from nutdamp.views.exchange import FORMATS, MESSAGES, export_text, lacking
 
 
 @click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
@@ -55,7 +57,7 @@ def command(
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
     for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
-    from nutdamp.decision import Decision
+    from nutdamp.planning.decision import Decision
 
     form = _format(form, spacecraft, ctx.args)
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
@@ -84,3 +86,36 @@ def _format(form: str | None, spacecraft: Input, more: list[str]) -> str:
         raise click.UsageError(f"name the format: --format {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
     named = [word for word in words if word.lower() != meant]
     raise click.UsageError(f"the format is an option: nutdamp export {shlex.join([*named, '--format', meant])}")
+
+
+@click.command("import")
+@click.argument("given", nargs=-1, required=True, type=FILE, metavar="[apm] FILE")
+@click.option("-o", "--output", type=FILE, default="-", help="Spacecraft file to write; default standard output.")
+@click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
+@quiet_option
+def import_command(given: tuple[str, ...], output: str, schedule: str | None, quiet: bool) -> None:
+    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, in KVN).
+
+    The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
+    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for
+    standard input.
+    """
+    *form, file = given
+    if form not in ([], ["apm"]):
+        raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
+    expect_outputs(file, output=output, schedule=schedule)
+
+    from nutdamp.files.ccsds.read import contradictions, imported, read_apm
+    from nutdamp.files.schedules import pulses_csv
+    from nutdamp.flight.propagation import flown
+
+    contents = read_apm(file)
+    text, body, pulses = imported(contents, file)
+    deliver([(output, lambda: text), (schedule, lambda: pulses_csv(flown(body, pulses)))])
+    remark = remarks(quiet)
+    for entry in contents.remarks:
+        remark(f"{file}: {entry}")
+    for entry in contradictions(contents, body):
+        say(f"{file}: warning: {entry}")
+    if pulses.pulses and schedule is None:
+        remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")

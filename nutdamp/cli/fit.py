@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
-from nutdamp.cli.job import Output, begin
-from nutdamp.cli.parameters import FILE, Quantity
-from nutdamp.cli.progress import working
+from nutdamp.cli.job import Input, Output, begin, quiet_option, spacecraft_argument, working
+from nutdamp.cli.options import FILE, Quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.estimation.fit import Fit
-    from nutdamp.estimation.outlook import Outlook
+    from nutdamp.estimation.forecast import Outlook
 
 
 @click.command("fit")
@@ -60,11 +58,11 @@ def command(
 
     from nutdamp.estimation.fit import fit
     from nutdamp.estimation.results import carried
-    from nutdamp.files.fit_json import fit_json
-    from nutdamp.files.fitted_file import fitted_text, notes
-    from nutdamp.files.schedule_file import read_pulses
-    from nutdamp.files.telemetry_csv import read_telemetry
-    from nutdamp.presentation.fit_tables import fit_screen
+    from nutdamp.files.editing import fitted_text, notes
+    from nutdamp.files.schedules import read_pulses
+    from nutdamp.files.telemetry import read_telemetry
+    from nutdamp.views.fit_json import fit_json
+    from nutdamp.views.fit_tables import fit_screen
 
     fired = None
     if schedule is not None:
@@ -86,13 +84,13 @@ def command(
 
 
 def _outlook(found: Fit, at: float, quiet: bool) -> Outlook:
-    from nutdamp.estimation.outlook import outlook
+    from nutdamp.estimation.forecast import outlook
 
     with working("looking ahead", quiet=quiet):
         return outlook(found, at)
 
 
 def _picture(found: Fit) -> Figure:
-    from nutdamp.presentation.figures.fit import fit_figure
+    from nutdamp.figures.fit import fit_figure
 
     return fit_figure(found)

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 import click
 
-from nutdamp.cli.failures import show_failures
-from nutdamp.cli.parameters import FILE, SchemeName
-from nutdamp.cli.scheme_options import expect_read
-from nutdamp.schemes import NAMES, Options, SchemeOptions
+from nutdamp.cli.options import FILE, SchemeName, expect_read
+from nutdamp.cli.screen import show_failures
+from nutdamp.schemes.catalogue import NAMES, Options, SchemeOptions
 
 if TYPE_CHECKING:
     from nutdamp.cli.job import Job
-    from nutdamp.comparison import Comparison
-    from nutdamp.planning import Plan
-    from nutdamp.robust import RobustComparison
+    from nutdamp.planning.decision import Comparison
+    from nutdamp.planning.plan import Plan
+    from nutdamp.planning.robust import RobustComparison
+
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -71,8 +71,8 @@ def compared_with(
     job: Job, names: Sequence[str], options: Options, samples: int | None = None, *, timed: bool = False
 ) -> Comparison:
     """The schemes named, else the usual ones, compared; which options none of them reads is said before."""
-    from nutdamp.cli.progress import working
-    from nutdamp.comparison import compare, usual
+    from nutdamp.cli.job import working
+    from nutdamp.planning.decision import compare, usual
 
     names = tuple(dict.fromkeys(names))
     expect_read(names or usual(job.spacecraft), options, job.spacecraft, job.remark)
@@ -82,8 +82,8 @@ def compared_with(
 
 def robust_of(job: Job, compared: Comparison, options: Options) -> RobustComparison:
     """The plans compared and their variants in dispersed cases, with a bar."""
-    from nutdamp import robust
-    from nutdamp.cli.progress import progress
+    from nutdamp.cli.job import progress
+    from nutdamp.planning import robust
 
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=job.quiet) as advance:
@@ -97,7 +97,7 @@ def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = Fal
     ``judged``: a verdict on the screen names the cones that are broken.
     """
     from nutdamp.errors import Infeasible
-    from nutdamp.remarks import infeasibility, remarks
+    from nutdamp.planning.decision import infeasibility, remarks
 
     if flown.schedule is not None:
         return _read(job, flown.schedule, options)
@@ -113,7 +113,7 @@ def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = Fal
 
 def _read(job: Job, schedule: str, options: Options) -> Plan:
     """The pulses of a file."""
-    from nutdamp.files.schedule_file import read_plan
+    from nutdamp.files.schedules import read_plan
 
     expect_read((), options, job.spacecraft, job.remark)
     plan, warnings = read_plan(schedule, job.spacecraft, options.of(SchemeOptions))
@@ -123,8 +123,8 @@ def _read(job: Job, schedule: str, options: Options) -> Plan:
 
 def _planned(job: Job, scheme: str, options: Options) -> Plan:
     """The plan of a scheme."""
-    from nutdamp import planning
-    from nutdamp.cli.progress import working
+    from nutdamp.cli.job import working
+    from nutdamp.planning import plan as planning
 
     expect_read((scheme,), options, job.spacecraft, job.remark)
     with working("planning", quiet=job.quiet):
@@ -134,7 +134,7 @@ def _planned(job: Job, scheme: str, options: Options) -> Plan:
 def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
     """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
-    from nutdamp.presentation import verdicts
+    from nutdamp.views import verdicts
 
     compared = compared_with(job, (), options)
     plan = compared.recommended
@@ -150,10 +150,10 @@ def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
 def _fired(job: Job, path: str, options: Options, *, jitter: bool) -> Plan:
     """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
     from nutdamp.errors import printable
-    from nutdamp.files.blocks_csv import read_blocks
-    from nutdamp.planning import Plan
-    from nutdamp.remarks import broken_limits
-    from nutdamp.schemes.tools.sun_pulses import fired
+    from nutdamp.files.schedules import read_blocks
+    from nutdamp.planning.decision import broken_limits
+    from nutdamp.planning.plan import Plan
+    from nutdamp.schemes.block_model import fired
 
     body = job.spacecraft
     blocks, warnings = read_blocks(path, body)

@@ -1,23 +1,394 @@
-"""How a command begins and ends: its files checked and its spacecraft read; its results written and shown."""
+"""How a command begins and ends: its files checked and its spacecraft read; its results written and shown.
+
+What several commands share: the spacecraft argument, options of pictures, what a file must have.
+
+What a long run shows while it runs, and how it is stopped.
+
+Where the files of a command line lie: no output may take the place of what is read, or of another output.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
+import functools
+import os
+import signal
+import stat
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import click
 
-from nutdamp.cli.common import FIGURES, Input, parsed, source
-from nutdamp.cli.places import expect_outputs
+from nutdamp.cli.options import FILE, Named
 from nutdamp.cli.screen import say, show
+from nutdamp.common.work import Watch, watched
+from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 
 if TYPE_CHECKING:
+    from collections.abc import Hashable
+
     from matplotlib.figure import Figure
     from rich.console import RenderableType
+    from rich.progress import Progress, TaskID
+    from rich.status import Status
 
-    from nutdamp.cli.scheme_options import Aim
+    from nutdamp.cli.options import Aim
     from nutdamp.errors import CannotWrite
-    from nutdamp.spacecraft import Spacecraft
+    from nutdamp.files.overrides import Setting
+    from nutdamp.spacecraft.model import Spacecraft
+
+
+DEFAULT_FILE = "spacecraft.yaml"
+
+FIGURES = ("overview", "motion", "sphere", "history", "timeline")
+"""Pictures that ``--plot`` can draw, the default first."""
+
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
+
+dispersions:
+  A: {normal: 2 %}
+  C: {normal: 2 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  timing: {uniform: 5 ms}"""
+"""What is said of a file that should have dispersions."""
+
+LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
+
+loop:
+  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
+  law: four-pulse
+  start: 0.5 deg
+  stop: 0.05 deg"""
+"""What is said of a file that should have a loop."""
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
+
+
+class Input(NamedTuple):
+    """The spacecraft that a command line names: the ``path`` of a file, and what ``--set`` changes in it."""
+
+    path: str | None
+    settings: tuple[Setting, ...] = ()
+
+
+def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
+    if not texts:
+        return ()
+    from nutdamp.files.overrides import parse_setting
+
+    try:
+        return tuple(parse_setting(text) for text in texts)
+    except ValueError as wrong:
+        raise click.BadParameter(str(wrong), ctx, param) from None
+
+
+set_option = click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_settings,
+    help="Change a key of the file, as limits.gap=1s; repeatable.",
+)
+
+
+def spacecraft_argument(command: Command) -> Command:
+    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`Input`) for `job.begin`."""
+
+    @functools.wraps(command)
+    def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
+        given = Input(spacecraft, settings)
+        try:
+            return command(*args, spacecraft=given, **parameters)
+        except Unsuitable as wrong:
+            raise placed(wrong, given) from None
+
+    argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
+    return cast(Command, argument(set_option(gathered)))
+
+
+def placed(wrong: Unsuitable, given: Input) -> NutdampError:
+    """The error as a fault with the place of the value in the spacecraft file, where it comes from one."""
+    if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
+        return wrong
+    from nutdamp.files.yaml import dotted, read_tree
+
+    text, name = source(given.path, lambda _: None)
+    place = read_tree(text, name)[0].place_of(wrong.where)
+    return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
+
+
+def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """``--plot FILE`` and which of the pictures ``names`` it is to be, the default first."""
+    which = click.option("--figure", type=Named(names), default=names[0], show_default=True, help="What --plot draws.")
+    where = click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+    return lambda command: where(which(command))
+
+
+def parsed(
+    text: tuple[str, str],
+    settings: tuple[Setting, ...],
+    remark: Callable[[str], None],
+    aim: Aim | None = None,
+    doubts: list[Fault] | None = None,
+) -> Spacecraft:
+    """The spacecraft in what `source` gives; ``aim`` replaces the goal in it, warnings are added to ``doubts``."""
+    from nutdamp.files.reader import read_spacecraft
+
+    def warn(doubt: Fault) -> None:
+        say(doubt.as_warning)
+        if doubts is not None:
+            doubts.append(doubt)
+
+    body = read_spacecraft(*text, settings, warn)
+    return body if aim is None else aim.applied(body, remark)
+
+
+def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
+    """The text of the spacecraft file that `load` reads, and its name."""
+    from pathlib import Path
+
+    from nutdamp.files.reader import example_text
+    from nutdamp.files.yaml import read_text
+
+    if path is None and Path(DEFAULT_FILE).exists():
+        remark(f"reading {DEFAULT_FILE}")
+        path = DEFAULT_FILE
+    if path is not None:
+        return read_text(Path(path)), path
+    remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
+    return example_text(), "example.yaml"
+
+
+def require_dispersions(body: Spacecraft) -> None:
+    """Raises BadRequest, which shows what to write, for a spacecraft without dispersions."""
+    from nutdamp.errors import BadRequest
+
+    if body.dispersions is None:
+        raise BadRequest(DISPERSIONS)
+
+
+def require_loop(body: Spacecraft) -> None:
+    """Raises BadRequest, which shows what to write, for a spacecraft without a closed loop."""
+    from nutdamp.errors import BadRequest
+
+    if body.loop is None:
+        raise BadRequest(LOOP)
+
+
+PATIENCE = 1.0
+"""Seconds that pass before a bar appears."""
+
+LONG = 10.0
+"""Seconds after which a line says how far the work is, where standard error is no terminal."""
+
+
+@contextmanager
+def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+    """A function to call now and then with how many of ``total`` are done.
+
+    It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
+    behind. Elsewhere one line says how far it is, after `LONG`.
+    """
+    shown = _Bar(what, total) if sys.stderr.isatty() else _Line(what, total)
+    try:
+        yield (lambda _: None) if quiet else shown.update
+    finally:
+        shown.close()
+
+
+@contextmanager
+def working(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Says ``what`` is done while it is done: which search, and how much of its budget of `work` is spent.
+
+    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    shown: list[Status] = []
+
+    def show() -> None:
+        from rich.console import Console
+
+        shown.append(Console(stderr=True).status(_Doing(what, watch)))
+        shown[0].start()
+
+    with watched() as watch:
+        timer = threading.Timer(PATIENCE, show)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()
+            for status in shown:
+                status.stop()
+
+
+class _Doing:
+    """``what`` is done, with the search that a ``watch`` sees and how far it is at the moment it is shown."""
+
+    def __init__(self, what: str, watch: Watch) -> None:
+        self.what, self.watch = what, watch
+
+    def __rich__(self) -> str:
+        budget = self.watch.budget
+        if budget is None:
+            return self.what
+        return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
+
+
+class _Line:
+    """What is shown where there is no terminal: one line, once, that names the share done and the time left."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self.what, self.total = what, total
+        self.began, self.said = time.monotonic(), False
+
+    def update(self, done: int) -> None:
+        passed = time.monotonic() - self.began
+        if self.said or passed < LONG:
+            return
+        self.said = True
+        left = passed * (self.total - done) / max(done, 1)
+        rest = f", about {left:.0f} s left" if left > 0.0 else ""
+        say(f"{self.what}: {min(done, self.total):,} of {self.total:,} done after {passed:.0f} s{rest}")
+
+    def close(self) -> None:
+        """Nothing is to be cleared."""
+
+
+class _Bar:
+    def __init__(self, what: str, total: int) -> None:
+        self.what, self.total = what, total
+        self.began = time.monotonic()
+        self.bar: Progress | None = None
+        self.task: TaskID | None = None
+
+    def update(self, done: int) -> None:
+        passed = time.monotonic() - self.began
+        if passed < PATIENCE:
+            return
+        if self.bar is None:
+            self._open()
+        assert self.bar is not None
+        assert self.task is not None
+        rate = done / passed
+        self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
+
+    def _open(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        self.bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=None),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self.task = self.bar.add_task(self.what, total=self.total, rate="")
+        self.bar.start()
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+
+class Stop:
+    """Whether a run was requested to stop, and by which signal."""
+
+    number: int | None = None
+
+    def __call__(self) -> bool:
+        """Whether it was."""
+        return self.number is not None
+
+
+@contextmanager
+def stoppable() -> Iterator[Stop]:
+    """Tells whether the run was requested to stop, by Ctrl-C or SIGTERM, so that it can end in order.
+
+    A second Ctrl-C interrupts at once.
+    """
+    stop = Stop()
+
+    def ask(number: int, _: FrameType | None) -> None:
+        if stop() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        stop.number = number
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+STANDARD = "-"
+"""File name that means standard input or standard output."""
+
+
+def expect_outputs(*read: Input | str | None, **written: str | Sequence[str] | None) -> bool:
+    """Whether an output file is standard output, so that nothing else may go there.
+
+    A usage error where an output, given by its option, is one of the files ``read`` or another output, under whatever
+    name: relative, or through links.
+    """
+    outputs = [
+        (f"--{option}", path)
+        for option, paths in written.items()
+        for path in ([paths] if isinstance(paths, str) else paths or ())
+    ]
+    standard = [option for option, path in outputs if path == STANDARD]
+    if len(standard) > 1:
+        raise click.UsageError(f"{' and '.join(standard)} cannot both go to standard output")
+    taken: dict[Hashable, str] = {}
+    if not standard:
+        taken[_identity(STANDARD, 1)] = "standard output goes to this file"
+    for given in read:
+        path = _path_of(given)
+        if path is not None:
+            taken[_identity(path, 0)] = "this command reads this file"
+    for option, path in outputs:
+        identity = _identity(path, 1)
+        if identity is not None and identity in taken:
+            raise click.UsageError(f"{option} {path}: {taken[identity]}; name another")
+        taken[identity] = f"{option} goes to this file"
+    return bool(standard)
+
+
+def _path_of(given: Input | str | None) -> str | None:
+    """The file that is read, if any."""
+    if not isinstance(given, Input):
+        return given
+    return DEFAULT_FILE if given.path is None and Path(DEFAULT_FILE).exists() else given.path
+
+
+def _identity(path: str, standard: int) -> Hashable:
+    """What tells one file from all others; None for what is no file, such as a terminal or /dev/null.
+
+    ``standard`` is the descriptor that ``-`` means.
+    """
+    try:
+        status = os.fstat(standard) if path == STANDARD else Path(path).stat()
+    except OSError:
+        return None if path == STANDARD else os.path.realpath(path)
+    return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None
+
 
 File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
 """What `write_whole` takes."""
@@ -89,7 +460,7 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
     """Write the JSON file of the job that has begun, if there is one: that nothing is feasible, and why."""
     if UNDER_WAY not in context.meta:
         return
-    from nutdamp.files.plan_json import infeasible_json
+    from nutdamp.views.plan_json import infeasible_json
 
     path, spacecraft = context.meta[UNDER_WAY]
     deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
@@ -101,9 +472,9 @@ def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
         if figure != FIGURES[0]:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
         return
-    from nutdamp.presentation import figures
+    from nutdamp.figures import image
 
-    figures.ending(path)
+    image.ending(path)
 
 
 def remarks(quiet: bool) -> Callable[[str], None]:
@@ -113,7 +484,7 @@ def remarks(quiet: bool) -> Callable[[str], None]:
 
 def expect_places(*paths: str) -> None:
     """Say at once, not after the work, that a file cannot be written where it is to be."""
-    from nutdamp.files.output import check_place
+    from nutdamp.files.tabular import check_place
 
     for path in paths:
         check_place(path)
@@ -133,7 +504,7 @@ def deliver(
     results = [make() for make in screens]
     if contents:
         from nutdamp.errors import CannotWrite
-        from nutdamp.files.output import write_whole
+        from nutdamp.files.tabular import write_whole
 
         for path, content in contents:
             try:
@@ -150,11 +521,11 @@ def deliver(
 
 def _file_of(content: File | dict[str, Any] | Figure, path: str) -> File:
     if isinstance(content, dict):
-        from nutdamp.files.output import json_text
+        from nutdamp.files.tabular import json_text
 
         return json_text(content)
     if isinstance(content, str | bytes) or callable(content):
         return content
-    from nutdamp.presentation.figures import rendered
+    from nutdamp.figures.image import rendered
 
     return rendered(content, path)

@@ -8,36 +8,33 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import (
+from nutdamp.cli.flown import compared_with, robust_of
+from nutdamp.cli.job import (
     FIGURES,
     Input,
+    Output,
+    begin,
     plot_options,
     quiet_option,
     require_dispersions,
     spacecraft_argument,
 )
-from nutdamp.cli.failures import show_failures
-from nutdamp.cli.flown import compared_with, robust_of
-from nutdamp.cli.job import Output, begin
-from nutdamp.cli.parameters import FILE, SchemeName
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options, scheme_options
-from nutdamp.cli.screen import say
-from nutdamp.errors import BadRequest, printable
-from nutdamp.schemes import PLANNED, Options
-from nutdamp.words import listed
+from nutdamp.cli.main import leave
+from nutdamp.cli.options import FILE, Aim, PlanningCommand, SchemeName, goal_options, scheme_options
+from nutdamp.cli.screen import say, show_failures
+from nutdamp.errors import BadRequest, listed, printable
+from nutdamp.schemes.catalogue import PLANNED, Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
-    from nutdamp.certificate import Certificate
-    from nutdamp.comparison import Comparison
-    from nutdamp.decision import Decision
     from nutdamp.errors import CannotWrite
-    from nutdamp.planning import Plan
-    from nutdamp.robust import RobustComparison
-    from nutdamp.spacecraft import Spacecraft
+    from nutdamp.planning.decision import Comparison, Decision
+    from nutdamp.planning.plan import Plan
+    from nutdamp.planning.robust import RobustComparison
+    from nutdamp.planning.tradeoff import Certificate
+    from nutdamp.spacecraft.model import Spacecraft
 
 
 SCHEMES, PRIMER = "schemes", "primer"
@@ -98,9 +95,9 @@ def command(
     if certificate is not None or curve is not None:
         _expect_certified(names, job.spacecraft)
 
-    from nutdamp.decision import decide
-    from nutdamp.files.schemes_csv import schemes_csv
-    from nutdamp.presentation import verdicts
+    from nutdamp.planning.decision import decide
+    from nutdamp.views import verdicts
+    from nutdamp.views.schemes_csv import schemes_csv
 
     compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
     dispersed = robust_of(job, compared, options) if robust else None
@@ -139,7 +136,7 @@ def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: 
     """The files of the plan to fly, if there is one."""
     if chosen is None:
         return []
-    from nutdamp.files.pulses_csv import pulses_csv
+    from nutdamp.files.schedules import pulses_csv
 
     return [(csv, partial(pulses_csv, chosen.flight)), (plot, partial(_picture, chosen, figure))]
 
@@ -159,7 +156,7 @@ def _outputs_of_blocks(
         raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
     if found is not chosen:
         remark(f"writing the blocks of {found.scheme}, which is not the recommended plan")
-    from nutdamp.files.blocks_csv import blocks_csv
+    from nutdamp.files.schedules import blocks_csv
 
     return [(path, partial(blocks_csv, found.flight))]
 
@@ -174,8 +171,8 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
 
     So it is too where it cannot plan, as without channels.
     """
-    from nutdamp.comparison import usual
-    from nutdamp.schemes.registry import OPTIMAL
+    from nutdamp.planning.decision import usual
+    from nutdamp.schemes.catalogue import OPTIMAL
 
     if OPTIMAL.name not in (names or usual(body)):
         raise BadRequest(f"a certificate is of {OPTIMAL.name}, which is not planned: name it with --scheme")
@@ -191,8 +188,8 @@ def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certi
     files = [path for path in paths if path is not None]
     if not files:
         return None, []
-    from nutdamp.certificate import SCHEME, certificate
     from nutdamp.errors import CannotWrite
+    from nutdamp.planning.tradeoff import SCHEME, certificate
 
     try:
         return certificate(next(one for one in compared if one.scheme == SCHEME)), []
@@ -204,45 +201,45 @@ def _outputs_of_proof(found: Certificate | None, path: str | None, plot: str | N
     """The files of a certificate, if there is one."""
     if found is None:
         return []
-    from nutdamp.files.certificate_json import certificate_json
+    from nutdamp.views.certificate_json import certificate_json
 
     def picture() -> Figure:
-        from nutdamp.presentation import figures
+        from nutdamp.figures import certificate
 
-        return figures.certificate_figure(found)
+        return certificate.certificate_figure(found)
 
     return [(path, partial(certificate_json, found)), (plot, picture)]
 
 
 def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:
-    from nutdamp.library.views import comparison_data
+    from nutdamp.page.results import comparison_data
 
     made = comparison_data(compared, decided)
     if dispersed is None:
         return made
-    from nutdamp.files.robust_json import robust_json
-    from nutdamp.presentation import robust_verdicts
+    from nutdamp.views import robust_verdicts
+    from nutdamp.views.robust_json import robust_json
 
     return {**made, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
 
 
 def _picture(chosen: Plan, figure: str) -> Figure:
-    from nutdamp.presentation import figures
+    from nutdamp.figures import export, overview
 
-    return figures.flight_figure(figure, *figures.shown(chosen))
+    return overview.flight_figure(figure, *export.shown(chosen))
 
 
 def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
-    from nutdamp.presentation import figures
+    from nutdamp.figures import schemes
 
-    return figures.schemes_figure(compared, decided)
+    return schemes.schemes_figure(compared, decided)
 
 
 def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:
     if dispersed is not None:
-        from nutdamp.presentation.robust_tables import robust_screen
+        from nutdamp.views.robust_tables import robust_screen
 
         return robust_screen(dispersed)
-    from nutdamp.presentation.plan_tables import comparison_screen
+    from nutdamp.views.plan_tables import comparison_screen
 
     return comparison_screen(compared)

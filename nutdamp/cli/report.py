@@ -10,19 +10,15 @@ from typing import Any
 
 import click
 
-from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import Input, quiet_option, require_dispersions, spacecraft_argument
 from nutdamp.cli.disperse import SAMPLES
-from nutdamp.cli.failures import show_failures
 from nutdamp.cli.flown import Flown, compared_with, plan_or_read, robust_of
-from nutdamp.cli.job import begin, deliver
-from nutdamp.cli.parameters import FILE, Count, SchemeName, is_number
-from nutdamp.cli.progress import working
-from nutdamp.cli.scheme_options import Aim, Grouped, PlanningCommand, goal_options
+from nutdamp.cli.job import Input, begin, deliver, quiet_option, require_dispersions, spacecraft_argument, working
+from nutdamp.cli.main import leave
+from nutdamp.cli.options import FILE, Aim, Count, Grouped, PlanningCommand, SchemeName, goal_options, is_number
+from nutdamp.cli.screen import show_failures
 from nutdamp.cli.trade import trade_with
 from nutdamp.errors import printable
-from nutdamp.schemes import PLANNED, Options
-from nutdamp.schemes.options import LEAST
+from nutdamp.schemes.catalogue import LEAST, PLANNED, Options
 
 POINTS = 6
 """Horizons tried for each front where no number follows ``--trade``."""
@@ -115,7 +111,7 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output. Needs the extra plot.
     """
-    from nutdamp.presentation.page.html import expect_html
+    from nutdamp.page.html import expect_html
 
     expect_html(output)
     flown = Flown(names[0] if names else None, schedule, blocks)
@@ -123,10 +119,10 @@ def command(
         raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
 
-    from nutdamp.comparison import compare_plans
-    from nutdamp.files.yaml_tree import dotted
-    from nutdamp.library.reports import controlled, made_of
-    from nutdamp.presentation.page.content import Repeat
+    from nutdamp.api import controlled, made_of
+    from nutdamp.files.yaml import dotted
+    from nutdamp.page.content import Repeat
+    from nutdamp.planning.decision import compare_plans
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
     set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)

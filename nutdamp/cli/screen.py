@@ -2,6 +2,8 @@
 
 Names of files, channels or units come from elsewhere; on a terminal their control characters could clear the screen,
 change its title or pass for output of this program.
+
+What is said of schemes that have a bug.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from nutdamp.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+
+    from nutdamp.planning.decision import Comparison
 
 
 NARROWEST = 20
@@ -69,3 +73,27 @@ class _Visible:
 
         for text, style, control in console.render(self.renderable, options):
             yield Segment(text if control else visible(text), style, control)
+
+
+DEBUG = "nutdamp.debug"
+"""Where the context of a command line keeps that ``--debug`` is given."""
+
+
+def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    ctx.meta[DEBUG] = value
+
+
+debug_option = click.option(
+    "--debug", is_flag=True, expose_value=False, callback=_debugging, help="Show the traceback of an internal error."
+)
+
+
+def show_failures(compared: Comparison) -> bool:
+    """Say on standard error which schemes have a bug, with ``--debug`` the tracebacks too; whether there are any."""
+    for plan in compared.failed:
+        if click.get_current_context().meta.get(DEBUG):
+            import traceback
+
+            say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
+        say(f"nutdamp: {plan.scheme}: {plan.refusal} (--debug shows the traceback)")
+    return bool(compared.failed)

@@ -1,4 +1,7 @@
-"""``nutdamp simulate``: propagate a scheme or a schedule file."""
+"""``nutdamp simulate``: propagate a scheme or a schedule file.
+
+``nutdamp animate``: the cones rolling on each other, as a film.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,82 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import FIGURES, Input, plot_options, quiet_option, spacecraft_argument
 from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.job import Output, begin
-from nutdamp.cli.parameters import FILE, EndTime
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, goal_options
-from nutdamp.schemes import Options
+from nutdamp.cli.job import (
+    FIGURES,
+    Input,
+    Output,
+    begin,
+    deliver,
+    plot_options,
+    progress,
+    quiet_option,
+    spacecraft_argument,
+)
+from nutdamp.cli.main import leave
+from nutdamp.cli.options import FILE, Aim, EndTime, PlanningCommand, goal_options
+from nutdamp.errors import printable
+from nutdamp.schemes.catalogue import Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
-    from nutdamp.simulation import Simulation
-    from nutdamp.track import Track
+    from nutdamp.flight.track import Track
+    from nutdamp.planning.decision import Simulation
+
+
+@click.command("animate", cls=PlanningCommand)
+@spacecraft_argument
+@flown_options("Show")
+@goal_options
+@click.option("-o", "--output", type=FILE, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
+@click.option("--until", type=EndTime(), help="End of the motion; default soon after the last pulse.")
+@click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
+@click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
+@click.option(
+    "--width", type=click.IntRange(320, 3840), default=800, show_default=True, help="Width in pixels; height 0.6 of it."
+)
+@quiet_option
+def animate_command(
+    spacecraft: Input,
+    flown: Flown,
+    options: Options,
+    aim: Aim,
+    output: str,
+    until: float | None,
+    seconds: float | None,
+    fps: int,
+    width: int,
+    quiet: bool,
+) -> None:
+    """Film the body cone rolling on the space cone through the pulses, flown with their real widths.
+
+    SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
+    standard output, as GIF.
+    """
+    from nutdamp.figures import animation
+
+    animation.film_format(output)
+    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
+    body, remark = job.spacecraft, job.remark
+    pulses = plan_or_read(job, flown, options).pulses
+
+    from nutdamp.figures.geometry import shown_until
+    from nutdamp.flight import propagation
+
+    end = shown_until(body, pulses) if until is None else until
+    timed = animation.timing(body, end, fps, seconds)
+    if not timed.smooth:
+        remark(
+            f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
+            f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
+        )
+    made = propagation.flown(body, pulses, end)
+    with progress("filming", timed.frames, quiet=quiet) as step:
+        deliver([(output, lambda: lambda stream: animation.film(stream, made, timed, output, width, step))])
+    if output != "-":
+        remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")
 
 
 PICTURED = 100_000
@@ -74,12 +139,12 @@ def command(
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     plan = plan_or_read(job, flown, options, jitter=True, judged=not job.silent)
 
-    from nutdamp.files.simulation_json import simulation_json
-    from nutdamp.files.track_csv import write_track
-    from nutdamp.presentation.decisions import verdict
-    from nutdamp.presentation.geometry import shown_until
-    from nutdamp.presentation.verdicts import model_warnings
-    from nutdamp.simulation import Simulation
+    from nutdamp.figures.geometry import shown_until
+    from nutdamp.files.tabular import write_track
+    from nutdamp.planning.decision import Simulation
+    from nutdamp.views.decisions import verdict
+    from nutdamp.views.simulation_json import simulation_json
+    from nutdamp.views.verdicts import model_warnings
 
     body, pulses = plan.spacecraft, plan.pulses
     made = Simulation(plan, pulses.end + body.inertial_period if until is None else until, real, samples)
@@ -98,20 +163,20 @@ def command(
 
 
 def _picture(made: Simulation, track: Track | None, figure: str) -> Figure:
-    from nutdamp.presentation import figures
+    from nutdamp.figures import overview
 
     assert track is not None
-    return figures.flight_figure(figure, made.shown, track)
+    return overview.flight_figure(figure, made.shown, track)
 
 
 def _screen(made: Simulation) -> RenderableType:
-    from nutdamp.presentation.simulate_tables import simulation_screen
+    from nutdamp.views.simulate_tables import simulation_screen
 
     return simulation_screen(made)
 
 
 def _drawing(made: Simulation, track: Track | None) -> RenderableType:
-    from nutdamp.presentation.terminal import motion_drawing
+    from nutdamp.figures.terminal import motion_drawing
 
     assert track is not None
     return motion_drawing(made.shown, track)

@@ -9,21 +9,29 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.boundary import leave
-from nutdamp.cli.common import Input, quiet_option, spacecraft_argument
-from nutdamp.cli.job import Job, Output, begin, remarks
-from nutdamp.cli.parameters import FILE, FOLDER, Bare, Named, Quantity, reading_of
-from nutdamp.cli.scheme_options import Aim, PlanningCommand, expect_read, goal_options
-from nutdamp.schemes.options import LEAST, Options
-from nutdamp.schemes.registry import OPTIMAL
+from nutdamp.cli.job import Input, Job, Output, begin, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.main import leave
+from nutdamp.cli.options import (
+    FILE,
+    FOLDER,
+    Aim,
+    Bare,
+    Named,
+    PlanningCommand,
+    Quantity,
+    expect_read,
+    goal_options,
+    reading_of,
+)
+from nutdamp.schemes.catalogue import LEAST, OPTIMAL, Options
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
+    from nutdamp.api import Trade
     from nutdamp.errors import CannotWrite
-    from nutdamp.fronts import Front
-    from nutdamp.library.studies import Trade
+    from nutdamp.planning.tradeoff import Front
 
 
 class Allowance(Quantity):
@@ -77,9 +85,9 @@ def command(
     """
     if any(shift < 0.0 for shift in allow):
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
-    from nutdamp.files.trade_files import schedule_paths, trade_csv
-    from nutdamp.fronts import numbered
-    from nutdamp.remarks import CUT
+    from nutdamp.planning.decision import CUT
+    from nutdamp.planning.tradeoff import numbered
+    from nutdamp.views.trade_files import schedule_paths, trade_csv
 
     shifts = allow or (0.0, math.inf)
     most = points * len(set(shifts))
@@ -102,8 +110,8 @@ def command(
 
 def trade_with(job: Job, points: int, shifts: Sequence[float], least: str, options: Options) -> Trade:
     """The fronts, with a bar."""
-    from nutdamp.cli.progress import progress
-    from nutdamp.library.studies import trade
+    from nutdamp.api import trade
+    from nutdamp.cli.job import progress
 
     with progress("searching", points * len(set(shifts)), quiet=job.quiet) as step:
         known = options.with_disturbances
@@ -113,8 +121,8 @@ def trade_with(job: Job, points: int, shifts: Sequence[float], least: str, optio
 def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
     """A file of each schedule, or why the folder cannot be made."""
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.output import make_folder
-    from nutdamp.files.trade_files import schedule_files
+    from nutdamp.files.tabular import make_folder
+    from nutdamp.views.trade_files import schedule_files
 
     try:
         make_folder(folder)
@@ -124,12 +132,12 @@ def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[
 
 
 def _picture(traded: Trade) -> Figure:
-    from nutdamp.presentation import figures
+    from nutdamp.figures import trade
 
-    return figures.trade_figure(traded.spacecraft, traded.fronts)
+    return trade.trade_figure(traded.spacecraft, traded.fronts)
 
 
 def _screen(traded: Trade) -> RenderableType:
-    from nutdamp.presentation.trade_tables import trade_screen
+    from nutdamp.views.trade_tables import trade_screen
 
     return trade_screen(traded.spacecraft, traded.fronts)

@@ -7,6 +7,14 @@ With noise of one sigma s on each sample, residuals r = measured - predicted, an
 J the derivatives of the prediction at the minimum: P is then the Cramér-Rao bound, which least squares attains for
 normal noise as far as the motion is linear over the errors. Outliers are found under a loss that grows linearly beyond
 a few sigma (scipy's soft_l1) and left out of the last fits, so that they cost no efficiency. Noise is estimated.
+
+Whether a fit explains its record: what it leaves must be the noise that neighbouring samples show.
+
+Second differences of the residuals, r[k-1] - 2 r[k] + r[k+1], have the standard deviation √6 s of noise s, and next to
+nothing of what changes slowly. Residuals far larger than that s are no noise but motion that the model does not have,
+such as a pulse: their sigmas would mean nothing.
+
+The noise of each signal, from what a fit leaves of its samples.
 """
 
 from __future__ import annotations
@@ -19,15 +27,189 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation import aliases, noises
-from nutdamp.estimation.guess import once_a_turn, starts
+from nutdamp.estimation import initial_guess
+from nutdamp.estimation.initial_guess import once_a_turn, starts
 from nutdamp.estimation.model import Matrix, Model, Vector
-from nutdamp.estimation.record import ACCELERATION, GYROS, SUN_PULSE, Record
-from nutdamp.estimation.unexplained import expect_explained
-from nutdamp.physics import cones
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.estimation.parameters import ACCELERATION, GYROS, SUN_PULSE, Record, quantisation
+from nutdamp.physics import body as rigid_body
+from nutdamp.spacecraft.model import Spacecraft
+
+NORMAL_MAD = 1.4826
+"""Standard deviation of normal numbers over their median magnitude."""
+
+ROUNDING = 1e-7
+"""Noise that a signal has at least, as a share of its largest value: no telemetry has more digits."""
+
+
+def least(model: Model) -> Vector:
+    """Noise that each signal has at least: that of its steps, and rounding."""
+    found = []
+    for index, name in enumerate(model.signals):
+        values = model.measured[model.signal == index]
+        step = model.record.sun_step if name == SUN_PULSE else 0.0 if name == "axis" else quantisation(values)
+        size = {"axis": 1.0, SUN_PULSE: 1.0 / abs(model.spacecraft.spin)}.get(name, float(np.abs(values).max()))
+        found.append(max(step / math.sqrt(12.0), ROUNDING * size))
+    return np.array(found)
+
+
+def robust(model: Model, left: Vector) -> Vector:
+    """One sigma of each signal by its median magnitude, which outliers hardly change."""
+    return np.array(
+        [NORMAL_MAD * float(np.median(np.abs(left[model.signal == index]))) for index in range(len(model.signals))]
+    )
+
+
+def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None) -> Vector:
+    """One sigma of each signal by its samples that are no outliers; ``leverage`` is what the fit takes of each.
+
+    Of n samples with leverages that add up to p the mean of the variance is Σr²/(n - p - 2): that of its posterior,
+    so that regions made with it hold as often as they should.
+    """
+    found, signal = [], model.signal[used]
+    for index in range(len(model.signals)):
+        rows = signal == index
+        spent = 0.0 if leverage is None else float(leverage[rows].sum()) + 2.0
+        total = float(left[used][rows] @ left[used][rows])
+        found.append(math.sqrt(total / max(float(rows.sum()) - spent, 1.0)))
+    return np.array(found)
+
+
+FAR = 2.0
+"""Times the noise of neighbouring samples from which on residuals are no noise."""
+
+PART = 1e-3
+"""Part of what varies in a signal that such residuals have at least: records without noise show smaller ones."""
+
+WINDOWS = (4, 8, 16, 32, 64)
+"""Samples in a row among which those left out are counted."""
+
+CHANCE = 1e-6
+"""Probability by which they may be scattered so unevenly."""
+
+FEWEST_JUDGED = 20
+"""Samples of a signal that are judged at least."""
+
+SPLITS, SAMPLES = 120, 2000
+"""Times at which a step is looked for, and samples of a signal used for that, at most."""
+
+STEP = 0.7
+"""Part of the residuals that is left beside a step, at most, for it to count as found where they are no noise."""
+
+SHOWN = 50.0
+"""Decrease of the sum of squares, in units of the noise, by which a step shows in residuals that are nearly noise."""
+
+
+def expect_explained(found: Fit) -> None:
+    """Raises Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one.
+
+    So it does where samples are left out that follow each other: outliers come one by one, motion does not.
+    """
+    model = found.model
+    burst = left_out_together(found)
+    if burst is not None:
+        signal, begins, ends, count = burst
+        raise Infeasible(
+            f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: {count} samples would "
+            f"have to be left out, which is motion and no outlier; {_cure(found)}"
+        )
+    left = [index for index in range(len(model.signals)) if _more_than_noise(found, index)]
+    if not left:
+        return
+    signals = ", ".join(model.signals[index] for index in left)
+    more = max(found.noise[index] / _noise(found, index) for index in left)
+    says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
+    time = step(found, left)
+    where = "" if time is None else f", with a step at about {time:.4g} s"
+    raise Infeasible(f"{says}{where}; {_cure(found)}")
+
+
+def _cure(found: Fit) -> str:
+    fired = found.model.record.fired
+    what = "check the channels and times of the schedule" if fired else "give the pulses fired in it with --schedule"
+    return f"{what}; a record of the coast before or after needs none"
+
+
+def left_out_together(found: Fit) -> tuple[str, float, float, int] | None:
+    """Signal, first and last time (s), and number of samples that were left out though they follow each other.
+
+    None where those left out lie as scattered as chance has it: of any `WINDOWS` samples in a row no more than by the
+    share left out elsewhere (binomial tail, `CHANCE` for all windows).
+    """
+    model, least, burst = found.model, CHANCE, None
+    for index, signal in enumerate(model.signals):
+        rows = np.flatnonzero(model.signal == index)
+        rows = rows[np.argsort(model.times[rows], kind="stable")]
+        out = ~found.used[rows]
+        sums = np.concatenate([[0], np.cumsum(out)])
+        for width in (one for one in WINDOWS if one < len(rows)):
+            counts = sums[width:] - sums[:-width]
+            elsewhere = np.maximum(sums[-1] - counts, 1.0) / (len(rows) - width)
+            chances = len(rows) * bdtrc(counts - 1, width, np.minimum(elsewhere, 1.0))
+            at = int(np.argmin(np.where(counts > 0, chances, np.inf)))
+            if counts[at] > 0 and chances[at] < least:
+                least = float(chances[at])
+                those = model.times[rows][at : at + width][out[at : at + width]]
+                burst = signal, float(those[0]), float(those[-1]), int(counts[at])
+    return burst
+
+
+def _rows(found: Fit, signal: int) -> Vector:
+    return np.asarray(found.residuals[found.model.signal == signal])
+
+
+def _noise(found: Fit, signal: int) -> float:
+    """Noise of a signal by its second differences; at least that of its steps."""
+    second = np.diff(_rows(found, signal), 2)
+    noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
+    return max(noise, float(least(found.model)[signal]))
+
+
+def _more_than_noise(found: Fit, signal: int) -> bool:
+    model = found.model
+    values = model.measured[model.signal == signal]
+    if (
+        model.signals[signal] == SUN_PULSE
+        or len(values) < FEWEST_JUDGED
+        or found.noise[signal] < FAR * _noise(found, signal)
+    ):
+        return False
+    varied = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+    return bool(found.noise[signal] > PART * varied) and not found.white(signal)
+
+
+def step(found: Fit, signals: Sequence[int], *, small: bool = False) -> float | None:
+    """When the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals.
+
+    None where no step shows; ``small``: one that may hide in noise.
+    """
+    model = found.model
+    chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION)]
+    rate = initial_guess.nutation_rate(model, found.values)
+    splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
+    total, left = 0.0, np.zeros(len(splits))
+    for index in chosen:
+        rows = np.flatnonzero((model.signal == index) & (found.used | (not small)))
+        rows = rows[:: -(-len(rows) // SAMPLES)]
+        times, values = model.times[rows], found.residuals[rows] / found.noise[index]
+        turn = rate * (times - model.record.start)
+        wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
+        # Waves that grow linearly stand for what a rate that is off does, with or without a step.
+        smooth = np.column_stack([wave, wave * (times - times.mean())[:, None] / model.record.length])
+        total += _remains(smooth, values)
+        left += [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
+    best = int(np.argmin(left))
+    shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
+    return float(splits[best]) if chosen and shows else None
+
+
+def _remains(columns: Vector, values: Vector) -> float:
+    """Sum of squares that least squares leaves."""
+    solved = np.linalg.lstsq(columns, values, rcond=1e-10)[0]
+    return float(np.sum((values - columns @ solved) ** 2))
+
 
 OUTLIER = 5.0
 """Standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03."""
@@ -124,7 +306,7 @@ class Fit:
     @cached_property
     def resolved(self) -> NDArray[np.bool_]:
         """Of each signal, whether its noise is more than its digits or its steps make anyway."""
-        return np.asarray(self.noise > noises.least(self.model) * (1.0 + 1e-9))
+        return np.asarray(self.noise > least(self.model) * (1.0 + 1e-9))
 
     def whiteness(self, signal: int, lags: int = 40) -> Vector:
         """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are below 1.96/√n."""
@@ -161,7 +343,9 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     _expect_alive(model)
     found = _settled(model, _best(model))
     _expect_seen(found)
-    found = aliases.likeliest([found, *(_settled(model, one) for one in aliases.neighbours(model, found.values))])
+    found = initial_guess.likeliest(
+        [found, *(_settled(model, one) for one in initial_guess.neighbours(model, found.values))]
+    )
     if record.fired:
         return found
     if model.unequal:
@@ -230,7 +414,7 @@ def _expect_enough(model: Model) -> None:
             "unknowns; a longer record, or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
-    period = cones.body_period(body.inertia.A, body.inertia.C, body.spin)
+    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin)
     if set(model.signals) == {"axis"}:
         period = body.inertial_period
     if length < 0.5 * period:
@@ -306,7 +490,7 @@ def _scales(model: Model) -> Vector:
     found = []
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
-        spread = noises.NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
+        spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
         found.append(0.1 * spread or {"axis": 1e-3, SUN_PULSE: 0.01 / abs(model.spacecraft.spin)}.get(name, 1e-4))
     return np.array(found)
 
@@ -378,16 +562,16 @@ def _search(
 
 def _settled(model: Model, values: Vector) -> Fit:
     """The last fits: noise and outliers found, then plain least squares over what is no outlier."""
-    floor = noises.least(model)
-    noise = np.maximum(noises.robust(model, _residuals(model, values)), floor)
+    floor = least(model)
+    noise = np.maximum(robust(model, _residuals(model, values)), floor)
     every = np.ones(len(model.measured), dtype=bool)
     values, _ = _search(model, values, noise, every, robust=True)
     used = every
     for _ in range(ROUNDS):
         before, left = (noise, used), _residuals(model, values)
-        noise = np.maximum(noises.robust(model, left), floor)
+        noise = np.maximum(robust(model, left), floor)
         used = np.abs(left) < OUTLIER * noise[model.signal]
-        noise = np.maximum(noises.plain(model, left, used), floor)
+        noise = np.maximum(plain(model, left, used), floor)
         if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
             break
         values, _ = _search(model, values, noise, used, robust=False)
@@ -395,7 +579,7 @@ def _settled(model: Model, values: Vector) -> Fit:
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = _covariance(model, scaled)
-        noise = np.maximum(noises.plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
+        noise = np.maximum(plain(model, left, used, np.sum((scaled @ covariance) * scaled, axis=1)), floor)
     return Fit(model, values, covariance, noise, used, left, slopes)
 
 

@@ -18,18 +18,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.control_loop.sensor import felt, is_blind
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
-from nutdamp.estimation.parameters import Parameter, in_moments, parameters, prior
-from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, SUN_PULSE, Record
-from nutdamp.flight import Flight, flown
-from nutdamp.loop.sensor import felt, is_blind
-from nutdamp.loop_settings import ACCELEROMETER
-from nutdamp.motion import Arc, Path
-from nutdamp.physics import attitude, energy_sink, sun_clock, triaxial
-from nutdamp.physics.rigid import Forcing
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Attitude, Inertia, Spacecraft, SpinState
+from nutdamp.estimation.parameters import (
+    ACCELERATION,
+    AXIS,
+    GYROS,
+    SUN_PULSE,
+    Parameter,
+    Record,
+    in_moments,
+    parameters,
+    prior,
+)
+from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, flown, make_dynamics
+from nutdamp.physics import attitude, energy_sink, sky, triaxial
+from nutdamp.physics.taylor import Forcing
+from nutdamp.spacecraft.equipment import ACCELEROMETER
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
+from nutdamp.spacecraft.schedule import Schedule
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -229,7 +236,7 @@ class Model:
         of_body = attitude.multiply(quaternion, attitude.from_matrix(body.inertia.axes))
         sun = np.broadcast_to(body.sun[:, None], (3, len(rates)))
         sense = math.copysign(1.0, body.spin)
-        ahead, rate = sun_clock.ahead((rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
+        ahead, rate = sky.ahead((rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
         off = (ahead + math.pi) % (2.0 * math.pi) - math.pi
         return np.asarray(off / np.where(rate > 0.0, rate, abs(body.spin)))
 

@@ -1,1 +1,0 @@
-"""Files in and out: spacecraft files (YAML, JSON), schedules, tracks and results."""

@@ -1,16 +1,71 @@
-"""Numbers without a unit that are hardly what was meant, with the unit that was: for warnings."""
+"""Numbers without a unit that are hardly what was meant, with the unit that was: for warnings.
+
+What a file given as a spacecraft file is instead: kinds that nutdamp writes or imports, by their first lines.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from nutdamp.files.dispersion_models import VALVE_TIMES
-from nutdamp.files.facts import Facts, Finding
-from nutdamp.files.rules import inertia_of, spin_of
-from nutdamp.files.yaml_tree import KeyPath, Node
-from nutdamp.physics.cones import momentary
+from nutdamp.files.fields import KeyPath
+from nutdamp.files.keys import VALVE_TIMES
+from nutdamp.files.rules import Facts, Finding, inertia_of, spin_of
+from nutdamp.files.yaml import Node
+from nutdamp.physics.body import momentary
 from nutdamp.units import KINDS
+
+LOOKED_AT = 4000
+"""Characters from the beginning that are looked at."""
+
+
+class Foreign(NamedTuple):
+    """A kind of file: the ``pattern`` of its first lines, what it ``is``, and what to do with it."""
+
+    pattern: str
+    is_: str
+    cure: str
+
+
+FOREIGN = (
+    Foreign(
+        r"[^\n]*\bstart_s\b[^\n]*,|[^\n]*\bt_s,[^\n]*\bon_time_s\b",
+        "a schedule, as `plan --csv` writes it",
+        "name it with --schedule, behind its spacecraft file",
+    ),
+    Foreign(
+        r"[^\n]*\bomega_1_rad_s\b",
+        "a track, as `simulate --csv` writes it",
+        "name the spacecraft file that it was made from",
+    ),
+    Foreign(
+        r'\s*\{\s*"nutdamp"',
+        "a result in JSON, as nutdamp writes it",
+        "name the spacecraft file that it was made from",
+    ),
+    Foreign(
+        r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_APM_VERS",
+        "a CCSDS attitude parameter message",
+        "`nutdamp import FILE` makes a spacecraft file of it",
+    ),
+    Foreign(
+        r"\s*(?:COMMENT[^\n]*\n\s*)*CCSDS_\w+_VERS|\s*<\?xml|\s*<!DOCTYPE|\s*<html",
+        "a CCSDS message, or another XML or HTML text",
+        "a spacecraft file is in YAML; `nutdamp init` writes one to start from",
+    ),
+)
+"""In this order, the first that fits."""
+
+
+def foreign(text: str) -> str | None:
+    """That a text is no spacecraft file but of another known kind, and the cure; None where nothing shows that."""
+    for kind in FOREIGN:
+        if re.match(kind.pattern, text[:LOOKED_AT]):
+            return f"expected a spacecraft file, got {kind.is_}; {kind.cure}"
+    return None
+
 
 FAR = 50.0
 """m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm."""

@@ -1,28 +1,331 @@
 """What must hold between several keys of a spacecraft file.
 
 The rules read the raw tree and skip what cannot be read, so that they speak up whatever else is wrong.
+
+What must hold between the keys of a spacecraft file that name directions in space: Sun, cones, attitude.
+
+What must hold between the keys of thrusters and channels of a spacecraft file.
+
+The raw tree of a spacecraft file as rules read it: what can be read is a value, what cannot is None.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.files.facts import MOMENT, Facts, Finding
-from nutdamp.files.fields import SMALLEST
-from nutdamp.files.sky_rules import sky_findings
-from nutdamp.files.thruster_rules import CANCELLED, channels, norm, thrusters
-from nutdamp.files.yaml_tree import KeyPath, Node, dotted
-from nutdamp.physics import stability
-from nutdamp.physics.inertia import principal_axes
-from nutdamp.schedule import STEERABLE
-from nutdamp.spacecraft import Inertia
-from nutdamp.units import shown
+from nutdamp.common.time import Epoch
+from nutdamp.errors import nearest
+from nutdamp.files.fields import SMALLEST, KeyPath
+from nutdamp.files.yaml import Node, dotted
+from nutdamp.physics import attitude, sky
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics.body import principal_axes
+from nutdamp.spacecraft.model import Inertia
+from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.units import parse, shown
 
 Vector = NDArray[np.float64]
+
+
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
+"""Keys for single parts of an inertia tensor, which a file gives as a whole."""
+
+
+class Finding(NamedTuple):
+    """Something wrong at ``path``, which need not exist; ``at_key`` points at the key and not at its value."""
+
+    path: KeyPath
+    problem: str
+    at_key: bool = False
+
+
+class Facts:
+    """The values of a tree that can be read."""
+
+    def __init__(self, root: Node) -> None:
+        self.root = root
+
+    def has(self, *path: str | int) -> bool:
+        """Whether something is at ``path``."""
+        return self.root.get(*path) is not None
+
+    def text(self, *path: str | int) -> str | None:
+        """The text at ``path``."""
+        node = self.root.get(*path)
+        return node.value if node is not None and isinstance(node.value, str) else None
+
+    def number(self, kind: str, *path: str | int) -> float | None:
+        """The quantity at ``path``, SI."""
+        node = self.root.get(*path)
+        try:
+            return None if node is None else parse(node.plain(), kind)
+        except ValueError:
+            return None
+
+    def vector(self, kind: str, size: int, *path: str | int) -> Vector | None:
+        """The ``size`` quantities at ``path``, SI; None unless all can be read."""
+        if len(self.children(*path)) != size:
+            return None
+        numbers = [self.number(kind, *path, index) for index in range(size)]
+        return None if None in numbers else np.array(numbers, dtype=np.float64)
+
+    def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
+        """Keys or positions at ``path``, and what is there."""
+        node = self.root.get(*path)
+        return [] if node is None else list(node.children())
+
+
+ALONG = 1e-3
+"""rad from the spin axis, up to which the Sun counts as along it."""
+
+NO_ATTITUDE = "needs attitude, which says where the body points at t = 0"
+
+
+def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
+    """Everything wrong with ``orbit``, ``sun``, ``keep`` and ``commands``.
+
+    ``axis`` (3,) is the axis in the body about which it spins at ``spin`` rad/s, or None where that cannot be read.
+    """
+    yield from _orbit(facts)
+    yield from _sun(facts)
+    yield from _command_blocks(facts, spin, axis)
+    for index, _ in facts.children("keep"):
+        yield from _cone(facts, ("keep", index))
+
+
+def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
+    """What is wrong between sun_sensor and commands; ``axis`` (3,) is axis 3, and ``spin`` rad/s its rate."""
+    if facts.has("commands") and not facts.has("sun_sensor"):
+        yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
+    if facts.has("sun_sensor") and not facts.has("sun"):
+        yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
+    if spin is not None:
+        turn = 2.0 * math.pi / abs(spin)
+        width = facts.number("time", "commands", "width", "max")
+        if width is not None and width >= turn:
+            problem = f"{width:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
+            yield Finding(("commands", "width", "max"), problem)
+        yield from _sun_in_view(facts, math.copysign(1.0, spin) * axis)
+    least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
+    if least is not None and most is not None and least > most:
+        yield Finding(("commands", "width", "min"), f"{least:g} s exceeds max; expected at most {most:g} s")
+
+
+def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
+    """A Sun that gives no pulse: along the spin ``axis`` (3,) in the body at t = 0, or out of the sensor's view."""
+    turned, direction = facts.vector("number", 4, "attitude", "quaternion"), _to_sun(facts)
+    if not facts.has("sun_sensor") or turned is None or direction is None or not np.any(turned):
+        return
+    seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
+    angle = float(attitude.angle_between(seen, axis))
+    if min(angle, math.pi - angle) < ALONG:
+        yield Finding(("sun",), "lies along the spin axis at t = 0, so that no Sun pulse comes to fire blocks")
+        return
+    middle = facts.number("angle", "sun_sensor", "elevation") or 0.0
+    half_width = facts.number("angle", "sun_sensor", "half_width")
+    if half_width is not None and abs(0.5 * math.pi - angle - middle) > half_width:
+        low, high = (math.degrees(0.5 * math.pi - middle + side * half_width) for side in (-1.0, 1.0))
+        problem = (
+            f"never sees the Sun, which is {math.degrees(angle):.4g} deg from the spin axis at t = 0; "
+            f"it sees from {max(low, 0.0):.4g} to {min(high, 180.0):.4g} deg"
+        )
+        yield Finding(("sun_sensor",), problem, True)
+
+
+def _orbit(facts: Facts) -> Iterator[Finding]:
+    if not facts.has("orbit"):
+        return
+    missing = [key for key in ("epoch", "frame") if not facts.has("attitude", key)]
+    if missing:
+        names = " and ".join(f"attitude.{key}" for key in missing)
+        yield Finding(("orbit",), f"needs {names}: the moment of the position and the axes that it is in", True)
+    position = facts.vector("length", 3, "orbit", "position")
+    if position is not None and not position.any():
+        yield Finding(("orbit", "position"), "is zero; expected the position of the spacecraft relative to center")
+    center = facts.text("orbit", "center")
+    if center is not None and not (center.strip() and center.isascii() and center.isprintable()):
+        yield Finding(("orbit", "center"), f"{shown(center)} is no name of a body; expected one such as EARTH")
+
+
+def _to_sun(facts: Facts) -> Vector | None:
+    """The direction (3,) to the Sun, given or of the epoch; None where it cannot be read."""
+    given = facts.vector("angle", 2, "sun")
+    if given is not None:
+        return attitude.on_sphere(*given.tolist())
+    epoch = facts.text("attitude", "epoch")
+    if facts.text("sun") != "epoch" or epoch is None:
+        return None
+    try:
+        return sky.direction(Epoch.parse(epoch).days_of_j2000)
+    except ValueError:
+        return None
+
+
+def _sun(facts: Facts) -> Iterator[Finding]:
+    if not facts.has("sun"):
+        return
+    yield from _direction(facts, ("sun",))
+    if facts.text("sun") != "epoch" or not facts.has("attitude"):
+        return
+    epoch = facts.text("attitude", "epoch")
+    if epoch is None:
+        yield Finding(("sun",), "epoch needs attitude.epoch, the date of t = 0; or give [right ascension, declination]")
+        return
+    try:
+        Epoch.parse(epoch)
+    except ValueError:
+        cure = "give [right ascension, declination]"
+        yield Finding(("sun",), f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}")
+
+
+def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    yield from _direction(facts, (*path, "direction"))
+    if facts.text(*path, "direction") == "sun" and not facts.has("sun"):
+        yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
+    least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
+    if not facts.has(*path, "min") and not facts.has(*path, "max"):
+        yield Finding((*path, "min"), "missing; give min, max or both, else the cone has no effect")
+    if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
+        problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
+        yield Finding((*path, "min"), problem)
+
+
+def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    """What is wrong with a direction, by two angles or by a word."""
+    if not facts.has("attitude") and facts.has(*path):
+        yield Finding(path, NO_ATTITUDE, True)  # at the key: what is written there is judged too
+    declination = facts.number("angle", *path, 1)
+    if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
+        found = f"{math.degrees(declination):g} deg"
+        yield Finding((*path, 1), f"{found} is no declination; expected an angle from -90 deg to 90 deg")
+
+
+CANCELLED = 1e-12
+"""A sum that is smaller than its terms by this factor is rounding; it counts as zero."""
+
+
+def norm(vector: Vector) -> float:
+    """Length of a vector, without the underflow of squares."""
+    return math.hypot(*vector)
+
+
+def force_vector(direction: Iterable[float], force: float) -> Vector:
+    """Force in N along ``direction``, which need not have length one."""
+    components = tuple(direction)
+    return np.array([part / math.hypot(*components) * force for part in components])
+
+
+_MOUNTING = ("position", "direction", "force")
+
+
+def thrusters(facts: Facts) -> Iterator[Finding]:
+    """What is wrong with each of the ``thrusters``."""
+    for index, node in facts.children("thrusters"):
+        if isinstance(node.value, dict):
+            yield from _thruster_keys(facts, ("thrusters", index))
+            yield from _thruster_values(facts, ("thrusters", index))
+
+
+def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    mounting = [key for key in _MOUNTING if facts.has(*path, key)]
+    given = " and ".join(mounting)
+    if facts.has(*path, "torque"):
+        if mounting:
+            problem = f"given together with {given}; keep either torque, or position, direction and force"
+            yield Finding((*path, "torque"), problem, True)
+    elif not mounting:
+        yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
+    else:
+        for key in _MOUNTING:
+            if key not in mounting:
+                yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
+    if mounting and facts.has(*path, "lever_arm"):
+        yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
+
+
+def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    direction = facts.vector("number", 3, *path, "direction")
+    if direction is not None and norm(direction) < SMALLEST:
+        yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
+    elif _is_none(torque_of(facts, path)):
+        if facts.has(*path, "torque"):
+            yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
+        else:
+            problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
+            yield Finding((*path, "position"), problem)
+    least, most = on_times_of(facts, path)
+    if least > most:
+        yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; expected at most {most:g} s")
+
+
+def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
+    """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be read."""
+    torque = facts.vector("torque", 3, *path, "torque")
+    if torque is not None:
+        return torque, norm(torque)
+    position = facts.vector("length", 3, *path, "position")
+    direction = facts.vector("number", 3, *path, "direction")
+    force = facts.number("force", *path, "force")
+    if position is None or direction is None or not force or norm(direction) < SMALLEST:
+        return None
+    return np.cross(position, force_vector(direction, force)), norm(position) * abs(force)
+
+
+def _is_none(torque: tuple[Vector, float] | None) -> bool:
+    """Whether a torque is zero but for rounding; False where it is not known."""
+    return torque is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1])
+
+
+def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
+    """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
+    least = facts.number("time", *path, "min_on_time")
+    most = facts.number("time", *path, "max_on_time")
+    return (0.0 if least is None else least), (math.inf if most is None else most)
+
+
+def channels(facts: Facts) -> Iterator[Finding]:
+    """What is wrong with the ``channels``: thrusters that fire together."""
+    indices = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
+    names = [name for name in indices if name is not None]
+    for channel, node in facts.children("channels"):
+        path = ("channels", channel)
+        members: set[KeyPath] = set()
+        for index, entry in node.children():
+            name = entry.value
+            if not isinstance(name, str):
+                continue
+            if name not in indices:
+                yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
+            elif (member := ("thrusters", indices[name])) in members:
+                yield Finding((*path, index), f"{shown(name)} is listed twice in this channel; expected once")
+            else:
+                members.add(member)
+        if members and len(members) == len(list(node.children())):
+            yield from _channel_values(facts, path, members)
+
+
+def instead(name: str, names: list[str]) -> str:
+    """The thruster that was meant, or all there are."""
+    few = names[:20]  # to look for the nearest of very many takes long
+    close = nearest(name, few)
+    if close is not None:
+        return f"did you mean {shown(close)}?"
+    return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
+
+
+def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
+    times = [on_times_of(facts, member) for member in members]
+    least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
+    if least > most and all(shortest <= longest for shortest, longest in times):
+        problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
+        yield Finding(path, f"{problem}; let them fire in channels of their own")
+
 
 SYMMETRIC = 1e-9
 """Asymmetry of an inertia tensor that passes for rounding, relative to its largest entry."""
@@ -156,13 +459,13 @@ def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
     moments = principal_axes(symmetric(tensor))[0]
     named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
     values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
-    kind, growth = stability.axis_class(moments), ""
+    kind, growth = rigid_body.axis_class(moments), ""
     if kind == "degenerate":
         problem, growth = f"the same principal moment as just one other axis ({values} kg m^2)", " and drifts evenly"
     elif kind == "intermediate":
         problem = f"the middle principal moment ({values} kg m^2)"
         if spin is not None:
-            growth = f" and grows e-fold in {stability.growth(moments, spin).growth_time:.2g} s"
+            growth = f" and grows e-fold in {rigid_body.growth(moments, spin).growth_time:.2g} s"
     else:
         return None
     cure = "spin about the axis of the smallest or largest moment"

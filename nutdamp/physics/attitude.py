@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import rounding
+from nutdamp.common import numerics
 
 Array = NDArray[np.float64]
 
@@ -150,10 +150,10 @@ def full_turn(angle: float) -> float:
 
 def sphere_angles(vector: Array) -> tuple[float | None, float]:
     """Right ascension in [0, 2π) and declination of ``vector`` (3,), rad; at the poles there is no right ascension."""
-    x, y, z = rounding.cleaned(vector).tolist()
+    x, y, z = numerics.cleaned(vector).tolist()
     across = math.hypot(x, y)
     declination = math.atan2(z, across)
-    polar = abs(math.atan2(across, abs(z))) < rounding.SAME_ANGLE
+    polar = abs(math.atan2(across, abs(z))) < numerics.SAME_ANGLE
     return None if polar else full_turn(math.atan2(y, x)), declination
 
 

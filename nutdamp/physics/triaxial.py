@@ -12,6 +12,8 @@ extreme: ω_a ~ cn, ω_b ~ sn, ω_c ~ dn of p t + const. With d_xy = |I_x - I_y|
 
 The addition theorems give the motion from the rates at t = 0 by sn, cn, dn of p t alone, so that neither the phase at
 the start nor the amplitudes of ω_a and ω_b are needed, and no limit divides by what vanishes in it.
+
+The cone angles by which a torque-free arc is judged, for bodies with two equal moments and with three.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nutdamp.physics import attitude, cones, stability
-from nutdamp.physics.cones import Cones
+from nutdamp.physics import attitude
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics.body import Cones, momentary
 
 Array = NDArray[np.float64]
 
@@ -87,7 +90,7 @@ def body_nutation_rate(moments: ArrayLike, spin: float) -> float:
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
     square = (first - third) / first * ((second - third) / second)
-    if square < 0.0 and stability.axis_class(moments) == "intermediate":
+    if square < 0.0 and rigid_body.axis_class(moments) == "intermediate":
         raise ValueError("spin about the axis of the middle moment has no nutation rate")
     return math.copysign(math.sqrt(max(square, 0.0)), first - third) * spin
 
@@ -120,7 +123,7 @@ def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]
     polhode = _polhode(moments, rates0)
     inertia, (a, b, c) = polhode.moments, polhode.axes
     if polhode.pace == 0.0:
-        now = cones.momentary(inertia, np.abs(polhode.rates), 1.0)
+        now = rigid_body.momentary(inertia, np.abs(polhode.rates), 1.0)
         return now, now
     d_ca, d_cb = abs(inertia[c] - inertia[a]), abs(inertia[c] - inertia[b])
     # Components of H at the two crossings; P and Q hold at both.
@@ -128,7 +131,7 @@ def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]
     at_b[c], at_b[a] = inertia[c] * polhode.largest, math.sqrt(inertia[a] * polhode.about_c / d_ca)
     at_a[c] = math.sqrt(inertia[c] * polhode.balance / d_cb)
     at_a[b] = math.sqrt(inertia[b] * polhode.about_c / d_cb)
-    crossing_b, crossing_a = (cones.momentary(inertia, momentum / inertia, 1.0) for momentum in (at_b, at_a))
+    crossing_b, crossing_a = (rigid_body.momentary(inertia, momentum / inertia, 1.0) for momentum in (at_b, at_a))
     if c == 2:
         return crossing_b, crossing_a
     least = crossing_b if a == 2 else crossing_a
@@ -307,3 +310,16 @@ def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
         np.where(still, np.copysign(1.0, cosine), ratio * sn),
         np.where(still, 1.0, dn),
     )
+
+
+def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> Cones:
+    """The cones at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
+
+    With I1 = I2 they stay what they are; else θ swings between two values while H is fixed in space. The spin
+    axis is ``sense``·e3.
+    """
+    if moments[0] == moments[1]:
+        return momentary(moments, rates, sense)
+    pass  # MERGED
+
+    return widest_cones(moments, np.asarray(rates, dtype=float), sense)

@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 
-from nutdamp.errors import Infeasible
-from nutdamp.limits import usable
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.schemes.options import FourPulseOptions
-from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
-from nutdamp.schemes.tools.reasons import at_hand, no_alignment
-from nutdamp.spacecraft import Channel, Spacecraft
-from nutdamp.words import span
+from nutdamp.errors import Infeasible, span
+from nutdamp.schemes.catalogue import FourPulseOptions
+from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
+from nutdamp.spacecraft.constraints import usable
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 DEFAULT_SHARE = 0.125
 """Default on-time as a share of T_ω: 2.6 % of the impulse is lost to the width."""

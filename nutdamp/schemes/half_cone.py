@@ -14,19 +14,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nutdamp import work
+from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.limits import Windows, commandable, usable
-from nutdamp.motion import Arc
-from nutdamp.physics import attitude, pointing
-from nutdamp.schedule import Pulse, Schedule, channel_pulse
-from nutdamp.schemes import one_pulse
-from nutdamp.schemes.options import HalfConeOptions
-from nutdamp.schemes.tools import pair_search, predamping
-from nutdamp.schemes.tools.flown_builder import FlownBuilder
-from nutdamp.schemes.tools.reasons import expect_aim, turn_of
-from nutdamp.schemes.tools.steerable_pair import SteerablePair
-from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.flight.propagation import Arc
+from nutdamp.physics import attitude, precession
+from nutdamp.schemes import correction, one_pulse, pulse_pairs
+from nutdamp.schemes.catalogue import HalfConeOptions
+from nutdamp.schemes.correction import FlownBuilder
+from nutdamp.schemes.pulse_pairs import SteerablePair
+from nutdamp.schemes.sequential import expect_aim, turn_of
+from nutdamp.spacecraft.constraints import Windows, commandable, usable
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 WORTH_A_CONE = 0.01
 """Share of the cost that one more cone must save; else the fewer cones are taken, which end earlier."""
@@ -68,7 +68,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
-        builder = predamping.damped(builder, one_pulse.schedule)
+        builder = correction.damped(builder, one_pulse.schedule)
     if options.cones is not None:
         return _row(builder, options.cones)
     here = builder.here
@@ -110,7 +110,9 @@ def _reach(spacecraft: Spacecraft) -> float:
     torquer, spin = spacecraft.torquer, abs(spacecraft.spin)
     if torquer is not None:
         return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
-    return max((pointing.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0)
+    return max(
+        (precession.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0
+    )
 
 
 def _fewest(spacecraft: Spacecraft) -> int:
@@ -156,9 +158,9 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
         here = builder.here
         steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
         builder.fire(steered or (_fixed(here, remaining),))
-    builder.fire(pair_search.schedule(builder.here, straight=True))
+    builder.fire(pulse_pairs.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
-    ideal = pointing.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
+    ideal = precession.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
     made = builder.schedule()
     note = f"{cones} half cone{'s' if cones > 1 else ''}"
     if damped:
@@ -188,7 +190,7 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
         costs, sizes = _costs(here, channel, push, cones, h, target)
-        on_times = pointing.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
+        on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
@@ -224,7 +226,7 @@ def _costs(
     reach = _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
     for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
-        on_time = float(pointing.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
+        on_time = float(precession.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from nutdamp.schedule import Schedule
-from nutdamp.schemes.options import SchemeOptions
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 
 def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noqa: ARG001 - the signature of a scheme

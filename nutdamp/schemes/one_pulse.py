@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 
 from nutdamp.errors import TooShort
-from nutdamp.limits import longest_useful, usable
-from nutdamp.physics import rates
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes.options import SchemeOptions
-from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
-from nutdamp.schemes.tools.reasons import at_hand, no_alignment
-from nutdamp.spacecraft import Channel, Spacecraft, Steerable
+from nutdamp.physics import response
+from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
+from nutdamp.spacecraft.constraints import longest_useful, usable
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 TRAIN_SHARE = 0.25
 """Longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width."""
@@ -83,11 +83,11 @@ def _train(
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
             return math.inf
-        return torque * on_time * abs(rates.width_factor(start.a, start.spin, spin_rate, on_time))
+        return torque * on_time * abs(response.width_factor(start.a, start.spin, spin_rate, on_time))
 
     longest = longest_useful(max_on_time, start.period)
     count = 1
-    single = math.isinf(torque) or rates.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
+    single = math.isinf(torque) or response.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
     share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
     if not single and share > 0.0:
         most = start.most

@@ -1,4 +1,9 @@
-"""A train of short pulses at a fixed inertial phase, which walks H to the target; one or more in each spin turn.
+"""What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
+
+From one pulse to the next the phasor that a pulse gives the nutation turns by 2πC/(AK) for K pulses a turn; the sum of
+the phasors says which numbers of pulses leave no nutation.
+
+A train of short pulses at a fixed inertial phase, which walks H to the target; one or more in each spin turn.
 
 Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
 2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
@@ -12,22 +17,398 @@ The phase is that of the great circle to the target, or fixed against the Sun: t
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp import work
-from nutdamp.errors import Infeasible
-from nutdamp.physics import pointing
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import one_pulse
-from nutdamp.schemes.options import RhumbLineOptions
-from nutdamp.schemes.tools import least_squares, predamping
-from nutdamp.schemes.tools.flown_builder import ROUNDING, FlownBuilder, tolerable
-from nutdamp.schemes.tools.pulse_train import LAST, Attempt, Train
-from nutdamp.schemes.tools.reasons import expect_aim
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.common import work
+from nutdamp.errors import Infeasible, TooShort, span
+from nutdamp.flight.propagation import Arc
+from nutdamp.physics import attitude, precession
+from nutdamp.schemes import correction, one_pulse, sequential
+from nutdamp.schemes.catalogue import RhumbLineOptions
+from nutdamp.schemes.correction import ROUNDING, FlownBuilder, tolerable
+from nutdamp.schemes.sequential import expect_aim
+from nutdamp.spacecraft.constraints import Windows, usable
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
+
+TURN_SHARE = 0.125
+"""Default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc."""
+
+WIDEST = 0.4
+"""Share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost."""
+
+STEP = math.radians(2.0)
+"""Angle that one ideal impulse turns H by, at most."""
+
+CLOSED = 0.3
+"""Phasors that sum to less than this many pulses count as closed: the rest is corrected."""
+
+OPEN = 1.2
+"""Sum of the phasors, in pulses, beyond which correction has no hope."""
+
+MOST_PULSES = 600
+
+LAST = 20
+"""How many of the last pulses may be moved, at most."""
+
+TRIES = 4
+"""Counts that are flown, at most."""
+
+SPARE = 3e-3
+"""Pulses that a train has to spare: by so much it may bend, without which its phases could not bring H nearer."""
+
+ROOM = 1.0
+"""Times twice the spare pulses that it takes at least to close the phasors by the phases of the last pulses."""
+
+LEAST_RATIO = 0.1
+"""Inertia ratio below which the phases of pulses hardly matter to the nutation."""
+
+BENT = 10.0
+"""Times as many spare pulses for a last try."""
+
+WIDEST_BEND = 1.3
+"""rad by which the heading of a train may differ from the course to the target."""
+
+
+class Shot(NamedTuple):
+    """A moment (s) at which a channel, or with None the steerable torquer, has the right phase; all undisturbed."""
+
+    t: float
+    channel: Channel | None
+
+
+class Attempt(NamedTuple):
+    """A train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
+
+    ``closes``: whether they leave little nutation as they are, so that correction costs little. ``resizable``: whether
+    the size is not that of a command, and may be corrected.
+    """
+
+    pulses: int
+    size: float
+    closes: bool
+    resizable: bool = False
+
+
+class Train:
+    """What a train from the motion of ``here`` can do."""
+
+    def __init__(self, here: Spacecraft, options: RhumbLineOptions) -> None:
+        self.here, self.options = here, options
+        self.windows = Windows(here)
+        self.turn = 2.0 * math.pi / abs(here.spin)
+        self.h = here.inertia.C * abs(here.spin)
+        self.sun = here.goal.sun
+        self.channels = [] if here.torquer is not None else _spread(usable(here), options.per_turn)
+        if self.channels:
+            self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(self.channels)
+            self.shortest = max(channel.min_on_time for channel in self.channels)
+            self.longest = min(channel.max_on_time for channel in self.channels)
+        else:
+            assert here.torquer is not None
+            self.torque = math.inf if here.torquer.torque is None else here.torquer.torque
+            self.shortest, self.longest = 0.0, math.inf
+        given = options.on_time
+        if given is not None:
+            self._check(given)
+        self.on_time = min(self.longest, TURN_SHARE * self.turn) if given is None else given
+        self.on_time = max(self.on_time, self.shortest)
+        if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
+            raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
+        self.ahead, self.way = precession.course(here.momentum, here.target_axis, self.sun)
+
+    def turns_by(self, size: float) -> float:
+        """By how much a pulse of a ``size`` as in `Attempt` turns H, N m s."""
+        return size if math.isinf(self.torque) else self.torque * size * precession.arc_efficiency(self.here.spin, size)
+
+    @property
+    def strongest(self) -> float:
+        """By how much a full pulse of the train turns H, N m s."""
+        return self.turns_by(STEP * self.h if math.isinf(self.torque) else self.on_time)
+
+    def _check(self, given: float) -> None:
+        """Raises Infeasible where no pulse can be ``given`` s long, or should."""
+        if math.isinf(self.torque):
+            raise Infeasible("an on-time is for pulses that last: ideal impulses have none; give the torquer a torque")
+        if not self.shortest <= given <= self.longest:
+            raise Infeasible(
+                f"an on-time of {given:.4g} s is outside what the channels allow: "
+                f"{span(self.shortest, self.longest, 's')}"
+            )
+        if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
+            raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {self.here.limits.tick:.4g} s")
+        if given > 0.5 * self.turn:
+            raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
+
+    def size(self, count: int, spare: float) -> float:
+        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on the ticks, rounded up.
+
+        Not a number where that is too far.
+        """
+        share = self.h * self.way / (count - min(spare, 0.5 * count))
+        if math.isinf(self.torque):
+            return share
+        needed = max(
+            float(precession.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]), self.shortest
+        )
+        return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
+
+    def rounding(self, size: float) -> float:
+        """What it may leave, rad, that the start of one pulse is rounded to a tick."""
+        return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
+
+    def attempts(self) -> list[Attempt]:
+        """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
+        left = self.left_by(self.shots())
+        return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
+
+    def _spare(self, count: int, left: Vector) -> float:
+        """Pulses to spare for a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
+
+        A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
+        of its square.
+        """
+        needed = float(left[count - 1]) / max(abs(self.here.inertia.a), LEAST_RATIO)
+        return SPARE + ROOM * needed**2 / min(count, LAST)
+
+    def _free(self, left: Vector) -> list[Attempt]:
+        """Trains of pulses of any length: `left_by` of 1, 2, … pulses is ``left`` (n,)."""
+        fewest = self.fewest()
+        if fewest > len(left):
+            wide = STEP * self.h if math.isinf(self.torque) else self.turns_by(self.widest)
+            fewest = max(math.ceil(_ratio(self.h * self.way, wide) - 1e-9), 2)
+        most = min(len(left), self._most())
+        if fewest > most:
+            raise self._too_few(fewest, len(left))
+        closing = [count for count in range(fewest, most + 1) if left[count - 1] <= CLOSED]
+        if not closing:
+            best = int(np.argmin(left[fewest - 1 : most])) + fewest
+            if left[best - 1] > OPEN:
+                raise self._in_phase(fewest, most, left)
+            closing = [best]
+        # Of the next few counts the one that closes best, or that ticks make least dear; at last with room to bend.
+        near = [count for count in closing if count <= 1.25 * closing[0] + 3]
+        free = self.here.limits.tick is None
+        tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
+        if free:
+            tried.sort(key=lambda one: float(left[one.pulses - 1]))
+        else:
+            tried.sort(key=lambda one: one.pulses * one.size)
+        tried = tried[:TRIES]
+        for count in [one.pulses for one in tried[:2]]:
+            tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
+        widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
+        possible = list({one[:2]: one for one in reversed(tried) if one.size <= widest}.values())[::-1]
+        if not possible:
+            raise self._too_few(most + 1, len(left))
+        return possible
+
+    def _held(self, left: Vector, given: float) -> list[Attempt]:
+        """Trains of pulses ``given`` s long, the fewest first, the spare ones bent away: ``left`` as in `_free`."""
+        fewest, most = self.fewest(), self._most()
+        if fewest > min(most, len(left)):
+            raise self._too_few(fewest, len(left))
+        counts = range(fewest, min(most, len(left), fewest + 2 * TRIES) + 1)
+        needed = self.h * self.way / self.turns_by(given)
+        closing = [count for count in counts if left[count - 1] <= OPEN]
+        enough = [count for count in closing if count - needed >= 0.5 * self._spare(count, left)]
+        tried = [Attempt(count, given, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
+        if not tried:
+            raise self._in_phase(fewest, counts[-1], left)
+        return tried[: 2 * TRIES]
+
+    @property
+    def floor(self) -> float:
+        """Impulse (N m s) that no train can do without."""
+        given = self.shortest if self.options.on_time is None else self.on_time
+        return self.h * self.way / precession.arc_efficiency(self.here.spin, given)
+
+    def lengths_near(self, given: float) -> list[float]:
+        """On-times (s) of trains that may close, in the order of how near they are to the one ``given``."""
+        left = self.left_by(self.shots())
+        closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
+        sizes = {self.size(count, self._spare(count, left)) for count in closing}
+        if self.here.limits.tick is not None:
+            sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
+        possible = [one for one in sizes if self.shortest <= one <= self.widest and one > 0.0]
+        return sorted(possible, key=lambda one: abs(one - given))
+
+    @property
+    def widest(self) -> float:
+        """Longest pulse (s) worth firing, unless a longer one is given."""
+        return min(self.longest, WIDEST * self.turn)
+
+    def fewest(self) -> int:
+        """Pulses that it takes with the on-time given; two at least, to close."""
+        return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
+
+    def _most(self) -> int:
+        """Pulses that are allowed, and not shorter than they can be."""
+        most = self.here.limits.max_pulses
+        allowed = MOST_PULSES if most is None else most
+        if self.shortest > 0.0:
+            allowed = min(allowed, int(_ratio(self.h * self.way, self.turns_by(self.shortest))))
+        return allowed
+
+    def left_by(self, shots: list[Shot]) -> Vector:
+        """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
+        start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
+        pushes = np.array([_in_body(self.here, self.ahead, t) if one is None else one.transverse for t, one in shots])
+        turned = a * spin * np.array([shot.t for shot in shots])
+        sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
+        counts = np.arange(1, len(shots) + 1)
+        return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
+
+    def shots(self) -> list[Shot]:
+        """Moments of right phase, one pulse after the other as the limits allow them."""
+        found: list[Shot] = []
+        ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
+        firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
+        gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
+        for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
+            start = self.windows.earliest_start(on_time, ready)
+            if start is None or len(found) == MOST_PULSES:
+                break
+            centre = start + 0.5 * on_time
+            if firsts:
+                moments = [
+                    (first + max(math.ceil((centre - first) / self.turn - 1e-9), 0) * self.turn, number)
+                    for number, (first, _) in enumerate(firsts)
+                ]
+                t, number = min(moments)
+                shot = Shot(t, firsts[number][1])
+            else:
+                shot = Shot(centre, None)
+            if shot.t + 0.5 * on_time > self.windows.horizon:
+                break
+            free = self.windows.blocked_until(shot.t - 0.5 * on_time, on_time)
+            if free is not None:
+                ready = max(free, ready + 0.25 * self.turn)
+                continue
+            found.append(shot)
+            ready = shot.t + 0.5 * on_time + gap
+            if not firsts:
+                ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
+        return found
+
+    def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
+        """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
+        windows, limits = Windows(here), here.limits
+        ahead = self._heading(here, remaining, attempt)
+        on_time = 0.0 if math.isinf(self.torque) else attempt.size
+        ready, turn = limits.earliest, self.turn / self.options.per_turn
+        begun = here is not self.here
+        if self.channels:  # no two in the same passage of the phase
+            return self._passing(here, windows, ahead, on_time, max(ready, 0.5 * turn - on_time) if begun else ready)
+        if begun:
+            ready = max(ready, turn - on_time)
+        start = windows.earliest_start(on_time, ready)
+        if start is None:
+            return None
+        centre = start + 0.5 * on_time
+        assert here.torquer is not None
+        given = {"impulse": attempt.size} if here.torquer.torque is None else {"on_time": on_time}
+        return steerable_pulse(here.torquer, centre, cmath.phase(_in_body(here, ahead, centre)), **given)
+
+    def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
+        """The course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
+        ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
+        share = self.h * way / (remaining * self.turns_by(attempt.size))
+        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
+        aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
+        return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
+
+    def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
+        """The first firing of a channel as it passes the phase that the limits allow."""
+        for _ in range(MOST_PULSES):
+            moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
+            t, channel = min(moments, key=lambda one: one[0])
+            start = windows.nearest_tick(t - 0.5 * on_time)
+            free = windows.blocked_until(start, on_time)
+            if start + on_time > windows.horizon + 1e-9:
+                return None
+            if free is None and start >= here.limits.earliest - 1e-9:
+                return channel_pulse(channel, start + 0.5 * on_time, on_time)
+            ready = max(free or 0.0, start + 0.25 * self.turn)
+        return None
+
+    def _in_phase(self, fewest: int, most: int, left: Vector) -> Infeasible:
+        nutation = float(left[fewest - 1 : most].min()) * self.way / most
+        return Infeasible(sequential.in_phase(self.here, self.options.per_turn, fewest, most, nutation))
+
+    def _too_few(self, needed: int, moments: int) -> Infeasible:
+        """That the limits do not leave moments for as many pulses as are needed, or allow too few."""
+        most = self.here.limits.max_pulses
+        if most is not None and most < needed:
+            return Infeasible(
+                f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
+            )
+        if needed <= moments:
+            return Infeasible(
+                "so many of the shortest pulses turn H beyond the target; lower min_on_time, or take two-pulse"
+            )
+        turns = needed / self.options.per_turn * self.turn
+        return TooShort(
+            f"a train to the target takes {needed} pulses, about {turns:.4g} s, and the limits leave moments for "
+            f"{moments}; longer pulses or more of them a turn help, or a longer horizon"
+        )
+
+
+def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) -> float:
+    """First moment (s) from ``ready`` on at which the torque of ``channel`` points along ``ahead`` (3,), inertial."""
+    direction, turn, t = channel.transverse / abs(channel.transverse), 2.0 * math.pi / abs(here.spin), ready
+    for step in range(12):
+        off = cmath.phase(direction * _in_body(here, ahead, t).conjugate())  # the torque is so far ahead of it
+        change = -off / here.spin
+        if step == 0:
+            change %= turn
+        t += change
+        if abs(change) < 1e-12 * turn:
+            break
+    return t if t >= ready - 1e-9 else t + turn
+
+
+def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
+    """What an inertial ``direction`` (3,) has along axes 1 and 2 of the body at ``t`` s, undisturbed."""
+    _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(np.array([t]))
+    body = attitude.matrix(quaternions[0]).T @ direction
+    return complex(body[0], body[1])
+
+
+def _spread(channels: list[Channel], count: int) -> list[Channel]:
+    """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
+    if not channels:
+        raise Infeasible("once the nutation is taken out no time is left for the turn")
+    chosen = [min(channels, key=lambda one: (one.price, -abs(one.transverse)))]
+    while len(chosen) < count:
+
+        def apart(channel: Channel) -> float:
+            return min(abs(cmath.phase(channel.transverse * one.transverse.conjugate())) for one in chosen)
+
+        farthest = max(channels, key=apart)
+        if apart(farthest) < 0.2:
+            raise Infeasible(
+                f"{count} pulses a spin turn need {count} channels of different directions, for each passes the "
+                f"phase once a turn; there are {len(chosen)}"
+            )
+        chosen.append(farthest)
+    return chosen
+
+
+def _too_long(turn: float) -> str:
+    return f"is more than half a spin turn ({0.5 * turn:.4g} s), after which a torque fixed in the body undoes its work"
+
+
+def _ratio(whole: float, part: float) -> float:
+    """How often ``part`` goes into ``whole``; a billion times at most."""
+    return whole / part if whole < 1e9 * part else 1e9
+
 
 MOVED = (6, 12, LAST)
 """How many of the last pulses are moved, one number after the other until nothing is left."""
@@ -70,7 +451,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    builder = predamping.damped(builder, one_pulse.schedule)
+    builder = correction.damped(builder, one_pulse.schedule)
     if builder.left <= ROUNDING:
         return builder.schedule("what damps the nutation brings H to the target already: no train is needed")
     return _best(builder, Train(builder.here, options))
@@ -81,7 +462,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
-            builder = predamping.damped(builder, one_pulse.schedule)
+            builder = correction.damped(builder, one_pulse.schedule)
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
@@ -92,7 +473,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
             made = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
-        if float(np.linalg.norm(least_squares.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
+        if float(np.linalg.norm(correction.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
             continue
         return f"--on-time {rounded:.4g}s works, with {len(made)} pulses in all"
     return "no other length was found that works"
@@ -150,7 +531,7 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
 def _note(builder: FlownBuilder, train: Train, count: int) -> str:
     """What the train is, in words."""
     on_time = builder.pulses[-1].on_time
-    efficiency = pointing.arc_efficiency(train.here.spin, on_time)
+    efficiency = precession.arc_efficiency(train.here.spin, on_time)
     line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
     names = ", ".join(channel.name for channel in train.channels)
     damped = len(builder.pulses) - count

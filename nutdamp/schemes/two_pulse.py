@@ -18,16 +18,16 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.limits import Windows, for_pairs, keeps_limits, longest_useful
-from nutdamp.physics import damping, energy_sink, rates
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes.options import TwoPulseOptions
-from nutdamp.schemes.tools import least_squares
-from nutdamp.schemes.tools.flown_builder import tolerable
-from nutdamp.schemes.tools.impulse_builder import ALIGNED, ImpulseBuilder
-from nutdamp.schemes.tools.reasons import FADED, at_hand, bounded_by
-from nutdamp.schemes.tools.symmetric_model import model_of
-from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics import energy_sink, response
+from nutdamp.schemes import correction
+from nutdamp.schemes.catalogue import TwoPulseOptions
+from nutdamp.schemes.correction import tolerable
+from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, bounded_by, model_of
+from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 
 DEAREST = 2.0
 """Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
@@ -53,9 +53,9 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     """
     if spacecraft.goal.axis is not None and not options.literal:
         try:
-            from nutdamp.schemes.tools import pair_search  # here, because few plans have a target
+            from nutdamp.schemes import pulse_pairs  # here, because few plans have a target
 
-            return pair_search.schedule(spacecraft)
+            return pulse_pairs.schedule(spacecraft)
         except Infeasible:
             made = _wide(spacecraft)
             if made is None:
@@ -76,7 +76,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
         made = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
-    return made if float(np.linalg.norm(least_squares.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+    return made if float(np.linalg.norm(correction.misses(spacecraft, made))) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
@@ -96,7 +96,7 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
     inertia, windows = spacecraft.inertia, Windows(spacecraft)
-    form = damping.half_pulses_as_printed if options.literal else damping.half_pulses
+    form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
     halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
@@ -113,14 +113,14 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
         )
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
         return Schedule(best)
-    return least_squares.correct(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
+    return correction.correct(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
 
 
 def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
     """On-time in s of one half pulse; raises Infeasible where the torque is too weak for it."""
     if torquer.torque is None:
         return 0.0
-    on_time = rates.on_time_for(impulse, torquer.torque, spacecraft.inertia.a, spacecraft.spin, 0.0, math.inf)
+    on_time = response.on_time_for(impulse, torquer.torque, spacecraft.inertia.a, spacecraft.spin, 0.0, math.inf)
     if on_time is None:
         needed = 0.5 * abs(spacecraft.inertia.a * spacecraft.spin) * impulse
         raise Infeasible(
@@ -145,7 +145,7 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
 def _pair(
     spacecraft: Spacecraft,
     torquer: Steerable,
-    halves: damping.HalfPulses,
+    halves: rigid_body.HalfPulses,
     start: float,
     wait: float,
     on_times: tuple[float, ...],
@@ -199,7 +199,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 
     Where every one breaks a limit, the first of them: the judge says which.
     """
-    best, broken = least_squares.best_of(spacecraft, _shortlist(spacecraft, channels, options))
+    best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
     made = best or broken
     if made is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
@@ -227,16 +227,16 @@ def _shortlist(
 
 def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    made = least_squares.fired(spacecraft, candidate.channels, candidate.timing)
+    made = correction.fired(spacecraft, candidate.channels, candidate.timing)
     if not literal:
-        made = least_squares.correct(spacecraft, made, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(least_squares.misses(spacecraft, made)))
+        made = correction.correct(spacecraft, made, chosen=(0, 1), momentum=True)
+    left = float(np.linalg.norm(correction.misses(spacecraft, made)))
     return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
 
 
 def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tuple[str, ...]:
     inertia = spacecraft.inertia
-    halves = damping.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     first, second = made.pulses
     turns = (second.t - first.t) / halves.wait
     text = (
@@ -265,9 +265,9 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
     turns = _turns(count, turn + a * spin * first_wait, 2 * math.pi * a * spin / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns
-    halves = damping.half_pulses(A, C, abs(omega0), spin)
+    halves = rigid_body.half_pulses(A, C, abs(omega0), spin)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
-        halves = damping.half_pulses_as_printed(A, C, abs(omega0), spin)
+        halves = rigid_body.half_pulses_as_printed(A, C, abs(omega0), spin)
         count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
         odd = 2 * _turns(count, turn + a * spin * halves.wait, 2 * a * spin * halves.wait) + 1
         waits = halves.wait * odd
@@ -306,7 +306,7 @@ def _place(
     spacecraft: Spacecraft,
     one: Channel,
     two: Channel,
-    halves: damping.HalfPulses,
+    halves: rigid_body.HalfPulses,
     wait: float,
     miss: float,
     literal: bool,
@@ -316,7 +316,7 @@ def _place(
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     factor = 1.0 if literal else 1.0 / math.cos(0.5 * miss)
     # Both together oppose ω0 where the middle between their directions does.
-    phase = damping.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
+    phase = rigid_body.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
     if a == 0.0 and abs(phase) > ALIGNED:
         return None
     period = 2 * math.pi / abs(a * spin) if a != 0.0 else math.inf
@@ -355,7 +355,7 @@ def _place(
 def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
     """What a pulse of ``on_time`` s is off the effective impulse ``needed`` N m s, over all that the nutation needs."""
     rate = channel.axial / spacecraft.inertia.C
-    width = rates.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
+    width = response.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
     return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
 
 
@@ -363,7 +363,7 @@ def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
     """On-time in s with which a channel gives the effective impulse ``needed`` N m s, or comes nearest to it."""
     rate, longest = channel.axial / spacecraft.inertia.C, channel.max_on_time
     a, spin = spacecraft.inertia.a, spacecraft.spin
-    on_time = rates.on_time_for(needed, abs(channel.transverse), a, spin, rate, longest)
+    on_time = response.on_time_for(needed, abs(channel.transverse), a, spin, rate, longest)
     if on_time is None:
         on_time = longest_useful(longest, spacecraft.body_period)
     return max(on_time, channel.min_on_time)

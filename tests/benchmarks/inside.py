@@ -25,11 +25,12 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from support.single_case import realised
 
-from nutdamp import flight, load, planning
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.study import Results, run, threads_here
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp import load
+from nutdamp.flight import propagation
+from nutdamp.montecarlo.study import Results, run, study_of, threads_here
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
 
@@ -82,14 +83,14 @@ def works() -> dict[str, Callable[[], int]]:
     """What is timed, by name."""
     body = load("dispersed.yaml")
     schedule = planning.plan(body, "two-pulse").pulses
-    settled = flight.flown(body, schedule).settled
+    settled = propagation.flown(body, schedule).settled
     assert np.abs(by_solve_ivp(body, schedule)[:3] - settled.rates).max() < 1e-7  # the peer does the same work
     study = study_of(body, schedule)
     truths = [realised(study.model, study.draws_of(case)) for case in range(PEER_CASES)]
 
     def single() -> int:
         for true, pulses in truths:
-            _ = flight.flown(true, pulses).residual
+            _ = propagation.flown(true, pulses).residual
         return len(truths)
 
     def peer() -> int:
@@ -98,7 +99,7 @@ def works() -> dict[str, Callable[[], int]]:
         return len(truths)
 
     def simulator() -> int:
-        from nutdamp import basilisk
+        from nutdamp.flight import basilisk
 
         for true, pulses in truths[:5]:
             basilisk.fly(true, pulses, pulses.end, samples=2)

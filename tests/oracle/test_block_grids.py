@@ -10,12 +10,13 @@ import pytest
 from support.cases import spread
 
 import nutdamp
-from nutdamp import compliance, flight
-from nutdamp.commands import Block
 from nutdamp.errors import Infeasible
-from nutdamp.outcome import left_by
-from nutdamp.schemes.tools.sun_pulses import fired, spin_turn
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import left_by
+from nutdamp.schemes.block_model import fired, spin_turn
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Spacecraft
 
 
 def grid(seed: int) -> Spacecraft:
@@ -93,10 +94,10 @@ def cheapest(body: Spacecraft, most: float) -> float:
     for spent, sequence in sorted(sequences, key=lambda one: one[0]):
         try:
             made = fired(body, sequence)
-            left = left_by(flight.flown(body, made))
+            left = left_by(propagation.flown(body, made))
         except Infeasible:
             continue
-        if made.end <= body.horizon and all(one.met for one in compliance.held(body, left)):
+        if made.end <= body.horizon and all(one.met for one in requirements.held(body, left)):
             return spent
     return most
 

@@ -18,15 +18,15 @@ from support.cases import deep, spread
 from support.process import Run
 
 import nutdamp
-from nutdamp import flight, planning
-from nutdamp.commands import Block
-from nutdamp.files.examples import example_text
-from nutdamp.flight import Flight
+from nutdamp.files.reader import example_text
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.schemes import Options
-from nutdamp.schemes.tools.block_model import BlockModel
-from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.planning import plan as planning
+from nutdamp.schemes.block_model import BlockModel, fired
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 POUND = 0.45359237
 
@@ -39,7 +39,7 @@ def at_rest(name: str, rpm: float) -> Spacecraft:
 
 
 def flown(body: Spacecraft, *blocks: Block) -> Flight:
-    return flight.flown(body, fired(body, blocks))
+    return propagation.flown(body, fired(body, blocks))
 
 
 # --- Lunar Prospector ------------------------------------------------------------------------------------------------

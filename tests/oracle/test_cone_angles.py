@@ -16,14 +16,15 @@ from support.golden import check_text
 from support.places import case
 from support.process import Run
 
-from nutdamp import flight, load
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.kernel import ClosedForm
-from nutdamp.dispersion.outputs import OUTPUTS, measure
-from nutdamp.files.plan_json import residual_json, spacecraft_json
-from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.presentation.figures.motion import title
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp import load
+from nutdamp.figures.motion import title
+from nutdamp.flight import propagation
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.closed_form import ClosedForm
+from nutdamp.montecarlo.statistics import OUTPUTS, measure
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.plan_json import residual_json, spacecraft_json
 
 ROWS = 4001
 """Moments of the reference motion; between them the angle stays below its largest by 1e-6 of its swing."""
@@ -55,7 +56,7 @@ def test_the_cones_of_an_arc_are_those_where_its_nutation_is_largest(
     assert cones.body == pytest.approx(reference.angle(motion[widest].rates, np.array([0.0, 0.0, sense])), rel=2e-5)
     # From the other end of the axis the largest angle is π less the least.
     assert arc_cones(moments, rates, -sense).nutation == pytest.approx(math.pi - min(angles), rel=2e-5)
-    left = flight.flown(replace(spinner(moments=moments), omega0=np.array(rates)), Schedule()).residual
+    left = propagation.flown(replace(spinner(moments=moments), omega0=np.array(rates)), Schedule()).residual
     assert (left.nutation, left.body_cone) == pytest.approx((cones.nutation, cones.body), rel=1e-12)
 
 
@@ -89,7 +90,7 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
     said = spacecraft_json(body)
     assert said["nutation_deg"] == pytest.approx(said["body_cone_deg"] + said["space_cone_deg"], rel=1e-14)
     assert said["nutation_at_start_deg"] == pytest.approx(math.degrees(now), rel=1e-12)
-    for fly in (flight.flown, flight.by_impulses):
+    for fly in (propagation.flown, propagation.by_impulses):
         flown = fly(body, Schedule(), until)
         left, track = residual_json(flown.residual), flown.sampled(2000, until)
         assert track.nutation[0] == pytest.approx(now, rel=1e-9)
@@ -107,7 +108,7 @@ def test_the_angles_around_the_pulses_are_those_of_what_is_left() -> None:
     """So the last line of a table of pulses says what the residual says, and the first what the header says."""
     push = channel("T", 4.0, 1.0, 0.0)
     body = spinner(moments=(100.0, 130.0, 180.0), channels=(push,))
-    flown = flight.flown(body, Schedule((channel_pulse(push, 1.0, 0.5), channel_pulse(push, 4.0, 0.7))), 20.0)
+    flown = propagation.flown(body, Schedule((channel_pulse(push, 1.0, 0.5), channel_pulse(push, 4.0, 0.7))), 20.0)
     before, after = flown.around_pulses()
     left = flown.residual
     assert (after.nutation[-1], after.body_cone[-1]) == pytest.approx((left.nutation, left.body_cone), rel=1e-12)
@@ -118,7 +119,7 @@ def test_the_angles_around_the_pulses_are_those_of_what_is_left() -> None:
     for moments in ((100.0, 130.0, 180.0), (120.0, 100.0, 80.0)):
         body = spinner(moments=moments, degrees=0.01, channels=(push,))
         wide = Schedule((channel_pulse(push, 0.9, 1.2),))
-        real, sharp = (fly(body, wide).residual.nutation for fly in (flight.flown, flight.by_impulses))
+        real, sharp = (fly(body, wide).residual.nutation for fly in (propagation.flown, propagation.by_impulses))
         assert sharp == pytest.approx(real, rel=2e-4)
 
 

@@ -22,17 +22,17 @@ from support.builders import events, pulse, spinner, transverse
 from support.spinning import EPS, about
 from support.strategies import UNTIL, angles, schedules, symmetric_spinners, triaxial_spinners
 
-from nutdamp import flight
+from nutdamp.flight import propagation
 from nutdamp.physics import attitude
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Attitude, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 QUATERNION = np.array([0.5, -0.5, 0.5, 0.5])
 
 any_spinners = symmetric_spinners() | triaxial_spinners()
 
 
-def state_at(flown: flight.Flight, time: float) -> reference.Motion:
+def state_at(flown: propagation.Flight, time: float) -> reference.Motion:
     """The motion at ``time`` on the last leg that holds it."""
     leg = next(leg for leg in reversed(flown.legs) if leg.start <= time <= leg.end)
     (rates,), (quaternion,) = leg.path.motion(np.array([time]))
@@ -57,7 +57,7 @@ def by_reference(spacecraft: Spacecraft, made: Schedule, until: float) -> refere
 @given(any_spinners, schedules())
 def test_flown_is_the_motion_of_the_reference_integrator(spacecraft: Spacecraft, made: Schedule) -> None:
     """Overlapping pulses, axial torques, spin reversal and three different moments included; to 1e-9 rad."""
-    flown = flight.flown(spacecraft, made, UNTIL)
+    flown = propagation.flown(spacecraft, made, UNTIL)
     settled = reference.Motion(flown.settled.rates, attitude.matrix(flown.settled.quaternion))
     assert_same(settled, state_at(flown, made.end), 1e-13, 1e-13)
     assert_same(state_at(flown, UNTIL), by_reference(spacecraft, made, UNTIL), 1e-9, 1e-9)
@@ -67,12 +67,12 @@ def test_flown_is_the_motion_of_the_reference_integrator(spacecraft: Spacecraft,
 @given(symmetric_spinners(), schedules(ideal=True), angles)
 def test_for_ideal_impulses_both_models_are_the_reference(spacecraft: Spacecraft, made: Schedule, angle: float) -> None:
     """A symmetric body has no first axis: turned ω and turned impulses give turned rates and the same angles."""
-    summed = flight.by_impulses(spacecraft, made, UNTIL)
+    summed = propagation.by_impulses(spacecraft, made, UNTIL)
     assert_same(state_at(summed, UNTIL), by_reference(spacecraft, made, UNTIL), 1e-9, 1e-9)
-    assert_same(state_at(summed, UNTIL), state_at(flight.flown(spacecraft, made, UNTIL), UNTIL), 1e-12, 1e-12)
+    assert_same(state_at(summed, UNTIL), state_at(propagation.flown(spacecraft, made, UNTIL), UNTIL), 1e-12, 1e-12)
     turn = about((0.0, 0.0, 1.0), angle)
     turned = Schedule(tuple(replace(one, impulse=turn @ one.impulse) for one in made))
-    other = flight.by_impulses(replace(spacecraft, omega0=turn @ spacecraft.omega0), turned, UNTIL)
+    other = propagation.by_impulses(replace(spacecraft, omega0=turn @ spacecraft.omega0), turned, UNTIL)
     size = max(1.0, float(np.linalg.norm(summed.settled.rates)))
     assert other.settled.rates == pytest.approx(turn @ summed.settled.rates, abs=1e-12 * size)
     assert other.residual.momentum_shift == pytest.approx(summed.residual.momentum_shift, abs=1e-12)
@@ -89,7 +89,7 @@ def test_start_is_the_attitude_of_the_file_or_else_frame_n() -> None:
     assert attitude.matrix(turned) == pytest.approx(attitude.matrix(QUATERNION) @ axes, abs=8 * EPS)
     for spin in (3.0, -3.0):  # By the true H of three different moments, not by their symmetric body's (0.45° off).
         body = spinner(moments=(120.0, 100.0, 80.0), spin=spin, degrees=5.0)
-        start = flight.flown(body, Schedule(), 1.0).sampled(2, 1.0)
+        start = propagation.flown(body, Schedule(), 1.0).sampled(2, 1.0)
         assert start.momentum[0] / np.linalg.norm(start.momentum[0]) == pytest.approx([0, 0, 1], abs=4 * EPS)
         assert start.axis[0, 1] == pytest.approx(0.0, abs=4 * EPS)
         assert start.axis[0, 0] > 0.0
@@ -101,17 +101,17 @@ def test_start_is_the_attitude_of_the_file_or_else_frame_n() -> None:
 @given(any_spinners, st.floats(0.1, 10.0), st.floats(0.1, 10.0))
 def test_momentum_and_energy_stay_on_arcs_and_arcs_compose(spacecraft: Spacecraft, first: float, second: float) -> None:
     """A flight taken up again where another ended is the rest of it."""
-    whole = flight.flown(spacecraft, Schedule(), 50.0)
+    whole = propagation.flown(spacecraft, Schedule(), 50.0)
     track = whole.sampled(40, 50.0)
     h = track.momentum[0]
     # About two roundings in each of the hundred-odd steps of the integration; exact arcs take one.
     assert track.momentum == pytest.approx(np.tile(h, (40, 1)), abs=1000 * EPS * float(np.linalg.norm(h)))
     energies = [reference.energy(spacecraft.inertia.moments, rates) for rates in track.rates]
     assert energies == pytest.approx([energies[0]] * 40, rel=1000 * EPS)
-    middle = state_at(flight.flown(spacecraft, Schedule(), first), first)
+    middle = state_at(propagation.flown(spacecraft, Schedule(), first), first)
     again = replace(spacecraft, omega0=middle.rates, attitude=Attitude(attitude.from_matrix(middle.rotation)))
-    rest = state_at(flight.flown(again, Schedule(), second), second)
-    assert_same(rest, state_at(flight.flown(spacecraft, Schedule(), first + second), first + second), 1e-12, 1e-12)
+    rest = state_at(propagation.flown(again, Schedule(), second), second)
+    assert_same(rest, state_at(propagation.flown(spacecraft, Schedule(), first + second), first + second), 1e-12, 1e-12)
 
 
 @given(symmetric_spinners(), schedules())
@@ -119,7 +119,7 @@ def test_momentum_stays_between_pulses_and_the_residual_is_what_the_vectors_say(
     spacecraft: Spacecraft, made: Schedule
 ) -> None:
     """Angles between H, ω, the spin axis and H at the start, at the end of the last pulse."""
-    flown = flight.flown(spacecraft, made, UNTIL)
+    flown = propagation.flown(spacecraft, made, UNTIL)
     moments = np.array(flown.moments)
     for leg in flown.legs:
         if not any(pulse.start <= leg.start and leg.end <= pulse.end for pulse in made if pulse.on_time > 0.0):
@@ -151,13 +151,13 @@ def test_a_pulse_of_nothing_changes_nothing_and_the_mirror_body_flies_the_mirror
 ) -> None:
     """Spin reversed, torques mirrored: mirrored rates, and the same angles."""
     more = Schedule((*made, pulse(max(time, 0.5 * on_time), on_time, np.zeros(3), "idle")))
-    for model in (flight.flown, flight.by_impulses) if spacecraft.inertia.symmetric else (flight.flown,):
+    for model in (propagation.flown, propagation.by_impulses) if spacecraft.inertia.symmetric else (propagation.flown,):
         assert_same(
             state_at(model(spacecraft, more, 13.0), 13.0), state_at(model(spacecraft, made, 13.0), 13.0), 1e-12, 1e-12
         )
     pulses = (pulse(one.t, one.on_time, mirrored(one.impulse), one.channel) for one in made)
     other_body = replace(spacecraft, omega0=mirrored(spacecraft.omega0))
-    plain, mirror = flight.flown(spacecraft, made), flight.flown(other_body, Schedule(tuple(pulses)))
+    plain, mirror = propagation.flown(spacecraft, made), propagation.flown(other_body, Schedule(tuple(pulses)))
     size = max(1.0, float(np.linalg.norm(plain.settled.rates)))
     assert mirror.settled.rates == pytest.approx(mirrored(plain.settled.rates), abs=1e-12 * size)
     for name in ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error"):
@@ -174,7 +174,7 @@ def test_the_impulse_sum_gives_the_rates_after_real_widths_exactly(spacecraft: S
     if any(later[0] < earlier[1] for earlier, later in itertools.pairwise(ends)):
         made = Schedule(tuple(pulse(one.t, one.on_time, one.impulse * (1, 1, 0)) for one in made))
     summed, flown = (
-        state_at(model(spacecraft, made, 13.0), 13.0).rates for model in (flight.by_impulses, flight.flown)
+        state_at(model(spacecraft, made, 13.0), 13.0).rates for model in (propagation.by_impulses, propagation.flown)
     )
     assert summed == pytest.approx(flown, abs=1e-11 * max(1.0, float(np.linalg.norm(flown))))
 
@@ -184,12 +184,12 @@ def test_the_direction_of_h_after_real_widths_is_not_that_of_the_impulse_sum() -
     spacecraft, tau = spinner(120.0, 80.0, 3.0, degrees=1e-3), 0.8
     made = Schedule((pulse(1.0, tau, np.array([1e-3, 0.0, 0.0])),))
     a_factor, factor = (math.sin(x) / x for x in (0.5 * 3.0 * tau / 3, 0.5 * 3.0 * tau))
-    assert flight.effective_impulses(spacecraft, made)[0] == pytest.approx(1e-3 * a_factor, rel=4 * EPS)
+    assert propagation.effective_impulses(spacecraft, made)[0] == pytest.approx(1e-3 * a_factor, rel=4 * EPS)
     # Second order in angles of 1e-5 rad.
-    for model, share in ((flight.flown, factor), (flight.by_impulses, a_factor)):
+    for model, share in ((propagation.flown, factor), (propagation.by_impulses, a_factor)):
         assert model(spacecraft, made).residual.momentum_shift == pytest.approx(1e-3 * share / (80.0 * 3.0), rel=1e-4)
     ideal = Schedule((pulse(1.0, 0.0, np.array([3.0, -4.0, 50.0])), pulse(2.0, 0.0, np.array([0.0, 1.0, 0.0]))))
-    assert flight.effective_impulses(spinner(), ideal) == pytest.approx([3.0 - 4.0j, 1.0j], rel=2 * EPS)
+    assert propagation.effective_impulses(spinner(), ideal) == pytest.approx([3.0 - 4.0j, 1.0j], rel=2 * EPS)
 
 
 def test_a_long_pulse_takes_all_the_nutation_for_more_than_the_floor_and_moves_h_by_less() -> None:
@@ -199,22 +199,22 @@ def test_a_long_pulse_takes_all_the_nutation_for_more_than_the_floor_and_moves_h
     opposed = transverse(spacecraft.omega0) * cmath.exp(-1j * half)
     impulse = -1.32 * spacecraft.least_impulse * opposed / abs(opposed)
     made = Schedule((pulse(half, 2 * half, np.array([impulse.real, impulse.imag, 0.0])),))  # aω3 = 1 rad/s
-    left = flight.flown(spacecraft, made).residual
+    left = propagation.flown(spacecraft, made).residual
     assert left.nutation < 1e-14
     assert math.degrees(left.momentum_shift) == pytest.approx(2.1, abs=0.05)
 
 
 def test_residuals_without_pulses_after_spin_reversal_and_of_a_pulse_that_the_clock_can_hardly_tell() -> None:
-    left = flight.flown(spinner(degrees=5.0), Schedule()).residual
+    left = propagation.flown(spinner(degrees=5.0), Schedule()).residual
     assert math.degrees(left.nutation) == pytest.approx(5.0, rel=4 * EPS)
     assert left.momentum_shift == 0.0
     # ω3 from 3 to -1 rad/s: H now points nearly along -e3, and nutation counts from the same end of the body.
     reversed_ = Schedule((pulse(1.0, 0.5, np.array([0.0, 0.0, -320.0])),))
-    left = flight.flown(spinner(spin=3.0, degrees=2.0), reversed_).residual
+    left = propagation.flown(spinner(spin=3.0, degrees=2.0), reversed_).residual
     assert math.pi - left.nutation == pytest.approx(math.atan(3 * math.tan(math.radians(2.0))), rel=1e-12)
     # At t = 10⁵ s start and end of a pulse of 1 ps are the same number, and it is flown as an impulse.
     sphere = spinner(120.0, 120.0)  # so that only the pulse changes ω
-    settled = flight.flown(sphere, Schedule((pulse(1e5, 1e-12, np.array([6.0, 0.0, 0.0])),))).settled
+    settled = propagation.flown(sphere, Schedule((pulse(1e5, 1e-12, np.array([6.0, 0.0, 0.0])),))).settled
     assert settled.omega - transverse(sphere.omega0) == pytest.approx(6.0 / 120.0, rel=1e-6)
 
 
@@ -238,7 +238,7 @@ def test_flown_is_golden(name: str) -> None:
     golden = GOLDEN[name]
     first, second, third = golden["moments_kgm2"]
     body = Spacecraft(name, Inertia((first, second, third)), np.array(golden["rates_rad_s"]))
-    flown = flight.flown(body, Schedule(tuple(fired(one) for one in golden["pulses"])))
+    flown = propagation.flown(body, Schedule(tuple(fired(one) for one in golden["pulses"])))
     end = flown.settled
     size = float(np.linalg.norm(golden["end_rates_rad_s"]))
     assert end.rates == pytest.approx(golden["end_rates_rad_s"], abs=CLOSE * size)

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from support import places
 
-from nutdamp import flight
-from nutdamp.files.spacecraft_file import load_spacecraft
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
+from nutdamp.schemes.catalogue import FourPulseOptions, TwoPulseOptions
 from nutdamp.schemes.four_pulse import schedule as four_pulse
-from nutdamp.schemes.options import FourPulseOptions, TwoPulseOptions
 from nutdamp.schemes.two_pulse import schedule as two_pulse
-from nutdamp.spacecraft import Inertia, Spacecraft
+from nutdamp.spacecraft.model import Inertia, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 BODIES = {name: load_spacecraft(places.CONFIGS / f"magnus-{name}.yaml") for name in ("a09", "a03", "oblate")}
 every_body = pytest.mark.parametrize("spacecraft", BODIES.values(), ids=BODIES)
@@ -38,7 +38,7 @@ def unbounded(spacecraft: Spacecraft) -> Spacecraft:
 
 def around(spacecraft: Spacecraft, made: Schedule) -> tuple[np.ndarray, np.ndarray]:
     """ω just before and after each pulse by the impulse sum."""
-    before, after = (track.rates for track in flight.by_impulses(spacecraft, made).around_pulses())
+    before, after = (track.rates for track in propagation.by_impulses(spacecraft, made).around_pulses())
     return before[:, 0] + 1j * before[:, 1], after[:, 0] + 1j * after[:, 1]
 
 
@@ -50,7 +50,7 @@ def test_fig_5_pole_curve_steps_inwards_by_equal_amounts_each_quarter_turn(space
     """
     made = coarse(spacecraft)
     before, after = around(spacecraft, made)
-    step = abs(flight.effective_impulses(spacecraft, made)[0]) / spacecraft.inertia.A
+    step = abs(propagation.effective_impulses(spacecraft, made)[0]) / spacecraft.inertia.A
     assert len(made) == round(spacecraft.transverse_rate / step)
     expected = spacecraft.transverse_rate - step * np.arange(1, len(made) + 1)
     assert np.abs(after) == pytest.approx(np.abs(expected), abs=1e-13)
@@ -87,7 +87,7 @@ def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
     small = replace(spacecraft, omega0=spacecraft.omega0 * (1e-3, 1e-3, 1.0))
     rate = inertia.C * small.spin / inertia.A
     assert math.degrees(rate * small.body_period / 4) == pytest.approx(arc_deg, rel=1e-12)
-    legs = flight.by_impulses(small, coarse(small, on_time=5e-5)).legs[1:-1]
+    legs = propagation.by_impulses(small, coarse(small, on_time=5e-5)).legs[1:-1]
     assert len(legs) >= 3
     for leg in legs[:3]:
         body, quaternion = leg.path.motion(np.linspace(leg.start, leg.end, 400))
@@ -101,7 +101,7 @@ def test_fig_6_and_7_arcs_of_the_axis_track(name: str, arc_deg: float) -> None:
 
 @every_body
 def test_fig_6_and_7_the_centre_of_each_arc_is_where_h_has_jumped_to(spacecraft: Spacecraft) -> None:
-    for leg in flight.by_impulses(spacecraft, coarse(spacecraft)).legs[1:]:
+    for leg in propagation.by_impulses(spacecraft, coarse(spacecraft)).legs[1:]:
         if leg.end > leg.start:
             body, quaternion = leg.path.motion(np.linspace(leg.start, leg.end, 30))
             momentum = attitude.rotate(quaternion, body * spacecraft.inertia.moments)
@@ -113,7 +113,7 @@ def test_fig_6_and_7_the_centre_of_each_arc_is_where_h_has_jumped_to(spacecraft:
 @every_body
 def test_fig_8_two_pulses_stop_the_axis_where_h_was(spacecraft: Spacecraft) -> None:
     """D0 -> D1 at half the cone, half a turn on the smaller circle, and back to D0 with no nutation left."""
-    before, after = flight.by_impulses(spacecraft, two_pulse(spacecraft, TwoPulseOptions())).around_pulses()
+    before, after = propagation.by_impulses(spacecraft, two_pulse(spacecraft, TwoPulseOptions())).around_pulses()
     start, d0, d1, back = spacecraft.nutation, before.momentum[0], after.momentum[0], after.momentum[1]
     assert (before.nutation[0], after.nutation[0]) == pytest.approx((start, start / 2), rel=1e-12)
     assert attitude.angle_between(d0, d1) == pytest.approx(start / 2, rel=1e-12)

@@ -34,13 +34,13 @@ from support.shown import (
     points,
 )
 
-import nutdamp.library.views  # noqa: F401 - figures of flights are declared there
-from nutdamp import flight, planning
+import nutdamp.page.results  # noqa: F401 - figures of flights are declared there
+from nutdamp.figures import export, geometry, overview, sphere
+from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
-from nutdamp.presentation import figures, geometry
-from nutdamp.presentation.figures import sphere
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Inertia, Requirement
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.model import Inertia, Requirement
+from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -234,13 +234,13 @@ def test_flights_from_python_end_alike_unless_they_name_an_end() -> None:
 
 @pytest.mark.deep
 def test_of_a_very_long_time_all_pictures_say_how_much_is_drawn() -> None:
-    made = flight.flown(WIDE, Schedule(), 1e6)
+    made = propagation.flown(WIDE, Schedule(), 1e6)
     track = made.sampled(1000, 1e6)
-    axes = figures.flight_figure("history", made, track).axes[-1]
+    axes = overview.flight_figure("history", made, track).axes[-1]
     until = re.search(r"the first ([\d.]+) of 1e\+06", axes.get_xlabel())
     assert until is not None
     assert float(until[1]) == pytest.approx(axes.get_xlim()[1], rel=1e-3)
-    assert heading(figures.flight_figure("motion", made, track)).endswith(f"drawn: the first {until[1]} s of 1e+06 s")
+    assert heading(overview.flight_figure("motion", made, track)).endswith(f"drawn: the first {until[1]} s of 1e+06 s")
     assert "drawn" not in heading(drawn("timeline", "wide pulses"))
 
 
@@ -248,8 +248,8 @@ def test_titles_name_scheme_model_and_result_in_lines_that_fit() -> None:
     for by_impulses in (False, True):
         figure = planning.plan(BODY, "two-pulse").fly(by_impulses=by_impulses).figure("timeline")
         check_text(f"pictures.title-{'impulses' if by_impulses else 'widths'}", heading(figure))
-    made, track = figures.shown(planning.Plan(spinner(), "schedules/of/the/second/attempt/" * 4, Schedule()))
-    figure = figures.flight_figure("timeline", made, track)
+    made, track = export.shown(planning.Plan(spinner(), "schedules/of/the/second/attempt/" * 4, Schedule()))
+    figure = overview.flight_figure("timeline", made, track)
     assert 1 < max(map(len, figure.get_suptitle().split("\n"))) <= 11 * figure.get_figwidth()
 
 
@@ -313,8 +313,8 @@ def test_cones_are_filled_from_their_apex_to_all_of_their_rim(case: str) -> None
 def test_the_legend_of_the_sphere_names_what_is_seen() -> None:
     """Pulses where they move the axis; a body cone, of about C/A of the nutation, that lies under the marks."""
     plan = planning.plan(BODY, "two-pulse")
-    for made, named in ((flight.by_impulses(BODY, plan.pulses), False), (plan.flight, True)):
-        assert ("pulse" in legend_words(figures.flight_figure("sphere", made, made.sampled(400, 20.0)))) is named
+    for made, named in ((propagation.by_impulses(BODY, plan.pulses), False), (plan.flight, True)):
+        assert ("pulse" in legend_words(overview.flight_figure("sphere", made, made.sampled(400, 20.0)))) is named
     for moment, hidden in ((80.0, False), (1.5, True)):
         body = replace(spinner(), inertia=Inertia((120.0, 120.0, moment)), omega0=np.array([0.003, 0.0, 3.0]))
         (name,) = (word for word in legend_words(flight_picture("sphere", body, Schedule())) if "body cone" in word)

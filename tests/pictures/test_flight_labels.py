@@ -20,16 +20,15 @@ from support.colours import check_colours, contrast, pages
 from support.layout import check_layout, texts
 from support.shown import BODY, CASES, NAMES, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
 
-from nutdamp import flight
-from nutdamp.comparison import compare
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.presentation import figures, geometry
-from nutdamp.presentation.figures import style
-from nutdamp.presentation.figures.motion import _together
-from nutdamp.presentation.figures.style import GREY, INK, MOTION, PULSE
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Vector
+from nutdamp.figures import geometry, overview, style
+from nutdamp.figures.motion import _together
+from nutdamp.figures.style import GREY, INK, MOTION, PULSE
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning.decision import compare
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.model import Vector
+from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = [
     pytest.mark.usefixtures("plans_shared"),
@@ -183,8 +182,8 @@ def test_firings_that_cannot_be_told_apart_are_drawn_as_one() -> None:
 def test_many_turns_are_drawn_thin() -> None:
     widths = []
     for until in (5.0, 60.0, 600.0):
-        made = flight.flown(spinner(), Schedule(), until)
-        space = figures.flight_figure("motion", made, made.sampled(1000, until)).axes[1]
+        made = propagation.flown(spinner(), Schedule(), until)
+        space = overview.flight_figure("motion", made, made.sampled(1000, until)).axes[1]
         widths.append(next(line.get_linewidth() for line in space.lines if line.get_label() == "path"))
     assert widths[0] > widths[1] > widths[2]
 

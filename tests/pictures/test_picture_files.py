@@ -25,15 +25,15 @@ from support.cases import deep
 from support.golden import check_text
 from support.shown import BODY, WIDE, drawn, flight_picture, flown, kicks
 
-from nutdamp import flight, planning
 from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
-from nutdamp.flight import Flight
+from nutdamp.figures import animation, geometry, image, overview, style
+from nutdamp.figures.animation import Scene, Timing, film_format, timing
+from nutdamp.figures.image import _brief
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics.attitude import angle_between
-from nutdamp.presentation import figures, geometry
-from nutdamp.presentation.figures import animation, style
-from nutdamp.presentation.figures.animation import Scene, Timing, film_format, timing
-from nutdamp.presentation.figures.export import _brief
-from nutdamp.schedule import Pulse, Schedule
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -43,15 +43,15 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
 )
 def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(path: str, magic: bytes) -> None:
     figure = drawn("timeline", "no pulses")
-    content = figures.rendered(figure, path)
+    content = image.rendered(figure, path)
     assert content.startswith(magic)
-    assert figures.rendered(figure, path) == content
+    assert image.rendered(figure, path) == content
 
 
 def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
     figure, said = drawn("timeline", "no pulses"), []
     for ending, paths in (
-        (figures.ending, ("a.bmp", "a", "png", "a.png.gz", ".png")),
+        (image.ending, ("a.bmp", "a", "png", "a.png.gz", ".png")),
         (film_format, ("a.webm", "gif")),
     ):
         for path in paths:
@@ -59,16 +59,16 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch:
                 ending(path)
             said.append(str(refused.value))
     with pytest.raises(BadRequest):
-        figures.rendered(figure, "a.bmp")
+        image.rendered(figure, "a.bmp")
     assert film_format("-") == film_format("b.GIF") == "gif"
     monkeypatch.setenv("PATH", "")
     with pytest.raises(CannotWrite) as without:
         film_format("a.mp4")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for call in (
-        lambda: figures.rendered(figure, "a.png"),
-        lambda: figures.flight_figure("motion", *flown("no pulses")),
-        lambda: figures.ending("a.png"),
+        lambda: image.rendered(figure, "a.png"),
+        lambda: overview.flight_figure("motion", *flown("no pulses")),
+        lambda: image.ending("a.png"),
         lambda: film_format("a.gif"),
     ):
         with pytest.raises(MissingExtra, match=re.escape("pip install 'nutdamp[plot]'")):
@@ -77,9 +77,9 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch:
 
 
 def test_settings_of_the_user_change_nothing() -> None:
-    plain = figures.rendered(drawn("timeline", "no pulses"), "a.png")
+    plain = image.rendered(drawn("timeline", "no pulses"), "a.png")
     with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
-        assert figures.rendered(drawn("timeline", "no pulses"), "a.png") == plain
+        assert image.rendered(drawn("timeline", "no pulses"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
 
 
@@ -88,7 +88,7 @@ def test_settings_of_the_user_change_nothing() -> None:
 
 def test_inline_svg_stands_in_any_page() -> None:
     """As wide as what holds it, in the colour of the text around, and no rule or id of it meets another's."""
-    shown = [figures.svg(drawn("timeline", case)) for case in ("wide pulses", "no pulses")]
+    shown = [image.svg(drawn("timeline", case)) for case in ("wide pulses", "no pulses")]
     ids = []
     for text in shown:
         root = ET.fromstring(text)
@@ -102,7 +102,7 @@ def test_inline_svg_stands_in_any_page() -> None:
         assert set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text)) <= set(ids[-1])
     assert not set(ids[0]) & set(ids[1])
     assert not re.search(r'\sd="[^"]*\.\d{3}', shown[0])
-    for content in (shown[0], figures.rendered(drawn("timeline", "wide pulses"), "a.svg").decode()):
+    for content in (shown[0], image.rendered(drawn("timeline", "wide pulses"), "a.svg").decode()):
         words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
         assert "Firings" in words
         assert any(word.startswith("1: ") for word in words)
@@ -136,15 +136,15 @@ def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
 
 @pytest.mark.deep
 def test_a_page_has_the_bands_of_all_pulses_of_a_panel_as_one_path() -> None:
-    content = figures.svg(flight_picture("history", WIDE, kicks(WIDE, 30, 0.7, 0.1)))
+    content = image.svg(flight_picture("history", WIDE, kicks(WIDE, 30, 0.7, 0.1)))
     outlines = re.findall(r'<path d="([^"]*)"[^>]*fill-opacity: 0\.25', content)
     assert sorted(outline.count("M") for outline in outlines) == [1, 30, 30, 30, 30]  # the first is in the legend
 
 
 def digest() -> str:
     """Of the overview, which holds every panel, as a file and in a page."""
-    file = figures.rendered(flight_picture("overview", WIDE, "four-pulse"), "a.svg")
-    return hashlib.sha256(file + figures.svg(flight_picture("overview", WIDE, "four-pulse")).encode()).hexdigest()
+    file = image.rendered(flight_picture("overview", WIDE, "four-pulse"), "a.svg")
+    return hashlib.sha256(file + image.svg(flight_picture("overview", WIDE, "four-pulse")).encode()).hexdigest()
 
 
 @pytest.mark.weekly
@@ -172,7 +172,7 @@ def damped(plans_shared: None) -> tuple[Flight, float]:
     """The flight of two pulses of the example of the physics sheet, and its end."""
     pulses = planning.plan(WIDE, "two-pulse").pulses
     end = pulses.end + WIDE.inertial_period
-    return flight.flown(WIDE, pulses, end), end
+    return propagation.flown(WIDE, pulses, end), end
 
 
 @pytest.mark.deep
@@ -205,7 +205,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace_and_each_is_written_before_t
 
 @pytest.mark.deep
 def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
-    made, stream = flight.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
+    made, stream = propagation.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
     animation.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320, lambda _: None)
     assert getattr(Image.open(stream), "n_frames", 1) == 4
 
@@ -214,7 +214,7 @@ def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
 def test_the_film_begins_before_a_pulse_at_once_and_ends_with_the_motion() -> None:
     body = spinner(degrees=20.0)
     kick = Schedule((Pulse(0.0, 0.0, "steerable", -body.inertia.A * np.append(body.omega0[:2], 0.0)),))
-    scene = Scene(flight.flown(body, kick, body.inertial_period), Timing(body.inertial_period, 8, 10, 1.0), 400)
+    scene = Scene(propagation.flown(body, kick, body.inertial_period), Timing(body.inertial_period, 8, 10, 1.0), 400)
     seen = [np.degrees(angle_between(scene.cones(frame).axis, scene.cones(frame).momentum)) for frame in (0, 1)]
     assert seen == pytest.approx([20.0, 0.0], abs=1e-9)
 

@@ -20,23 +20,22 @@ from support.golden import check_text
 from support.layout import check_layout, texts
 from support.shown import WIDE, check_star, flight_picture, heading, legend_words
 
-from nutdamp import fronts, planning
-from nutdamp.certificate import certificate
-from nutdamp.comparison import Comparison, compare
-from nutdamp.demands import Keep
-from nutdamp.fronts import Front, Point
-from nutdamp.planning import Plan
-from nutdamp.presentation import figures
-from nutdamp.presentation.figures import schemes, style
-from nutdamp.presentation.figures.style import PULSE
-from nutdamp.presentation.text import cost
-from nutdamp.presentation.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
-from nutdamp.recommendation import Standing
-from nutdamp.remarks import down
-from nutdamp.schedule import Bounds, Schedule
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Limits, Requirement, Spacecraft, Steerable
-from nutdamp.tolerances import Dispersions
+from nutdamp.figures import certificate as primer
+from nutdamp.figures import schemes, style, trade
+from nutdamp.figures.style import PULSE
+from nutdamp.planning import plan as planning
+from nutdamp.planning import tradeoff
+from nutdamp.planning.decision import Comparison, compare, down
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Standing
+from nutdamp.planning.tradeoff import Front, Point, certificate
+from nutdamp.schemes.catalogue import OptimalOptions
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Keep, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Bounds, Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.views.text import cost
+from nutdamp.views.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -67,7 +66,7 @@ def dots(axes: Axes) -> dict[str, tuple[float, str, bool]]:
 
 @pytest.mark.deep
 def test_dots_stand_at_the_numbers_of_the_comparison_beside_floor_and_requirement() -> None:
-    figure = figures.schemes_figure(compared())
+    figure = schemes.schemes_figure(compared())
     check_layout(figure)
     check_colours(figure)
     ends, impulses = dots(column(figure, "end")), dots(column(figure, "impulse"))
@@ -105,7 +104,7 @@ def test_schemes_that_fall_short_are_not_taken_for_the_cheapest(required: bool) 
     whole, best = (planning.plan(body, name) for name in ("two-pulse", "optimal"))
     both = Comparison(body, (Plan(body, "half", Schedule(whole.pulses.pulses[:1])), whole, best))
     assert [plan.scheme for plan in both.plans if plan.standing is Standing.MISSES] == ["half"]
-    figure = figures.schemes_figure(both)
+    figure = schemes.schemes_figure(both)
     check_layout(figure)
     words = "NOT met: nutation and shift of H" if required else "does not damp"
     left = min(axes.get_position().x0 for axes in figure.axes)
@@ -135,7 +134,7 @@ def test_scales_of_schemes() -> None:
 def test_propellant_has_the_unit_of_the_tables(kilograms: tuple[float, ...], unit: str, shown: str) -> None:
     pulse = planning.plan(BODY, "two-pulse").pulses.pulses[0]
     plans = (Plan(BODY, f"trial {spent}", Schedule((replace(pulse, propellant=spent),))) for spent in kilograms)
-    axes = column(figures.schemes_figure(Comparison(BODY, tuple(plans))), "propellant")
+    axes = column(schemes.schemes_figure(Comparison(BODY, tuple(plans))), "propellant")
     assert axes.get_xlabel() == f"propellant, {unit}"
     assert shown in {note.get_text() for note in axes.texts}
 
@@ -146,7 +145,7 @@ def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
     sure = replace(BODY, dispersions=Dispersions(thrust_per_pulse=normal(0.001, relative=True)))
     for body, samples, count in ((BODY, 2_000, 2), (BODY, 3_000, 1), (sure, 2_000, 2)):
         both = compare(body, ("two-pulse", "four-pulse"), samples=samples)
-        figure = figures.schemes_figure(both)
+        figure = schemes.schemes_figure(both)
         check_layout(figure)
         axes = column(figure, "complying cases")
         shares = {plan.scheme: 100.0 * share.exact for plan, share in both.shares.items() if share.exact is not None}
@@ -168,12 +167,12 @@ def test_where_cases_were_flown_a_column_says_how_many_comply() -> None:
 @pytest.mark.deep
 def test_an_infeasible_scheme_has_a_row_without_dots() -> None:
     ideal = compare(spinner(), ("one-pulse", "four-pulse"))
-    figure = figures.schemes_figure(ideal)
+    figure = schemes.schemes_figure(ideal)
     check_layout(figure)
     assert all(set(dots(axes)) == {"one-pulse"} for axes in figure.axes)
     rows = [tick.get_text() for axes in figure.axes for tick in axes.get_yticklabels()]
     assert rows.count("four-pulse\nno plan") == len(figure.axes)
-    check_layout(figures.schemes_figure(compare(spinner(), ("four-pulse",))))
+    check_layout(schemes.schemes_figure(compare(spinner(), ("four-pulse",))))
 
 
 @pytest.mark.deep
@@ -183,7 +182,7 @@ def test_a_scheme_that_breaks_a_cone_is_marked_as_not_met() -> None:
     assert all(plan.kept is False and not plan.meets_requirement for plan in both.plans)
     assert any(plan.ends_well for plan in both.plans)
     assert all(fails(Point(plan, 100.0, "N m s")) for plan in both.plans)
-    figure = figures.schemes_figure(both)
+    figure = schemes.schemes_figure(both)
     check_layout(figure)
     # Below the scale a mark points there, in the colour of the others that fail.
     assert all(mark in "xX<" for axes in figure.axes for _, mark, _ in dots(axes).values())
@@ -196,7 +195,7 @@ def test_a_scheme_that_breaks_a_cone_is_marked_as_not_met() -> None:
 def test_titles_speak_of_widths_where_pulses_have_some(torque: float | None, model: str) -> None:
     body = spinner(steerable=Steerable(torque))
     both = compare(body, ["one-pulse", "two-pulse"])
-    assert f"schemes by {model}" in heading(figures.schemes_figure(both))
+    assert f"schemes by {model}" in heading(schemes.schemes_figure(both))
     assert f"by {model}" in heading(flight_picture("timeline", body))
     assert both["two-pulse"].flight.model == "real pulse widths"
 
@@ -225,7 +224,7 @@ def traded_point(later: float, share: float) -> Point:
 @pytest.mark.deep
 def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     chosen = planning.plan(BODY, "two-pulse")
-    figure = figures.trade_figure(BODY, traded(), chosen)
+    figure = trade.trade_figure(BODY, traded(), chosen)
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
@@ -246,32 +245,32 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
 @pytest.mark.parametrize("front", [0, 1])
 def test_no_number_lies_under_the_star_of_the_recommended_plan(front: int) -> None:
     for point in traded()[front].points:
-        (axes,) = figures.trade_figure(BODY, traded(), point.plan).axes
+        (axes,) = trade.trade_figure(BODY, traded(), point.plan).axes
         check_star(axes, np.array([point.plan.end, point.cost]), 0.36 * style.STAR)
 
 
 @pytest.mark.deep
 def test_fronts_without_points_say_why() -> None:
-    figure = figures.trade_figure(spinner(), (Front(0.0, (), "no channel"),))
+    figure = trade.trade_figure(spinner(), (Front(0.0, (), "no channel"),))
     check_layout(figure)
     assert not figure.axes
     assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
     missing = Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
-    figure = figures.trade_figure(BODY, (missing, traded()[1]))
+    figure = trade.trade_figure(BODY, (missing, traded()[1]))
     check_layout(figure)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
     assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
-    assert not any("none" in text.get_text() for text, _ in texts(figures.trade_figure(BODY, traded())))
+    assert not any("none" in text.get_text() for text, _ in texts(trade.trade_figure(BODY, traded())))
 
 
 @pytest.mark.weekly
 @pytest.mark.parametrize("body", [BODY, spinner(phase=0.0)], ids=["channels", "at once"])
 def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_their_place(body: Spacecraft) -> None:
     body = replace(body, requirement=Requirement(momentum_shift=math.radians(0.05)))
-    both = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
-    plans = [point for _, _, point in fronts.numbered(both)]
+    both = tradeoff.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
+    plans = [point for _, _, point in tradeoff.numbered(both)]
     failing = {(point.plan.end, point.cost) for point in plans if point.plan.meets_requirement is False}
-    figure = figures.trade_figure(body, both)
+    figure = trade.trade_figure(body, both)
     check_layout(figure)
     low, high = figure.axes[0].get_xlim()
     assert all(low < point.plan.pulses.end < high for point in plans)
@@ -288,7 +287,7 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_th
 def test_points_close_together_keep_numbers_that_can_be_read(count: int, later: float, cheaper: float) -> None:
     """Nearest to their own points or joined to them."""
     close = Front(0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count)))
-    figure = figures.trade_figure(BODY, (close,))
+    figure = trade.trade_figure(BODY, (close,))
     check_layout(figure, crowded=count > 5)
     assert {str(number) for number in range(1, count + 1)} <= {text.get_text() for text, _ in texts(figure)}
     (axes,) = figure.axes
@@ -308,7 +307,7 @@ def test_proofs_are_drawn_where_pulses_can_be_told_apart_and_of_many_periods_by_
     """Curves would fill the panel; burns stand on the line of the peaks, which is what they cost."""
     made = planning.plan(spinner(channels=cross(8.0), limits=Limits(horizon=horizon)), "optimal")
     assert 0.0 < made.pulses.end < 60.0
-    figure = figures.certificate_figure(certificate(made))
+    figure = primer.certificate_figure(certificate(made))
     check_layout(figure)
     *_, upper, closer = figure.axes
     fired = line(closer, "pulses of the plan")

@@ -20,22 +20,20 @@ from support.golden import check_text
 from support.layout import check_layout, texts
 from support.shown import heading, legend_words, studied
 
-from nutdamp.dispersion.outputs import OUTPUTS
-from nutdamp.dispersion.statistics import Exact
-from nutdamp.dispersion.study import Results
-from nutdamp.loop.plan import loop_of
-from nutdamp.loop.study import LoopResults, loop_study
-from nutdamp.loop.study import run as run_loops
-from nutdamp.loop_settings import Loop, Sensor
-from nutdamp.presentation import figures
-from nutdamp.presentation.figures import dispersion as drawing
-from nutdamp.presentation.figures.history import BAR
-from nutdamp.presentation.figures.loop import loop_figure
-from nutdamp.presentation.figures.loop_cases import loop_cases_figure
-from nutdamp.presentation.page.pictures import dispersion_pictures_of
-from nutdamp.presentation.tolerance_tables import budget_rows, in_words
-from nutdamp.spacecraft import Channel, Requirement, Spacecraft, Steerable
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.control_loop.dispersion import LoopResults, loop_study
+from nutdamp.control_loop.dispersion import run as run_loops
+from nutdamp.control_loop.evaluation import loop_of
+from nutdamp.figures import dispersion
+from nutdamp.figures.history import BAR
+from nutdamp.figures.loop import loop_figure
+from nutdamp.figures.loop_cases import loop_cases_figure
+from nutdamp.montecarlo.statistics import OUTPUTS, Exact
+from nutdamp.montecarlo.study import Results
+from nutdamp.page.pictures import dispersion_pictures_of
+from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
+from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views.tolerance_tables import budget_rows, in_words
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -54,7 +52,7 @@ def study(which: str = "shift") -> Results:
 
 @cache
 def drawn(name: str, which: str = "shift") -> Figure:
-    return figures.dispersion_figure(name, study(which), scheme="two-pulse")
+    return dispersion.dispersion_figure(name, study(which), scheme="two-pulse")
 
 
 @pytest.mark.deep
@@ -94,7 +92,7 @@ def test_histograms_and_cases_beyond_reach_the_last_case(which: str) -> None:
 def test_a_histogram_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
     axes = Figure().subplots()
-    drawing._histogram(axes, Exact(values), "nutation left", None)
+    dispersion._histogram(axes, Exact(values), "nutation left", None)
     assert axes.get_xscale() == "log"
     assert "log axis" in axes.get_title()
     (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
@@ -110,7 +108,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
     still = Dispersions(timing=Tolerance("uniform", 1e-15), timing_offset=OFFSET if bias else None)
     results = studied(replace(BODY, dispersions=still), 50)
-    figure = figures.dispersion_figure("cases", results, scheme="two-pulse")
+    figure = dispersion.dispersion_figure("cases", results, scheme="two-pulse")
     check_layout(figure)
     most = results.distribution("nutation")
     assert most is not None
@@ -128,7 +126,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
 def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
     thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
     body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
-    figure = figures.dispersion_figure("momentum", studied(body, 500), scheme="two-pulse")
+    figure = dispersion.dispersion_figure("momentum", studied(body, 500), scheme="two-pulse")
     check_layout(figure)
     assert "the 500 cases" in legend_words(figure)
     ticks = figure.axes[0].get_xticklabels()
@@ -142,12 +140,12 @@ def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
 def test_final_h_lies_as_far_out_as_the_table_says(which: str, output: str) -> None:
     results = study(which)
     assert results.values is not None
-    cases = drawing.momentum_cases(results)
+    cases = dispersion.momentum_cases(results)
     away = np.degrees(results.values[OUTPUTS.index(output)])
     assert np.hypot(*cases.T) == pytest.approx(away, rel=1e-6, abs=1e-9)
     axes = drawn("momentum", which).axes[0]
     (dots,) = (patch for patch in axes.patches if isinstance(patch, PathPatch))
-    assert np.asarray(dots.get_path().vertices)[::2] == pytest.approx(cases[: drawing.DOTS])
+    assert np.asarray(dots.get_path().vertices)[::2] == pytest.approx(cases[: dispersion.DOTS])
     required = line(axes, "required")
     assert np.hypot(*required.T) == pytest.approx(np.full(len(required), 0.2))
     assert axes.get_aspect() == 1.0
@@ -160,14 +158,14 @@ def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
     points = np.random.default_rng(2).multivariate_normal([1.0, -2.0], [[4.0, 1.5], [1.5, 1.0]], 100_000)
     inverse = np.linalg.inv(np.cov(points.T))
     for share in (0.5, 0.9, 0.997):
-        rim, inside = (rows - points.mean(axis=0) for rows in (drawing.ellipse(points, share), points))
+        rim, inside = (rows - points.mean(axis=0) for rows in (dispersion.ellipse(points, share), points))
         sizes = np.sqrt(np.einsum("ij,jk,ik->i", rim, inverse, rim))
         assert np.ptp(sizes) < 1e-6 * sizes[0]
         # Rayleigh: of normal cases this share lies within.
         assert sizes[0] == pytest.approx(math.sqrt(-2.0 * math.log(1.0 - share)), rel=0.02)
         within = np.einsum("ij,jk,ik->i", inside, inverse, inside) <= sizes[0] ** 2
         assert within.mean() == pytest.approx(share, abs=1e-4)
-    assert (drawing.ellipse(np.zeros((5, 2)), 0.997) == 0.0).all()
+    assert (dispersion.ellipse(np.zeros((5, 2)), 0.997) == 0.0).all()
 
 
 @pytest.mark.deep
@@ -204,7 +202,7 @@ def test_the_tornado_has_the_rows_and_effects_of_the_table_and_says_what_they_ar
 @pytest.mark.parametrize("name", ["budget", *map(weekly, NAMES[:3])])
 def test_nothing_that_varies_is_an_empty_tornado(name: str) -> None:
     results = studied(replace(BODY, dispersions=Dispersions(timing_offset=OFFSET)), 50)
-    check_layout(figures.dispersion_figure(name, results, scheme="two-pulse"))
+    check_layout(dispersion.dispersion_figure(name, results, scheme="two-pulse"))
 
 
 @pytest.mark.deep

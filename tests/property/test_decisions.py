@@ -9,9 +9,8 @@ import pytest
 from support.cases import spread
 
 import nutdamp
-from nutdamp.comparison import compare
-from nutdamp.decision import decide
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.planning.decision import compare, decide
+from nutdamp.spacecraft.model import Spacecraft
 
 SCHEMES = ("one-pulse", "two-pulse", "four-pulse")
 

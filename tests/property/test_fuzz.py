@@ -19,7 +19,7 @@ from support.planner import Planner
 from support.process import within
 from support.random_bodies import power
 
-from nutdamp import schemes
+from nutdamp.schemes import planner as schemes
 
 SEEDS, BLOCKS = 600, 24
 """Spacecraft, and in how many blocks they run."""
@@ -208,8 +208,8 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     """
     one = Planner()
     monkeypatch.setattr(schemes, "schedule", one.schedule)
-    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 20_000)
-    monkeypatch.setattr("nutdamp.basilisk.MOST_STEPS", 20_000)
+    monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 20_000)
+    monkeypatch.setattr("nutdamp.flight.basilisk.MOST_STEPS", 20_000)
     return one
 
 

@@ -18,16 +18,18 @@ from support.checker import violations
 from support.places import case
 from support.random_bodies import disturbed_spacecraft, power, random_spacecraft
 
-from nutdamp import flight, planning
 from nutdamp.errors import Infeasible
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.limits import Windows
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schedule import TOUCHING, Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC, Options
-from nutdamp.schemes.tools import steerable_pair
-from nutdamp.schemes.tools.impulse_builder import MOST_PULSES, ImpulseBuilder
-from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Steerable
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.schemes import pulse_pairs
+from nutdamp.schemes.catalogue import CLASSIC, Options
+from nutdamp.schemes.sequential import MOST_PULSES, ImpulseBuilder
+from nutdamp.spacecraft.constraints import Windows
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
 PLENTY = 3_000_000
 """Calls of functions; most plans take a tenth of that, so that an endless search fails, not hangs."""
@@ -327,8 +329,8 @@ def test_a_search_that_gains_a_little_in_every_step_ends() -> None:
         return np.asarray(1.0 / (1.0 + np.exp(np.minimum(1e-9 * points[:, 0], 700.0))))
 
     with within(PLENTY):
-        steerable_pair._descend(cost, np.array([0.0]), np.array([1.0]))
-    assert next(steps) <= steerable_pair.COMPASS_STEPS + 1
+        pulse_pairs._descend(cost, np.array([0.0]), np.array([1.0]))
+    assert next(steps) <= pulse_pairs.COMPASS_STEPS + 1
 
 
 @pytest.mark.weekly
@@ -346,7 +348,9 @@ def test_a_planned_schedule_is_flown_in_so_many_steps_and_a_track_in_more() -> N
     """One pulse that spins a needle up to turn after turn."""
     body, screw = spinner(2.0, 2e-4, spin=1e-3, degrees=60.0), channel("screw", 1e-5, 0.0, 1e-4)
     with pytest.raises(Infeasible, match="too many steps"):
-        flight.flown(body, Schedule((channel_pulse(screw, 500.0, 1000.0),)))
-    assert 0 < flight.flown(body, Schedule((channel_pulse(screw, 50.0, 100.0),))).steps <= flight.PLANNED_STEPS
+        propagation.flown(body, Schedule((channel_pulse(screw, 500.0, 1000.0),)))
+    assert (
+        0 < propagation.flown(body, Schedule((channel_pulse(screw, 50.0, 100.0),))).steps <= propagation.PLANNED_STEPS
+    )
     tumbling = spinner(moments=(100.0, 120.0, 80.0), degrees=5.0)
-    assert flight.flown(tumbling, Schedule(), 30_000.0).steps > flight.PLANNED_STEPS
+    assert propagation.flown(tumbling, Schedule(), 30_000.0).steps > propagation.PLANNED_STEPS

@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 from support.builders import pulse, spinner
 from support.cases import spread
 
-from nutdamp import flight
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Disturbance, Spacecraft
+from nutdamp.flight import propagation
+from nutdamp.spacecraft.model import Disturbance, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
 Case = tuple[Spacecraft, Schedule]
@@ -101,7 +101,7 @@ def test_random_cases(seed: int, count: int, periods: float, slimmest: float) ->
     cases = [draw(rng, periods, slimmest) for _ in range(count)]
     for (body, made), end in zip(cases, reference(cases, periods), strict=True):
         until, size = periods * body.inertial_period, float(np.linalg.norm(end[:3]))
-        (got,), (turned,) = flight.flown(body, made, until).legs[-1].path.motion(np.array([until]))
+        (got,), (turned,) = propagation.flown(body, made, until).legs[-1].path.motion(np.array([until]))
         assert np.linalg.norm(got - end[:3]) <= AGREEMENT * size
         q = end[3:] / np.linalg.norm(end[3:])  # |q - q'| is half the angle between two attitudes
         assert 2 * min(np.linalg.norm(turned - q), np.linalg.norm(turned + q)) <= AGREEMENT

@@ -10,12 +10,12 @@ import pytest
 from support.builders import Outcome, aimed
 from support.random_bodies import power, random_spacecraft
 
-from nutdamp.comparison import Comparison, compare, usual
-from nutdamp.planning import Plan
-from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Standing
-from nutdamp.schemes import Options
-from nutdamp.spacecraft import Requirement, Spacecraft
+from nutdamp.planning.decision import Comparison, compare, usual
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Standing
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.views import verdicts
 
 COUNT = 200
 

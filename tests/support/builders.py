@@ -12,25 +12,15 @@ from types import FrameType
 import numpy as np
 from support import reference
 
-from nutdamp.comparison import Comparison
-from nutdamp.compliance import Left
-from nutdamp.flight import Residual
-from nutdamp.planning import Plan
-from nutdamp.presentation import verdicts
-from nutdamp.recommendation import recommend
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import (
-    Attitude,
-    Channel,
-    Goal,
-    Inertia,
-    Limits,
-    Requirement,
-    Spacecraft,
-    Steerable,
-    Thruster,
-    Vector,
-)
+from nutdamp.flight.propagation import Residual
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import recommend
+from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
+from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Left
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views import verdicts
 
 
 def spinner(

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 ROUNDING = 2e-9
 """s; far below any resolution of commands."""

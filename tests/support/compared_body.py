@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from support.builders import cross, spinner
 from support.dispersed import normal
 
-from nutdamp.comparison import Comparison, compare
-from nutdamp.spacecraft import Limits, Requirement, Vector
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.planning.decision import Comparison, compare
+from nutdamp.spacecraft.model import Limits, Requirement, Vector
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
 TOLERANCES = Dispersions(

@@ -16,13 +16,13 @@ from support import messages, reference
 from support.cases import deep
 from support.golden import check_text
 
-from nutdamp import planning
 from nutdamp.errors import FaultyFile, printable
-from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.planning import Plan
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.files.overrides import parse_setting
+from nutdamp.files.reader import load_spacecraft, read_spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 QUICK = ("steerable-stage", "tilted tensor, backwards", "oblate, backwards")
 CASES = pytest.mark.parametrize("case", [name if name in QUICK else deep(name) for name in messages.CASES])

@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 from support.builders import spinner
 
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.draws import BLOCK, Draws
-from nutdamp.dispersion.study import Study
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft, Steerable, Thruster
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.inputs import BLOCK, Draws
+from nutdamp.montecarlo.study import Study
+from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
+from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 def normal(size: float, *, relative: bool = False) -> Tolerance:
@@ -90,7 +91,7 @@ def steered(
 
 def exact_two_pulse(scale: float, **tolerances: object) -> Study:
     """The exact two-pulse by ideal impulses, which leaves nothing, dispersed a little."""
-    from nutdamp import planning
+    from nutdamp.planning import plan as planning
 
     body = spinner(limits=Limits(earliest=1.0))  # a pulse at t = 0 could only be late
     plan = planning.plan(body, "two-pulse")

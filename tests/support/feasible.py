@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from support.checker import violations
 
-from nutdamp import flight, planning
-from nutdamp.remarks import infeasibility
-from nutdamp.schemes import Options
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.model import Spacecraft
 
 
 def feasible_by(scheme: str, spacecraft: Spacecraft, options: Options | None = None) -> planning.Plan:
@@ -17,6 +18,6 @@ def feasible_by(scheme: str, spacecraft: Spacecraft, options: Options | None = N
     return plan
 
 
-def left(plan: planning.Plan) -> flight.Residual:
+def left(plan: planning.Plan) -> propagation.Residual:
     assert plan.flown is not None
     return plan.flown

@@ -14,13 +14,13 @@ from support.builders import channel, cross, events, spinner
 from support.dispersed import normal
 from support.spinners import commanded
 
-from nutdamp.commands import Block
-from nutdamp.dispersion.cases import Model
+from nutdamp.montecarlo.cases import Model
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule
-from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Spacecraft
-from nutdamp.tolerances import Dispersions
+from nutdamp.schemes.block_model import fired
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.record import Record
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.estimation.parameters import Record
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 
 def silent(*signals: str, until: float = 10.0, count: int = 11, schedule: Schedule | None = None) -> Record:

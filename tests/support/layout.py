@@ -10,7 +10,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from nutdamp.spacecraft import Vector
+from nutdamp.spacecraft.model import Vector
 
 KEPT = "texts of the tests"
 """Where a figure keeps what it was drawn for."""

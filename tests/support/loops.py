@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from support.builders import channel, spinner
 
-from nutdamp.loop import cycles
-from nutdamp.loop.cycles import Map
-from nutdamp.loop_settings import Loop, Sensor
-from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.control_loop import limit_cycle
+from nutdamp.control_loop.limit_cycle import Map
+from nutdamp.spacecraft.equipment import Channel, Loop, Sensor
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 rad = math.radians
 
@@ -69,4 +69,4 @@ def follow_few_cycles(patch: pytest.MonkeyPatch) -> None:
     """Budgets by 8 chains of 4 cycles or 20 firings: known to some 3 %, which changes none of their texts."""
     patch.setattr(Map.cycle, "__defaults__", (8, 4))
     patch.setattr(Map.attractors, "__defaults__", (8,))
-    patch.setattr(cycles, "FIRINGS", 20)
+    patch.setattr(limit_cycle, "FIRINGS", 20)

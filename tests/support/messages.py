@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 from support import places
 
-from nutdamp import planning
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
+from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.physics import attitude
-from nutdamp.planning import Plan
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 CONFIGS = places.CONFIGS
 

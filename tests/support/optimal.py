@@ -12,11 +12,12 @@ import numpy as np
 from support.builders import Outcome, off_target, spinner
 from support.checker import violations
 
-from nutdamp.planning import Plan, plan
-from nutdamp.remarks import infeasibility
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.plan import Plan, plan
+from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import search
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Channel, Limits, Spacecraft, Thruster
+from nutdamp.spacecraft.equipment import Channel, Thruster
+from nutdamp.spacecraft.model import Limits, Spacecraft
 
 
 def flies(spacecraft: Spacecraft, *, left: float = 1e-6, dearest: float = math.inf, **options: Any) -> Plan:

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from nutdamp.comparison import Comparison
-from nutdamp.presentation.page import content
-from nutdamp.presentation.page.content import Repeat, report_page
-from nutdamp.presentation.page.document import Page, Prose
+from nutdamp.page import content
+from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.document import Page, Prose
+from nutdamp.planning.decision import Comparison
 
 
 @contextmanager

@@ -9,10 +9,12 @@ from importlib import import_module
 from typing import Any
 from unittest.mock import patch
 
-from nutdamp import planning, schemes, work
+from nutdamp.common import work
 from nutdamp.errors import NutdampError
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.schemes import catalogue, planner
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 NOT_PLANNED_WITH = ("source", "dispersions", "with_disturbances")
 """Fields that no scheme reads: disturbances are taken from the body before a scheme sees it."""
@@ -27,17 +29,17 @@ class Planner:
     def __init__(self) -> None:
         self.kept: dict[str, tuple[Schedule | NutdampError, float]] = {}
         self.calls = 0
-        self.plain = schemes.schedule
+        self.plain = planner.schedule
 
-    def __call__(self, spacecraft: Spacecraft, name: str, options: schemes.Choice = None) -> planning.Plan:
-        """The plan of a scheme, judged as `nutdamp.planning.plan` does."""
-        with patch.object(schemes, "schedule", self.schedule):
+    def __call__(self, spacecraft: Spacecraft, name: str, options: planner.Choice = None) -> planning.Plan:
+        """The plan of a scheme, judged as `nutdamp.planning.plan.plan` does."""
+        with patch.object(planner, "schedule", self.schedule):
             return planning.plan(spacecraft, name, options)
 
-    def schedule(self, name: str, spacecraft: Spacecraft, options: schemes.Choice = None) -> Schedule:
+    def schedule(self, name: str, spacecraft: Spacecraft, options: planner.Choice = None) -> Schedule:
         """As `schemes.schedule`."""
         self.calls += 1
-        code = id(import_module(schemes.SCHEMES[name].module).schedule)
+        code = id(import_module(catalogue.SCHEMES[name].module).schedule)
         key = json.dumps([name, code, type(options).__name__, options, spacecraft], default=_plain)
         with work.budget("a schedule", math.inf) as spent:
             made, units = self.kept.get(key, (None, math.inf))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from nutdamp.cli.root import main
+from nutdamp.cli.main import main
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 """``run("plan", "--json", "-", stdin=…, columns=80)``: the type of the fixtures that run the command line."""

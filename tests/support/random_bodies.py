@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from support.builders import channel, fan, spinner
 
-from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft, Steerable
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft
 
 
 def power(rng: np.random.Generator, least: float, most: float) -> float:

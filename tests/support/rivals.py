@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 from support.reference import frame_n
 
-from nutdamp.spacecraft import Channel, Inertia, Limits, Spacecraft, Thruster
+from nutdamp.spacecraft.equipment import Channel, Thruster
+from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 
 Array = NDArray[np.float64]
 

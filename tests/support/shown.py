@@ -12,18 +12,20 @@ from matplotlib.text import Annotation
 from support.builders import aimed, cross, fan, spinner
 from support.markup import Node, parsed
 
-from nutdamp import dispersion, planning
-from nutdamp.comparison import Comparison, compare
-from nutdamp.dispersion.study import Results, run
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import Flight
-from nutdamp.presentation import figures, geometry
-from nutdamp.presentation.page.document import Page
-from nutdamp.presentation.page.html import page_html
-from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Attitude, Limits, Requirement, Spacecraft, Steerable, Vector
-from nutdamp.track import Track
+from nutdamp.figures import export, geometry, overview
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.montecarlo import study as dispersion
+from nutdamp.montecarlo.study import Results, run
+from nutdamp.page.document import Page
+from nutdamp.page.html import page_html
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import Comparison, compare
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Attitude, Limits, Requirement, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
 
 WIDE = spinner(channels=cross(20.0))
 BODY = spinner(channels=cross(20.0), requirement=Requirement(0.01, 0.005))
@@ -75,20 +77,20 @@ def flown(case: str) -> tuple[Flight, Track]:
     """The flight of a case, as far as its pictures reach."""
     body, pulses = CASES[case]
     pulses = planning.plan(body, pulses).pulses if isinstance(pulses, str) else pulses
-    made, track = figures.shown(planning.Plan(body, "trial", pulses))
+    made, track = export.shown(planning.Plan(body, "trial", pulses))
     return made, geometry.drawn(made, track)
 
 
 @cache
 def drawn(name: str, case: str) -> Figure:
     """A figure of a case."""
-    return figures.flight_figure(name, *flown(case))
+    return overview.flight_figure(name, *flown(case))
 
 
 def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pulse") -> Figure:
     """A figure of a schedule, or of the one of a scheme."""
     plan = planning.plan(body, pulses) if isinstance(pulses, str) else planning.Plan(body, "trial", pulses)
-    return figures.flight_figure(name, *figures.shown(plan))
+    return overview.flight_figure(name, *export.shown(plan))
 
 
 def studied(body: Spacecraft, count: int, scheme: str = "two-pulse") -> Results:

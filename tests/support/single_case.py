@@ -7,17 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import flight
-from nutdamp.dispersion import sun_fired
-from nutdamp.dispersion.cases import DispersedCases, Model, Thrusting
-from nutdamp.dispersion.draws import Draws
-from nutdamp.dispersion.elementwise import triple
-from nutdamp.dispersion.watched import number_of
-from nutdamp.dynamics import make_dynamics
-from nutdamp.physics import attitude, rigid_cases
-from nutdamp.physics.valve import Ramp
-from nutdamp.schedule import Command, Pulse, Schedule
-from nutdamp.spacecraft import Attitude, Spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import make_dynamics
+from nutdamp.montecarlo import propagated
+from nutdamp.montecarlo.cases import DispersedCases, Model, Thrusting, number_of, triple
+from nutdamp.montecarlo.inputs import Draws
+from nutdamp.physics import attitude, batch
+from nutdamp.physics.thruster import Ramp
+from nutdamp.spacecraft.model import Attitude, Spacecraft
+from nutdamp.spacecraft.schedule import Command, Pulse, Schedule
 
 Array = NDArray[np.float64]
 
@@ -29,8 +27,8 @@ def timed(model: Model, cases: DispersedCases) -> DispersedCases:
     count, dynamics = number_of(cases), make_dynamics(model.spacecraft)
     moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
-    bodies = rigid_cases.Bodies(moments, dynamics.constant, dynamics.forcing)
-    fired = sun_fired.fly(model, bodies, rates, upright, cases, sun_fired.seen_nominally(model))
+    bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing)
+    fired = propagated.fly(model, bodies, rates, upright, cases, propagated.seen_nominally(model))
     pulses = zip(cases.impulses, fired.seen, strict=True)
     impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
     return replace(cases, starts=tuple(fired.starts), impulses=impulses)
@@ -93,7 +91,7 @@ def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float |
 def flown_outputs(model: Model, draws: Draws) -> Array:
     """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by `flight.flown`."""
     true, schedule = realised(model, draws)
-    made = flight.flown(true, schedule)
+    made = propagation.flown(true, schedule)
     settled, left = made.settled, made.residual
     momentum = attitude.rotate(settled.quaternion, settled.rates * np.asarray(made.last_moments))
     target = attitude.rotate(model.spacecraft.initial.quaternion, model.target)

@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 from support import reference
 from support.builders import aimed, cross, spinner
 
-from nutdamp.commands import Block
 from nutdamp.physics import attitude
-from nutdamp.spacecraft import Commands, Limits, Spacecraft, SunSensor
+from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
+from nutdamp.spacecraft.model import Limits, Spacecraft
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from support.builders import pulse, spinner
 
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 UNTIL = 12.0
 """End, s, of the flights of `schedules`."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from support import reference
 
 import nutdamp
-from nutdamp.estimation.record import GYROS, Record
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.estimation.parameters import GYROS, Record
+from nutdamp.spacecraft.model import Spacecraft
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from scipy.interpolate import CubicSpline
 from support import reference
 
 import nutdamp
-from nutdamp.epoch import Epoch
-from nutdamp.estimation.record import GYROS, Record
-from nutdamp.files.telemetry_csv import read_telemetry
+from nutdamp.common.time import Epoch
+from nutdamp.estimation.parameters import GYROS, Record
+from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from support.spinning import spinners
 
-from nutdamp import flight
-from nutdamp.guide.equation import EQUATIONS
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes import SchemeOptions
+from nutdamp.flight import propagation
+from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.one_pulse import schedule as one_pulse
-from nutdamp.spacecraft import Inertia, Spacecraft
+from nutdamp.spacecraft.model import Inertia, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views.guide import EQUATIONS
 
 PHYSICS = Path(__file__).parent / "physics"
 TESTED = {
@@ -59,7 +59,7 @@ def test_one_pulse_21(A: float, C: float, spin: float) -> None:
     body = Spacecraft("x", Inertia((A, A, C)), np.array([0.3, -0.4, spin]))
     schedule = one_pulse(body, SchemeOptions())
     assert schedule.total_impulse == pytest.approx(A * 0.5, rel=1e-14)
-    left = flight.by_impulses(body, schedule).residual
+    left = propagation.by_impulses(body, schedule).residual
     assert left.nutation < 1e-14
     assert left.momentum_shift == pytest.approx(body.nutation, rel=1e-12)
 
@@ -68,6 +68,6 @@ def test_a_pulse_in_the_schedule_is_15() -> None:
     """M(t) = Σ M_v δ(t - t_v): an ideal impulse changes ω by M_v/A at t_v and nothing else."""
     body = Spacecraft("x", Inertia((120.0, 120.0, 80.0)), np.array([0.2, 0.1, 3.0]))
     schedule = Schedule((Pulse(1.0, 0.0, "x", np.array([6.0, 0.0, 0.0])),))
-    before, after = flight.flown(body, schedule).around_pulses()
+    before, after = propagation.flown(body, schedule).around_pulses()
     assert after.rates[0] - before.rates[0] == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
     assert after.quaternion[0] == pytest.approx(before.quaternion[0], abs=1e-15)

@@ -2,14 +2,24 @@
 
 The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
 502.0-B-3: 3-1 to 3-3 (OPM).
+
+Keyword = value notation, CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7 alike): messages as plain text.
+
+XML notation, CCSDS 504.0-B-2 section 7.
 """
 
 from __future__ import annotations
 
+import re
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import groupby
 from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from nutdamp.errors import Fault
 
 VERSION = "2.0"
 """Version of APM and AEM in issue 2 of their standard. Version 1 has other keywords."""
@@ -248,3 +258,117 @@ def _ascii(text: str) -> str:
     """Without accents and without what ASCII does not have."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return "".join(character if character.isprintable() else " " for character in plain)
+
+
+SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance"
+
+
+def to_xml(message: Message) -> str:
+    """The text of a message."""
+    # Namespace and attributes are written as the standard prints them.
+    root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, "id": f"CCSDS_{message.kind}_VERS"})
+    root.set("version", message.version)
+    _fill(SubElement(root, "header"), message.header)
+    body = SubElement(root, "body")
+    for segment in message.segments:
+        place = SubElement(body, "segment")
+        _fill(SubElement(place, "metadata"), segment.metadata)
+        data = SubElement(place, "data")
+        for block in segment.blocks:
+            layout = {**APM_BLOCKS, **OPM_BLOCKS}.get(block.name)
+            if layout is None:
+                _fill(data, block)
+            else:
+                _fill(SubElement(data, layout.tag), block, layout.keywords)
+        for record in segment.records:
+            assert segment.record is not None
+            tag, rows = segment.record
+            entries = (Entry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
+            _entries(SubElement(SubElement(data, "attitudeState"), tag), entries, rows)
+    indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
+
+
+def _fill(place: Element, block: Block, keywords: tuple[Keyword, ...] = ()) -> None:
+    for comment in block.comments:
+        SubElement(place, "COMMENT").text = comment
+    _entries(place, block.entries, keywords)
+
+
+def _entries(place: Element, entries: Iterable[Entry], keywords: tuple[Keyword, ...]) -> None:
+    wraps = {keyword.name: keyword.tag for keyword in keywords}
+    for tag, group in groupby(entries, lambda entry: wraps.get(entry.keyword, "")):
+        parent = SubElement(place, tag) if tag else place
+        for entry in group:
+            SubElement(parent, entry.keyword, {"units": entry.unit} if entry.unit else {}).text = entry.value
+
+
+_PAIR = re.compile(r"([A-Z0-9_]+)\s*=\s*(.*?)(?:\s+\[([^\]]*)\])?")
+_WORD = re.compile(r"[A-Z0-9_]+")
+_LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
+
+
+def to_kvn(message: Message) -> str:
+    """The text of a message."""
+    lines = [f"CCSDS_{message.kind}_VERS = {message.version}", *_block(message.header)]
+    for segment in message.segments:
+        metadata = _block(segment.metadata)
+        if message.kind == "AEM":
+            lines += ["", "META_START", *metadata, "META_STOP"]
+        else:
+            lines += ["", *metadata]
+        for block in segment.blocks:
+            inside, named = _block(block), block.name in APM_BLOCKS
+            lines += ["", f"{block.name}_START", *inside, f"{block.name}_STOP"] if named else ["", *inside]
+        if segment.records:
+            lines += ["", "DATA_START", *(" ".join(record) for record in segment.records), "DATA_STOP"]
+    return "\n".join(lines) + "\n"
+
+
+def _block(block: Block) -> list[str]:
+    width = max((len(entry.keyword) for entry in block.entries), default=0)
+    return [
+        *(f"COMMENT {comment}" for comment in block.comments),
+        *(
+            f"{entry.keyword:<{width}} = {entry.value}" + (f" [{entry.unit}]" if entry.unit else "")
+            for entry in block.entries
+        ),
+    ]
+
+
+def from_kvn(text: str, name: str) -> tuple[list[Block], list[Fault]]:
+    """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
+
+    Lines count from 1; ``name`` is that of the file in faults.
+    """
+    outside: list[Entry] = []
+    blocks: list[Block] = []
+    faults: list[Fault] = []
+    within: tuple[str, int] | None = None
+    entries: list[Entry] = []
+    for line, raw in enumerate(_LINE_END.split(text), start=1):
+        content = raw.strip()
+        if not content or content.split(maxsplit=1)[0] == "COMMENT":
+            continue
+        pair = _PAIR.fullmatch(content)
+        if pair is not None:
+            entry = Entry(pair[1], pair[2], pair[3] or "", line)
+            (outside if within is None else entries).append(entry)
+        elif _WORD.fullmatch(content) and content.endswith("_START"):
+            if within is not None:
+                faults.append(Fault(name, line, 1, content, f"{within[0]}_STOP is missing before it"))
+                blocks.append(Block(within[0], tuple(entries), line=within[1]))
+            within, entries = (content.removesuffix("_START"), line), []
+        elif _WORD.fullmatch(content) and content.endswith("_STOP"):
+            if within is None or content != f"{within[0]}_STOP":
+                expected = "no block is open" if within is None else f"expected {within[0]}_STOP"
+                faults.append(Fault(name, line, 1, content, expected))
+            else:
+                blocks.append(Block(within[0], tuple(entries), line=within[1]))
+                within = None
+        else:
+            faults.append(Fault(name, line, 1, "", f"{content[:40]!r} is no KEYWORD = value"))
+    if within is not None:
+        faults.append(Fault(name, within[1], 1, f"{within[0]}_START", f"{within[0]}_STOP is missing"))
+        blocks.append(Block(within[0], tuple(entries), line=within[1]))
+    return [Block("", tuple(outside), line=1), *blocks], faults

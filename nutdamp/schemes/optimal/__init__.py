@@ -1,1 +1,0 @@
-"""The scheme optimal: the cheapest schedule, by linear programs about the flown motion, with its bounds."""

@@ -3,6 +3,8 @@
 Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
 and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at
 any moment. Columns enter the program by their price, since a handful of equations needs few of them.
+
+The unknowns of the linear program of `optimal`: how long to fire a channel at a moment, or in a slot of time.
 """
 
 from __future__ import annotations
@@ -10,17 +12,91 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp import work
-from nutdamp.limits import Windows
-from nutdamp.schemes.optimal import lp_solver
-from nutdamp.schemes.optimal.columns import Burn, Columns, alone, burns, peaks
-from nutdamp.schemes.optimal.reach import supplies
-from nutdamp.schemes.optimal.residual_equations import Influence
-from nutdamp.spacecraft import Channel, Spacecraft, Vector
+from nutdamp.common import work
+from nutdamp.schemes.optimal import highs
+from nutdamp.schemes.optimal.highs import supplies
+from nutdamp.schemes.optimal.refinement import Influence
+from nutdamp.spacecraft.constraints import Windows
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Spacecraft, Vector
+
+
+class Columns(NamedTuple):
+    """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
+
+    Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
+    """
+
+    channel: NDArray[np.int_]
+    t: Vector
+    width: Vector
+    burn: NDArray[np.int_]
+
+    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> Columns:
+        """Some of the columns."""
+        return Columns(self.channel[which], self.t[which], self.width[which], self.burn[which])
+
+    def joined(self, other: Columns) -> Columns:
+        """These columns and others."""
+        return Columns(
+            np.concatenate([self.channel, other.channel]),
+            np.concatenate([self.t, other.t]),
+            np.concatenate([self.width, other.width]),
+            np.concatenate([self.burn, other.burn]),
+        )
+
+
+def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
+    """Columns that belong to no burn."""
+    return Columns(channel, t, width, np.full(len(t), -1))
+
+
+@dataclass(frozen=True, slots=True)
+class Burn:
+    """Neighbouring slots of one channel taken together: centre and on-time in s."""
+
+    channel: Channel
+    t: float
+    on_time: float
+
+    @property
+    def impulse(self) -> float:
+        """Torque times on-time, N m s."""
+        return self.on_time * float(np.linalg.norm(self.channel.torque))
+
+
+def burns(channels: Sequence[Channel], columns: Columns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
+    """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
+    found: list[Burn] = []
+    for index in np.flatnonzero(np.bincount(columns.channel)).tolist():
+        mine = np.flatnonzero(columns.channel == index)
+        mine = mine[np.argsort(columns.t[mine], kind="stable")]
+        cut = (np.diff(columns.t[mine]) > apart) | (np.diff(columns.burn[mine]) != 0)
+        for group in np.split(mine, np.flatnonzero(cut) + 1):
+            total = float(on_times[group].sum())
+            found.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+    return tuple(sorted(found, key=lambda burn: burn.t))
+
+
+def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
+    """Moments (n,) s at which what is worth ``worth`` (n, 5) at even ``times`` (n, 5) s is worth most, and how much.
+
+    By the parabola through the best of the five and those beside it; at an end of them, that end.
+    """
+    best = np.argmax(worth, axis=1)
+    every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+    low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+    bend = low - 2.0 * top + high
+    aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+    aside = np.where(best == inner, aside, best - inner)
+    most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
+    return times[every, inner] + aside * (times[:, 1] - times[:, 0]), most
+
 
 SLOTS = 64
 """Slots in the faster of the two turns, at ω3 and at aω3."""
@@ -170,11 +246,11 @@ class Program:
             found.prices * self._dearest / self._scale,
         )
 
-    def _unmet(self, found: lp_solver.Optimum) -> float:
+    def _unmet(self, found: highs.Optimum) -> float:
         """What slacks have to supply, over all there is to do."""
         return float(found.x[: 2 * len(self.influence.goal)].sum())
 
-    def _master(self, columns: Columns, reach: Vector | None) -> lp_solver.GrowingProgram:
+    def _master(self, columns: Columns, reach: Vector | None) -> highs.GrowingProgram:
         """The program of these columns, in units of all there is to do, after slacks and the ring.
 
         ``reach`` (equations,): the largest coefficients that there can be, where more columns are to come.
@@ -187,7 +263,7 @@ class Program:
         work.spend(LIMITED * longest)
         limits = np.concatenate([np.full(shares, self.off / self._scale), np.ones(longest)])
         goal = self.influence.goal / self._scale
-        master = lp_solver.GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
+        master = highs.GrowingProgram(goal, limits, np.maximum(reach, TINIEST))
         rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count : count + shares, 2 * count :] = 1.0
@@ -196,7 +272,7 @@ class Program:
         self._add(master, columns)
         return master
 
-    def _add(self, master: lp_solver.GrowingProgram, columns: Columns) -> None:
+    def _add(self, master: highs.GrowingProgram, columns: Columns) -> None:
         """Let the program have these columns."""
         cost = self._price[columns.channel] / self._dearest * self._dearness(columns.t)
         most = np.full(len(cost), np.inf)

@@ -12,9 +12,9 @@ from support.places import case
 from support.process import Run
 
 import nutdamp
-from nutdamp import work
-from nutdamp.comparison import Comparison
-from nutdamp.files.examples import example_text
+from nutdamp.common import work
+from nutdamp.files.reader import example_text
+from nutdamp.planning.decision import Comparison
 
 LOOSE = "dispersions.A={normal: 1 %}"
 """A tolerance of the built-in example with which no plan compared complies in enough cases."""

@@ -20,8 +20,8 @@ from support.golden import check_text
 from support.markup import parsed
 from support.process import Run, environment
 
-from nutdamp import dispersion
 from nutdamp.cli import disperse
+from nutdamp.montecarlo import study as dispersion
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -14,20 +14,17 @@ from support.commands import python, rows, words
 from support.golden import check_text
 from support.process import Run
 
-from nutdamp import guide
-from nutdamp.cli.root import group
-from nutdamp.cli.scheme_options import SHARED
-from nutdamp.files.file_guide import flow, keys
-from nutdamp.files.schema import json_schema
-from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.guide.equation import EQUATIONS, SYMBOLS
-from nutdamp.guide.topic import Commands, Formula
-from nutdamp.presentation.explain_tables import WIDEST
-from nutdamp.schemes import NAMES, SCHEMES
-from nutdamp.schemes.options import names_of
-from nutdamp.tolerances import KINDS as TOLERANCE_KINDS
+from nutdamp.cli.main import group
+from nutdamp.cli.options import SHARED
+from nutdamp.files.overrides import parse_setting
+from nutdamp.files.reader import json_schema, read_spacecraft
+from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
+from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
+from nutdamp.views import guide
+from nutdamp.views.explain_tables import WIDEST
+from nutdamp.views.file_guide import flow, keys
+from nutdamp.views.guide import EQUATIONS, SYMBOLS, Commands, Formula
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -230,7 +227,7 @@ def test_the_guide_loads_no_numbers(tmp_path: Path) -> None:
     """Neither numpy nor scipy."""
     code = f"""
 import sys
-from nutdamp.cli.root import group
+from nutdamp.cli.main import group
 for topic in {["", *guide.NAMES]!r}:
     group.main(["explain", *topic.split()], standalone_mode=False)
 print("LOADED", *{{"numpy", "scipy", "matplotlib", "yaml"}} & set(sys.modules))

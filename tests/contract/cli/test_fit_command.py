@@ -16,9 +16,9 @@ from support.synthetic import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest
-from nutdamp.files.examples import example_text
-from nutdamp.flight import flown
-from nutdamp.physics.valve import Trapezoid
+from nutdamp.files.reader import example_text
+from nutdamp.flight.propagation import flown
+from nutdamp.physics.thruster import Trapezoid
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -18,10 +18,11 @@ from support.commands import EXACT, call, names, python, refusals, result, writt
 from support.golden import check_text
 from support.process import Run
 
-from nutdamp import __version__, errors, survey
-from nutdamp.cli.parameters import FileName
-from nutdamp.cli.root import COMMANDS, group
-from nutdamp.spacecraft import Spacecraft
+from nutdamp import __version__, errors
+from nutdamp.cli.main import COMMANDS, group
+from nutdamp.cli.options import FileName
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views import survey
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -254,7 +255,7 @@ def test_shells_complete_commands_options_choices_topics_and_leave_files_to_the_
 
 @pytest.mark.deep
 def test_completion_is_that_of_a_process_called_nutdamp() -> None:
-    code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli.root import main; main()"
+    code = "import sys; sys.argv = ['nutdamp']; from nutdamp.cli.main import main; main()"
     asked = {"_NUTDAMP_COMPLETE": "bash_complete", "COMP_WORDS": "nutdamp plan sp", "COMP_CWORD": "2"}
     process = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True, check=False
@@ -276,7 +277,7 @@ def test_every_file_of_every_command_is_completed() -> None:
 
 LOADED = """
 import contextlib, sys
-from nutdamp.cli.root import group
+from nutdamp.cli.main import group
 for words, heavy in {commands!r}:
     with contextlib.suppress(SystemExit):
         group.main(words.split(), standalone_mode=False)
@@ -304,7 +305,7 @@ def test_a_command_loads_what_it_needs(tmp_path: Path, commands: list[tuple[str,
 @pytest.mark.deep
 def test_products_of_small_matrices_have_one_thread(tmp_path: Path) -> None:
     """Unless the environment says otherwise."""
-    code = "import os, sys\n{}\nfrom nutdamp.cli.root import main\nsys.argv = ['nutdamp', '--version']\n"
+    code = "import os, sys\n{}\nfrom nutdamp.cli.main import main\nsys.argv = ['nutdamp', '--version']\n"
     code += "try: main()\nfinally: print(os.environ['OPENBLAS_NUM_THREADS'])"
     for given, used in (
         ("os.environ.pop('OPENBLAS_NUM_THREADS', 0)", "1"),

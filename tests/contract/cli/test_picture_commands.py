@@ -136,10 +136,10 @@ def test_an_infeasible_plan_has_no_picture(run: Run, tmp_path: Path) -> None:
 LACKING = """
 import sys
 sys.modules[{package!r}] = None
-from nutdamp.cli.root import main
-import nutdamp.comparison
+from nutdamp.cli.main import main
+import nutdamp.planning.decision
 sys.argv = ["nutdamp", *{words!r}]
-nutdamp.comparison.compare = None
+nutdamp.planning.decision.compare = None
 main()
 """
 

@@ -14,9 +14,9 @@ from support.commands import EXACT, WIDE, call, contents, result, rows, transcri
 from support.golden import check_text
 from support.process import Run
 
-from nutdamp.files.pulses_csv import HEADER
-from nutdamp.schedule import Schedule
+from nutdamp.files.schedules import PULSES_HEADER
 from nutdamp.schemes import two_pulse
+from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -122,7 +122,7 @@ def test_json_and_csv_follow_the_contract_and_agree(run: Run, tmp_path: Path) ->
     (first, second) = rows(run("plan", "--nominal", "--scheme", "two-pulse", "--csv", "-").stdout)
     assert (first["pulse"], second["pulse"]) == ("1", "2")
     table, recommended = rows(text), next(plan for plan in data["plans"] if plan["scheme"] == data["recommended"])
-    assert tuple(table[0]) == HEADER
+    assert tuple(table[0]) == PULSES_HEADER
     assert [float(row["t_s"]) for row in table] == [pulse["t_s"] for pulse in recommended["pulses"]]
     assert float(table[-1]["nutation_after_deg"]) == pytest.approx(recommended["flown"]["nutation_deg"], abs=1e-12)
     assert float(table[0]["nutation_before_deg"]) == pytest.approx(data["spacecraft"]["nutation_deg"], rel=1e-9)

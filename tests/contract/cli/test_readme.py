@@ -16,8 +16,8 @@ from support.cases import spread
 from support.process import Run
 
 from nutdamp import __version__
-from nutdamp.cli.root import COMMANDS
-from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.cli.main import COMMANDS
+from nutdamp.files.reader import read_spacecraft
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -18,9 +18,9 @@ from support.cases import spread
 from support.commands import call
 from support.process import Run
 
-from nutdamp.cli import progress as module
-from nutdamp.cli.progress import progress, stoppable, working
-from nutdamp.presentation.layout import NARROW, columns
+from nutdamp.cli import job
+from nutdamp.cli.job import progress, stoppable, working
+from nutdamp.views.layout import NARROW, columns
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -124,7 +124,7 @@ class Terminal(io.StringIO):
 
 def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float, *, quiet: bool = False) -> str:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(module, "PATIENCE", patience)
+    monkeypatch.setattr(job, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with progress("flying", 1_000, quiet=quiet) as tell:
         for count in (200, 500, 900):
@@ -143,7 +143,7 @@ def test_a_terminal_is_shown_share_rate_and_time_left_of_a_long_run(monkeypatch:
 def test_elsewhere_one_line_says_how_far_long_work_is(
     monkeypatch: pytest.MonkeyPatch, long: float, quiet: bool, lines: int
 ) -> None:
-    monkeypatch.setattr(module, "LONG", long)
+    monkeypatch.setattr(job, "LONG", long)
     text = shown(monkeypatch, io.StringIO(), 0.0, quiet=quiet)
     assert text.count("\n") == lines
     assert not lines or text.startswith("flying: 200 of 1,000 done after 0 s, about 0 s left")
@@ -159,7 +159,7 @@ def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
 ) -> None:
     err = stream()
     monkeypatch.setattr(sys, "stderr", err)
-    monkeypatch.setattr(module, "PATIENCE", patience)
+    monkeypatch.setattr(job, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning", quiet=quiet):
         while seen and "planning" not in err.getvalue():  # until the timer has had its turn

@@ -11,7 +11,7 @@ from support.commands import EXACT, SCHEDULE, result, rows, written
 from support.golden import check_text
 from support.process import Run
 
-from nutdamp.files.track_csv import HEADER
+from nutdamp.files.tabular import HEADER
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

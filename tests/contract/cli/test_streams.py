@@ -19,7 +19,7 @@ from support.golden import check_text
 from support.process import Run
 
 from nutdamp.cli.screen import visible
-from nutdamp.files.examples import example_text
+from nutdamp.files.reader import example_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -130,24 +130,25 @@ def test_each_file_that_cannot_be_saved_is_named_below_the_result(run: Run, tmp_
 
 TERMINATED = """
 import os, signal, sys
-from nutdamp.cli import root
-from nutdamp.files import {module}
+from importlib import import_module
+from nutdamp.cli.main import main
 
-made = {module}.{function}
+module = import_module("nutdamp.{module}")
+made = module.{function}
 
 def slow(*given, **named):
     os.kill(os.getpid(), signal.SIGTERM)
     return made(*given, **named)
 
-{module}.{function} = slow
+module.{function} = slow
 sys.argv = ["nutdamp", *{arguments!r}.split()]
-root.main()
+main()
 """
 WRITING = """
 import os, signal, sys
 import click
-from nutdamp.cli.boundary import run
-from nutdamp.files.output import whole_file
+from nutdamp.cli.main import run
+from nutdamp.files.tabular import whole_file
 
 @click.group()
 def group(): ...
@@ -170,13 +171,13 @@ run(group)
 @spread(
     ("arguments", "module", "function"),
     [
-        ("check --json x.json", "check_json", "check_json"),
-        ("plan spacecraft.yaml --json x.json", "spacecraft_file", "read_spacecraft"),
-        ("plan --json x.json --csv x.csv", "output", "json_text"),
-        ("simulate --scheme two-pulse --csv x.csv --json x.json", "output", "json_text"),
-        ("verify --json x.json", "verification_json", "verification_json"),
-        ("report -o x.html", "spacecraft_file", "read_spacecraft"),
-        ("export --format json -o x.json", "output", "json_text"),
+        ("check --json x.json", "views.check_json", "check_json"),
+        ("plan spacecraft.yaml --json x.json", "files.reader", "read_spacecraft"),
+        ("plan --json x.json --csv x.csv", "files.tabular", "json_text"),
+        ("simulate --scheme two-pulse --csv x.csv --json x.json", "files.tabular", "json_text"),
+        ("verify --json x.json", "views.verification_json", "verification_json"),
+        ("report -o x.html", "files.reader", "read_spacecraft"),
+        ("export --format json -o x.json", "files.tabular", "json_text"),
     ],
     quick=1,
     deep=4,

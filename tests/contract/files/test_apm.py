@@ -15,8 +15,7 @@ from support.golden import check_text
 from support.places import case
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.apm_import import imported
-from nutdamp.files.ccsds.apm_reader import MOST_BYTES, ApmContents, euler, read_apm
+from nutdamp.files.ccsds.read import MOST_BYTES, ApmContents, euler, imported, read_apm
 from nutdamp.physics import attitude
 
 GOOD = """\

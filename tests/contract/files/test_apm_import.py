@@ -15,17 +15,16 @@ from support.contract import CASES, Write, check_faults, known
 from support.golden import check_text
 from support.places import case as earlier
 
-from nutdamp import flight, planning
-from nutdamp.files.apm_import import contradictions, imported
-from nutdamp.files.ccsds.apm_reader import ApmContents, read_apm
-from nutdamp.files.exchange import export_text
-from nutdamp.files.pulses_csv import pulses_csv
-from nutdamp.files.schedule_file import read_pulses
-from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.files.ccsds.read import ApmContents, contradictions, imported, read_apm
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.files.schedules import pulses_csv, read_pulses
+from nutdamp.flight import propagation
 from nutdamp.physics import attitude
-from nutdamp.planning import Plan
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Limits, Spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views.exchange import export_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -73,7 +72,7 @@ def test_state_inertia_and_manoeuvres_come_back(case: str, take: Take) -> None:
         assert two.impulse == pytest.approx(one.impulse, rel=1e-12, abs=1e-12)
         assert two.propellant == (one.propellant and pytest.approx(one.propellant, rel=1e-15))
     # The schedule, flown from what came back, leaves what the plan leaves, and is read as a file without warnings.
-    flown, expected = flight.flown(back, schedule), plan.flown
+    flown, expected = propagation.flown(back, schedule), plan.flown
     assert flown.residual.nutation == pytest.approx(known(expected).nutation, abs=1e-9)
     assert flown.residual.momentum_shift == pytest.approx(known(expected).momentum_shift, abs=1e-9)
     Path("back.csv").write_text(pulses_csv(flown), encoding="utf-8")
@@ -116,7 +115,7 @@ def test_overlapping_manoeuvres_keep_apart_and_stand_in_the_order_of_their_start
     first, second = text.index("MAN_START"), text.rindex("MAN_START")
     _, _, back, schedule = take(text[:second] + text[first:second] + text[second:])
     assert [pulse.channel for pulse in schedule] == ["steerable", "MAN2", "steerable"]
-    assert flight.flown(back, schedule).settled.spin == pytest.approx(math.pi)
+    assert propagation.flown(back, schedule).settled.spin == pytest.approx(math.pi)
     torque = np.array([1.0, 0.0, 0.0])
     pulses = Schedule(
         (Pulse(2.0, 2.0, "long", 2.0 * torque, torque), Pulse(1.5, 0.2, "short", 0.4 * torque, 2 * torque))

@@ -19,16 +19,16 @@ from support.cases import spread
 from support.contract import CASES, PUSHED, VALVED, known, pushing, valved, velocity_change
 from support.golden import check_text
 
-from nutdamp import planning
 from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import APM_BLOCKS, comment, label, number
-from nutdamp.files.exchange import export_text, lacking
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.physics.feed import Tank
-from nutdamp.planning import Plan
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Disturbance
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.physics.thruster import Tank
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Disturbance
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.exchange import export_text, lacking
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -21,11 +21,10 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
-from nutdamp.files.examples import example_text
-from nutdamp.files.loop_models import LoopFaultsSection, LoopSection, LoopSensorSection
-from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.files.keys import LoopFaultsSection, LoopSection, LoopSensorSection
+from nutdamp.files.overrides import parse_setting
+from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
+from nutdamp.spacecraft.model import Spacecraft
 
 
 def faults_of(text: str) -> list[Fault]:

@@ -18,19 +18,17 @@ from support.golden import check_text
 from support.process import Run
 from support.spinners import FILE
 
-from nutdamp import flight, planning
 from nutdamp.cli.flown import JITTER_SEED
-from nutdamp.commands import Block
-from nutdamp.files import table
-from nutdamp.files.blocks_csv import HEADER, read_blocks
-from nutdamp.files.examples import example_text
-from nutdamp.files.pulses_csv import pulses_csv
-from nutdamp.files.schedule_file import read_pulses
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Pulse, Schedule, overlapping
-from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Limits, Steerable
+from nutdamp.files import tabular
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.files.schedules import BLOCKS_HEADER, pulses_csv, read_blocks, read_pulses
+from nutdamp.flight import propagation
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility
+from nutdamp.schemes.block_model import fired
+from nutdamp.spacecraft.equipment import Block, Steerable
+from nutdamp.spacecraft.model import Limits
+from nutdamp.spacecraft.schedule import Pulse, Schedule, overlapping
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -74,7 +72,7 @@ def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: st
     assert last.impulse.tolist() == pytest.approx([0.0, -5.6, 0.0])
     assert last.propellant == pytest.approx(0.7 * 10.0 / (220.0 * 9.80665))
     assert last.force is not None
-    left = flight.flown(EXAMPLE, made).residual
+    left = propagation.flown(EXAMPLE, made).residual
     assert math.degrees(left.nutation) == pytest.approx(0.2477, abs=5e-5)
     assert left.nutation == pytest.approx(Outcome(EXAMPLE, made).nutation, abs=1e-9)
     # Each kind of column that contradicts is reported once: centre, impulse, propellant.
@@ -86,7 +84,7 @@ def test_a_longer_on_time_is_what_the_thruster_then_does(read: Read, written: st
 def test_what_was_written_is_read_without_a_word_and_three_columns_are_enough(read: Read, written: str) -> None:
     plan = planning.plan(EXAMPLE, "four-pulse")
     whole, warnings = read(written)
-    assert flight.flown(EXAMPLE, whole).residual == plan.flown
+    assert propagation.flown(EXAMPLE, whole).residual == plan.flown
     assert whole.propellant == pytest.approx(plan.pulses.propellant, rel=1e-15)
     rows = "".join(f"{pulse.start!r},{pulse.on_time!r},{pulse.channel}\n" for pulse in whole)
     bare, more = read(f"{TOP}\n{rows}")
@@ -149,9 +147,9 @@ def test_faults_say_what_would_be_right(read: Read, monkeypatch: pytest.MonkeyPa
     check_faults("files.schedule", read, FAULTY)
     assert len(read(f"{TOP}\n1e15,2000,+M1\n9,1e-9,+M1\n")[0]) == 2
     with Path("huge.csv").open("wb") as stream:
-        stream.truncate(table.MOST_BYTES + 1)
+        stream.truncate(tabular.MOST_BYTES + 1)
     huge = faults(read_pulses, Path("huge.csv"), EXAMPLE)
-    monkeypatch.setattr(table, "MOST_ROWS", 3)
+    monkeypatch.setattr(tabular, "MOST_ROWS", 3)
     rows = "".join(f"{start},0.5,+M1\n" for start in range(4))
     assert len(read(f"{TOP}\n{rows.partition('3,')[0]}")[0]) == 3
     check_text("files.schedule-size", "\n".join([*huge, *faults(read, f"{TOP}\n{rows}")]))
@@ -212,7 +210,7 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
     planned = run("plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, "--csv", "pulses.csv", stdin=text)
     assert planned.returncode == 0, planned.stderr
     (row,) = rows_of(tmp_path / "blocks.csv")
-    assert tuple(row) == HEADER
+    assert tuple(row) == BLOCKS_HEADER
     assert float(row["delay_s"]) == pytest.approx(2e-3 * int(row["delay_counts"]))
     assert float(row["delay_deg"]) == pytest.approx(72.0 * float(row["delay_s"]))
     assert float(row["width_s"]) == pytest.approx(1e-2 * int(row["width_counts"]))

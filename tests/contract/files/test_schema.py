@@ -9,10 +9,8 @@ from typing import Any
 
 from jsonschema import Draft202012Validator
 
-from nutdamp.files.examples import example_text
-from nutdamp.files.schema import json_schema
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.files.yaml_tree import read_tree
+from nutdamp.files.reader import example_text, json_schema, read_spacecraft
+from nutdamp.files.yaml import read_tree
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

@@ -20,23 +20,19 @@ from support.cases import spread
 from support.contract import known
 from support.places import case
 
-from nutdamp import flight
-from nutdamp.actuators import STANDARD_GRAVITY
-from nutdamp.comparison import compare
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.examples import example_text
-from nutdamp.files.models import SpacecraftFile
-from nutdamp.files.schema import json_schema
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.outcome import seen_at
+from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.reader import example_text, json_schema, load_spacecraft, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import seen_at
+from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics import attitude
-from nutdamp.remarks import broken_limits, infeasibility
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Channel, Disturbance, Limits, Spacecraft, Steerable
-from nutdamp.tolerances import Tolerance
+from nutdamp.planning.decision import broken_limits, compare, infeasibility
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel, Steerable
+from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Tolerance
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -161,7 +157,7 @@ def test_a_pair_for_velocity_changes_is_flown_and_never_fired_to_damp() -> None:
     assert not pair.axial
     assert not any(plan.feasible for plan in compare(body, CLASSIC))
     pulses = Schedule((channel_pulse(pair, 21.75, 43.5),))
-    assert flight.flown(body, pulses).residual.nutation == pytest.approx(body.nutation, rel=1e-9)
+    assert propagation.flown(body, pulses).residual.nutation == pytest.approx(body.nutation, rel=1e-9)
     burn = run(Results(study_of(body, pulses), 500)).distribution("nutation")
     assert burn is not None
     assert burn.quantiles(np.array([0.95]))[0] > 1.2 * body.nutation
@@ -288,7 +284,7 @@ def test_dissipation_does_what_the_shape_or_the_file_says(A: float, C: float, sa
         return np.cross(momentum, momentum / inertia + slip)
 
     end = solve_ivp(changes, (0.0, 60.0), inertia * craft.omega0, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    left = seen_at(flight.flown(craft, Schedule(), 60.0), 60.0).final
+    left = seen_at(propagation.flown(craft, Schedule(), 60.0), 60.0).final
     assert left.nutation == pytest.approx(math.atan2(math.hypot(end[0], end[1]), end[2]), rel=1e-7)
     assert left.spin == pytest.approx(end[2] / inertia[2], rel=1e-9)
 

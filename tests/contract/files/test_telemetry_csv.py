@@ -14,9 +14,9 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import CannotRead
-from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, Record
-from nutdamp.files import table
-from nutdamp.files.telemetry_csv import read_telemetry
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record
+from nutdamp.files import tabular
+from nutdamp.files.telemetry import read_telemetry
 
 BODY = nutdamp.example()
 DATED = BODY.with_(attitude={"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"})
@@ -78,9 +78,9 @@ FAULTY = (
 def test_faults_have_their_place_and_columns_not_known_are_said(read: Read, tmp_path: Path) -> None:
     check_faults("files.telemetry", read, FAULTY)
     for many in (1, 2):  # one more than is shown is shown too, of two more their number
-        rows = "".join(f"{number},x\n" for number in range(table.MOST_FAULTS + many))
+        rows = "".join(f"{number},x\n" for number in range(tabular.MOST_FAULTS + many))
         shown = faults(read, f"t_s,omega_1_rad_s\n{rows}")
-        assert len(shown) == table.MOST_FAULTS + 1
+        assert len(shown) == tabular.MOST_FAULTS + 1
         assert ("such rows" in shown[-1]) == (many == 2)
     _, warnings = read("t_s,omega_1_rad_s,temperature\n0,1,20\n1,2,21\n")
     check_text("files.telemetry-column", "\n".join(warnings))

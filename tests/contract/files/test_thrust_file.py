@@ -15,21 +15,19 @@ from support.broken import BASE
 from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 
-from nutdamp import planning
-from nutdamp.dispersion.inputs import reachable
-from nutdamp.files import thrust_rules
-from nutdamp.files.dispersion_rules import thrusts
-from nutdamp.files.facts import Facts
-from nutdamp.files.pulses_csv import EFFECTIVE, pulses_csv
-from nutdamp.files.schedule_file import read_pulses
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Measured, Trapezoid
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Spacecraft
-from nutdamp.supply import supplied
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.files import study_rules
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.files.rules import Facts
+from nutdamp.files.schedules import EFFECTIVE, pulses_csv, read_pulses
+from nutdamp.files.study_rules import thrusts
+from nutdamp.flight.propellant import supplied
+from nutdamp.montecarlo.inputs import reachable
+from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -142,7 +140,7 @@ def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatc
         calls.append(facts)
         return thrusts(facts)
 
-    monkeypatch.setattr(thrust_rules, "thrusts", counted)
+    monkeypatch.setattr(study_rules, "thrusts", counted)
     read(body=with_table())
     assert len(calls) == 1
 

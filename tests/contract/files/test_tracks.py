@@ -18,29 +18,30 @@ from support.builders import aimed, channel, cross, events, spinner
 from support.cases import spread
 from support.contract import CASES, known, motions
 
-from nutdamp import flight, planning
-from nutdamp.epoch import Epoch
-from nutdamp.files.exchange import export_text
-from nutdamp.files.frames import TURN, stretches
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.files.spin_table import HEADER, spin_table
+from nutdamp.common.time import Epoch
+from nutdamp.files.export import TURN, interpolated
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight import propagation
 from nutdamp.physics import attitude
-from nutdamp.planning import Plan
-from nutdamp.schedule import Schedule, channel_pulse, on_command
-from nutdamp.spacecraft import Limits, Spacecraft, Vector
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
+from nutdamp.views.exchange import export_text
+from nutdamp.views.spin_table import HEADER, spin_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 
-def flown_on(plan: Plan) -> flight.Flight:
+def flown_on(plan: Plan) -> propagation.Flight:
     """The flight to the end of a track."""
-    return flight.flown(plan.spacecraft, plan.pulses, plan.pulses.end + plan.spacecraft.inertial_period)
+    return propagation.flown(plan.spacecraft, plan.pulses, plan.pulses.end + plan.spacecraft.inertial_period)
 
 
 @CASES
 def test_records_are_close_and_continuous(case: str) -> None:
     flown = flown_on(messages.planned(case))
-    track = list(stretches(flown, flown.legs[-1].end))
+    track = list(interpolated(flown, flown.legs[-1].end))
     assert track[0].t[0] == 0.0
     assert track[-1].t[-1] == pytest.approx(flown.legs[-1].end, abs=0.51e-9)
     for one, two in pairwise(track):

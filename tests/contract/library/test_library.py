@@ -20,13 +20,16 @@ from support.process import Run
 from support.tilted import KEYS, TILTED
 
 import nutdamp
-from nutdamp import errors, flight, planning, spacecraft
-from nutdamp.comparison import Comparison
-from nutdamp.dispersion.inputs import list_inputs
+from nutdamp import errors
 from nutdamp.errors import BadRequest, CannotRead, CannotWrite, FaultyFile, Infeasible
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import plan
-from nutdamp.schemes.options import OptimalOptions
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.montecarlo.inputs import list_inputs
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import Comparison
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.catalogue import OptimalOptions
+from nutdamp.spacecraft.model import Spacecraft
 
 CRAFT = nutdamp.example()
 Options = nutdamp.Options
@@ -88,7 +91,7 @@ def test_there_is_one_type_of_each_name() -> None:
     """What the library gives is what the modules below make, not something around it."""
     compared = nutdamp.compare(CRAFT, ["two-pulse"], samples=0)
     (plan,) = compared.plans
-    kinds = (spacecraft.Spacecraft, planning.Plan, Comparison, flight.Flight)
+    kinds = (Spacecraft, planning.Plan, Comparison, propagation.Flight)
     for made, kind in zip((CRAFT, plan, compared, plan.fly()), kinds, strict=True):
         assert type(made) is kind is getattr(nutdamp, kind.__name__)
     assert plan.spacecraft is plan.fly().spacecraft is CRAFT

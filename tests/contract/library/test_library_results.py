@@ -23,9 +23,9 @@ from support.tilted import KEYS, TILTED
 
 import nutdamp
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.files import pulses_csv, track_csv
-from nutdamp.presentation.figures import style
-from nutdamp.presentation.page import html
+from nutdamp.figures import style
+from nutdamp.files import schedules, tabular
+from nutdamp.page import html
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -65,7 +65,7 @@ def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkey
     plan = nutdamp.plan(nutdamp.read(TILTED), "two-pulse")
     pandas = types.ModuleType("pandas")
     pandas.DataFrame = dict  # type: ignore[attr-defined]
-    for made, header in ((plan, pulses_csv.HEADER), (plan.fly(samples=50), track_csv.HEADER)):
+    for made, header in ((plan, schedules.PULSES_HEADER), (plan.fly(samples=50), tabular.HEADER)):
         array = made.to_numpy()
         assert array.dtype.names == header
         made.to_csv(tmp_path / "rows.csv")

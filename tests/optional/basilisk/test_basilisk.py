@@ -1,4 +1,4 @@
-"""Flights by Basilisk against `nutdamp.flight.flown`: agreement to 1e-8 rad is promised, and far less is found."""
+"""Flights by Basilisk against `propagation.flown`: agreement to 1e-8 rad is promised, and far less is found."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import pytest
 from support.cases import spread
 from support.golden import refused
 
-from nutdamp import flight, schemes
-from nutdamp.basilisk import BasiliskFlight, fly
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import Flight
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.basilisk import BasiliskFlight, fly
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Attitude, Channel, Disturbance, Inertia, Spacecraft, Thruster
+from nutdamp.schemes import catalogue, planner
+from nutdamp.spacecraft.equipment import Channel, Thruster
+from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 PROMISED = 1e-8
 """rad; for the direction of the axes and of H, and for the rates relative to |ω|."""
@@ -73,7 +74,7 @@ def reference(flown: Flight, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def difference(spacecraft: Spacecraft, schedule: Schedule, until: float, found: BasiliskFlight) -> float:
     """Largest difference from the flown motion: directions of H and of all body axes in rad, rates over |ω|."""
-    rates, quaternion = reference(flight.flown(spacecraft, schedule, until), found.t)
+    rates, quaternion = reference(propagation.flown(spacecraft, schedule, until), found.t)
     moments = np.asarray(spacecraft.inertia.moments)
     worst = [np.linalg.norm(rates - found.rates, axis=1) / np.linalg.norm(rates, axis=1)]
     for mine, theirs in [(rates * moments, found.rates * moments), *((axis, axis) for axis in np.eye(3))]:
@@ -104,7 +105,7 @@ def pulse(t: float, on_time: float, *torque: float) -> Pulse:
 @spread("name", BODIES, quick=5)
 def test_plans_with_real_widths(name: str, scheme: str) -> None:
     body = spinner(name)
-    schedule = schemes.schedule(scheme, body, schemes.Options())
+    schedule = planner.schedule(scheme, body, catalogue.Options())
     assert schedule.pulses
     assert all(one.on_time > 0.0 for one in schedule)
     until = schedule.end + body.inertial_period
@@ -115,7 +116,7 @@ def test_plans_with_real_widths(name: str, scheme: str) -> None:
 @pytest.mark.basilisk
 def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
     body = read_spacecraft(example_text(), "example")
-    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+    schedule = planner.schedule("two-pulse", body, catalogue.Options())
     until = schedule.end + body.inertial_period
     found = fly(body, schedule, until)
     assert capfd.readouterr() == ("", "")
@@ -140,7 +141,7 @@ def test_built_in_example(capfd: pytest.CaptureFixture[str]) -> None:
 def test_ideal_impulses_and_overlapping_pulses_off_the_nanosecond_grid(name: str) -> None:
     """Of a steerable torquer, and about every axis at any time."""
     steered, body = spinner(name, thrusters=False), spinner(name)
-    schedule = schemes.schedule("two-pulse", steered, schemes.Options())
+    schedule = planner.schedule("two-pulse", steered, catalogue.Options())
     assert [one.on_time for one in schedule] == [0.0, 0.0]
     until = schedule.end + steered.inertial_period
     assert difference(steered, schedule, until, fly(steered, schedule, until)) <= FOUND
@@ -187,7 +188,7 @@ def test_attitude_of_the_file_and_tilted_axes(quaternion: tuple[float, float, fl
 )
 def test_disturbances(name: str, disturbances: tuple[Disturbance, ...]) -> None:
     body = replace(spinner(name), disturbances=disturbances)
-    schedule = schemes.schedule("two-pulse", body, schemes.Options())
+    schedule = planner.schedule("two-pulse", body, catalogue.Options())
     until = schedule.end + 1.0
     assert difference(body, schedule, until, fly(body, schedule, until)) <= FOUND
 

@@ -13,12 +13,12 @@ import pytest
 from support import messages
 from support.cases import spread
 
-from nutdamp import planning
-from nutdamp.files.exchange import export_text
-from nutdamp.planning import Plan
-from nutdamp.presentation.text import degrees
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Disturbance
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Disturbance
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views.exchange import export_text
+from nutdamp.views.text import degrees
 
 pytestmark = [pytest.mark.basilisk, pytest.mark.usefixtures("plans_shared")]
 

@@ -19,13 +19,12 @@ from support.cases import spread
 from support.places import case
 from support.process import Run
 
-from nutdamp.comparison import compare
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.presentation.page.content import Repeat, report_page
-from nutdamp.presentation.page.html import page_html
-from nutdamp.presentation.page.scales import LEAD
-from nutdamp.schemes import CLASSIC
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.html import page_html
+from nutdamp.page.scales import LEAD
+from nutdamp.planning.decision import compare
+from nutdamp.schemes.catalogue import CLASSIC
 
 pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
 

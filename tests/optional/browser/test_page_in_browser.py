@@ -11,12 +11,11 @@ import pytest
 from support import places
 
 from nutdamp import load
-from nutdamp.comparison import compare
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.presentation.page.content import Repeat, report_page
-from nutdamp.presentation.page.html import page_html
-from nutdamp.schemes import CLASSIC, COMMANDED
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.html import page_html
+from nutdamp.planning.decision import compare
+from nutdamp.schemes.catalogue import CLASSIC, COMMANDED
 
 pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
 

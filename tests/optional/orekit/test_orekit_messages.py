@@ -16,10 +16,10 @@ import pytest
 from support import messages, orekit
 from support.contract import PUSHED, known, pushing, valved, velocity_change
 
-from nutdamp import flight
-from nutdamp.files.exchange import export_text
-from nutdamp.flight import Flight
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
+from nutdamp.views.exchange import export_text
 
 pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
 
@@ -128,7 +128,7 @@ def ephemeris(case: str, xml: bool, form: str = "aem") -> tuple[Flight, Any, lis
     epoch = data_of("apm", export_text(plan, "apm")).getEpoch()
     read = orekit.parse("aem", export_text(plan, form, xml=xml))
     until = plan.pulses.end + plan.spacecraft.inertial_period
-    return flight.flown(plan.spacecraft, plan.pulses, until), epoch, list(read.getSegments())
+    return propagation.flown(plan.spacecraft, plan.pulses, until), epoch, list(read.getSegments())
 
 
 def motion(flown: Flight, t: float) -> tuple[np.ndarray, np.ndarray]:

@@ -7,8 +7,8 @@ import math
 import pytest
 from support import orekit
 
-from nutdamp.epoch import Epoch
-from nutdamp.physics import attitude, sun
+from nutdamp.common.time import Epoch
+from nutdamp.physics import attitude, sky
 
 
 @pytest.mark.orekit
@@ -19,5 +19,5 @@ def test_orekit_sees_it_there(text: str) -> None:
     provider = orekit.java("org.orekit.bodies.AnalyticalSolarPositionProvider")()
     frame = orekit.java("org.orekit.frames.FramesFactory").getEME2000()
     seen = orekit.components(provider.getPosition(orekit.date(text), frame))
-    expected = sun.direction(Epoch.parse(f"{text}Z").days_of_j2000)
+    expected = sky.direction(Epoch.parse(f"{text}Z").days_of_j2000)
     assert math.degrees(attitude.angle_between(seen, expected)) < 0.1

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from support import orekit, places
 from support.golden import check_text
 
-from nutdamp.epoch import FIRST_DAY, LEAP_DAYS, Epoch
-from nutdamp.physics import attitude, sun
+from nutdamp.common.time import FIRST_DAY, LEAP_DAYS, Epoch
+from nutdamp.physics import attitude, sky
 
 
 def test_the_leap_seconds_are_those_of_another_list() -> None:
@@ -119,6 +119,6 @@ def test_days_count_from_j2000_in_terrestrial_time_and_barycentric_time_swings()
 def test_the_direction_of_the_sun_is_right_to_a_hundredth_of_a_degree_from_1972_to_2100() -> None:
     """Against ERFA (golden/make_sun.py)."""
     rows = np.loadtxt(places.GOLDEN / "sun.csv", delimiter=",", skiprows=1)
-    errors = [float(attitude.angle_between(sun.direction(days), row)) for days, *row in rows.tolist()]
+    errors = [float(attitude.angle_between(sky.direction(days), row)) for days, *row in rows.tolist()]
     assert len(errors) == 100
     assert math.degrees(max(errors)) < 0.01

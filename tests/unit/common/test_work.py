@@ -9,12 +9,15 @@ from support.builders import aimed, cross, spinner
 from support.cases import deep, spread
 from support.places import case
 
-from nutdamp import dynamics, flight, planning, remarks, work
-from nutdamp.comparison import compare
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.schedule import Schedule
-from nutdamp.schemes.optimal import lp_solver
-from nutdamp.spacecraft import Limits
+from nutdamp.common import work
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning import decision
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import compare
+from nutdamp.schemes.optimal import highs
+from nutdamp.spacecraft.model import Limits
+from nutdamp.spacecraft.schedule import Schedule
 
 
 def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermost() -> None:
@@ -41,11 +44,11 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
 def test_flights_count_by_legs_and_steps() -> None:
     for body, until in ((spinner(channels=cross(8.0)), 10.0), (spinner(moments=(100.0, 120.0, 80.0)), 100.0)):
         with work.budget("flight", 1e9) as spent:
-            flown = flight.flown(body, Schedule(), until)
+            flown = propagation.flown(body, Schedule(), until)
         if body.inertia.symmetric:
-            assert 0.0 < spent.done == dynamics.LEG * len(flown.legs)
+            assert 0.0 < spent.done == propagation.LEG * len(flown.legs)
         else:
-            assert spent.done > dynamics.STEP * flown.steps > 10.0
+            assert spent.done > propagation.STEP * flown.steps > 10.0
 
 
 @pytest.mark.parametrize("most", [20.0, deep(500.0)])
@@ -57,7 +60,7 @@ def test_a_search_that_is_cut_ends_soon_with_what_it_has(most: float, monkeypatc
         plan = planning.plan(body, "optimal")
     assert plan.cut
     assert spent.done < most + 300.0
-    assert any(remarks.CUT in text for text in remarks.said(plan))
+    assert any(decision.CUT in text for text in decision.said(plan))
     monkeypatch.setattr(work, "COMMAND", 30.0)
     with work.budget("test", 1e9) as spent:
         compared = compare(body, ("one-pulse", "optimal"))
@@ -72,7 +75,7 @@ def test_what_is_not_cut_is_the_same_with_any_budget(monkeypatch: pytest.MonkeyP
     after = planning.plan(body, "optimal")
     assert (before.cut, before.feasible) == (False, True)
     assert [(one.t, one.on_time) for one in before.pulses] == [(one.t, one.on_time) for one in after.pulses]
-    assert not any(remarks.CUT in text for text in remarks.said(before))
+    assert not any(decision.CUT in text for text in decision.said(before))
 
 
 @pytest.mark.deep
@@ -94,12 +97,12 @@ def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) ->
     body = spinner(7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5))
     monkeypatch.setattr(work, "SCHEME", 300.0)
     sizes: list[int] = []
-    optimum = lp_solver.GrowingProgram.optimum
+    optimum = highs.GrowingProgram.optimum
 
-    def counted(self: lp_solver.GrowingProgram) -> lp_solver.Optimum | None:
+    def counted(self: highs.GrowingProgram) -> highs.Optimum | None:
         sizes.append(self._highs.getNumNz())
         return optimum(self)
 
-    monkeypatch.setattr(lp_solver.GrowingProgram, "optimum", counted)
+    monkeypatch.setattr(highs.GrowingProgram, "optimum", counted)
     assert planning.plan(aimed(body, 3.0, 0.0), "optimal").cut
     assert sum(sizes) < 200_000  # of 1.2 million

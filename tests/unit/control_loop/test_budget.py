@@ -15,23 +15,29 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.compliance import reached
+from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.limit_cycle import (
+    DAY,
+    YEAR,
+    Budget,
+    Cycle,
+    Held,
+    Map,
+    Odds,
+    Thresholds,
+    Transfer,
+    budget,
+    transfer,
+)
+from nutdamp.control_loop.sensor import Estimator, Signal
+from nutdamp.control_loop.simulation import fly
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.loop.budget import DAY, YEAR, Budget, Held, Thresholds, budget
-from nutdamp.loop.chains import Cycle
-from nutdamp.loop.cycles import Map
-from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.law import Law
-from nutdamp.loop.odds import Odds
-from nutdamp.loop.run import fly
-from nutdamp.loop.sensor import Estimator, Signal
-from nutdamp.loop.transfer import Transfer, transfer
-from nutdamp.loop_settings import BANG, ONE_PULSE, Loop, Sensor
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.presentation.budget_tables import _warnings
-from nutdamp.presentation.figures.budget import budget_figure
-from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft
+from nutdamp.figures.budget import budget_figure
+from nutdamp.physics.thruster import Cold, Tank, Trapezoid
+from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
+from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.requirements import reached
+from nutdamp.views.budget_tables import _warnings
 
 
 def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nutdamp.loop.diagnosis import Diagnosis, Doubt, Glimpse
+from nutdamp.control_loop.law import Diagnosis, Doubt, Glimpse
 
 
 def test_a_sensor_whose_scale_may_be_off_leaves_the_effect_open_by_that_share_of_the_nutation() -> None:

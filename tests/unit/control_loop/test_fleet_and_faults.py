@@ -13,19 +13,17 @@ from support.builders import spinner
 from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
+from nutdamp.control_loop.batch import Case, expects_alone, fly_together
+from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.sensor import Estimator, gain
+from nutdamp.control_loop.simulation import Run, fly
+from nutdamp.control_loop.stability import Cause, Margin, feeding
 from nutdamp.errors import Infeasible
-from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.fleet import Case, expects_alone, fly_together
-from nutdamp.loop.law import Law
-from nutdamp.loop.run import Run, fly
-from nutdamp.loop.sensor import Estimator, gain
-from nutdamp.loop.stability import Cause, Margin, feeding
-from nutdamp.loop_settings import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
-from nutdamp.physics.feed import Cold
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.presentation.loop_tables import margin_table
-from nutdamp.spacecraft import Disturbance, Limits, Spacecraft, Vector
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.physics.thruster import Cold, Trapezoid
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
+from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views.loop_tables import margin_table
 
 CRAFT = fired_by(channels=around(4, 2.0))
 PERIOD = CRAFT.body_period
@@ -286,7 +284,7 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
     craft = replace(craft, dissipation=200.0)
     known, cases = Law(craft, loop), truths(rng, craft, loop, 9)
     whole = fly_together(known, cases, 40.0)
-    monkeypatch.setattr("nutdamp.loop.fleet.TOGETHER", 100)
+    monkeypatch.setattr("nutdamp.control_loop.batch.TOGETHER", 100)
     parts, alone = fly_together(known, cases, 40.0), fly_together(known, cases[7:8], 40.0)
     assert np.abs(whole.rates - parts.rates).max() < 1e-12
     assert np.abs(whole.rates[:, 7] - alone.rates[:, 0]).max() < 1e-12
@@ -305,7 +303,7 @@ def test_what_cannot_go_together_is_named() -> None:
 
 
 def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.loop.pilot.MOST_FIRINGS", 3)
+    monkeypatch.setattr("nutdamp.control_loop.controller.MOST_FIRINGS", 3)
     craft, loop = fired_by(3.0, FOUR[:2]), fires(Sensor(rate=20.0), 0.57, 0.29, on_time=0.2)
     still = replace(craft, omega0=np.array([0.021, 0.0, 3.0]))
     fleet = fly_together(Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0)

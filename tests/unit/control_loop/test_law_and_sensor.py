@@ -14,12 +14,12 @@ from support.cases import deep, spread
 from support.golden import refused
 from support.loops import fired_by, fires, four, transverse_size
 
-from nutdamp.dynamics import make_dynamics
+from nutdamp.control_loop.law import ComplexArray, Firing, Law
+from nutdamp.control_loop.sensor import Estimator, Signal, gain, is_blind, lag
 from nutdamp.errors import Infeasible
-from nutdamp.loop.law import ComplexArray, Firing, Law
-from nutdamp.loop.sensor import Estimator, Signal, gain, is_blind, lag
-from nutdamp.loop_settings import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
-from nutdamp.spacecraft import Spacecraft, Vector
+from nutdamp.flight.propagation import make_dynamics
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 FOUR = four(least=0.01, most=1.0)
 TABLE = {"+M1": (1, 1), "-M1": (1, -1), "+M2": (0, -1), "-M2": (0, 1)}

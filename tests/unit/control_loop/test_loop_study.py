@@ -14,20 +14,18 @@ from support.dispersed import jet, normal
 from support.golden import refused
 from support.loops import fired_by, fires, rad
 
-from nutdamp.demands import Keep
-from nutdamp.dispersion import study_of
+from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy, loop_study, run
+from nutdamp.control_loop.evaluation import loop_of
+from nutdamp.control_loop.law import Stop
+from nutdamp.control_loop.simulation import fly
+from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.plan import loop_of
-from nutdamp.loop.run import fly
-from nutdamp.loop.stability import dead_band
-from nutdamp.loop.study import OUTPUTS, LoopResults, LoopStudy, loop_study, run
-from nutdamp.loop_settings import ACCELEROMETER, BANG, Sensor
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Attitude, Channel, Disturbance, Requirement, Spacecraft
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.montecarlo.study import study_of
+from nutdamp.physics.thruster import Cold, Tank, Trapezoid
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Sensor
+from nutdamp.spacecraft.model import Attitude, Disturbance, Keep, Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)
 FORCES = {"+M1": (0.0, -9.0, 0.0), "-M1": (0.0, 9.0, 0.0), "+M2": (9.0, 0.0, 0.0), "-M2": (-9.0, 0.0, 0.0)}
@@ -149,12 +147,12 @@ def test_a_case_is_the_same_in_a_study_of_any_size_and_flown_alone(monkeypatch: 
         assert plan.propellant == pytest.approx(outputs["propellant"], rel=1e-9)
         assert plan.flown_run.case == case + 1
         assert plan.flight.residual.momentum_shift == pytest.approx(outputs["momentum_shift"], abs=1e-9)
-    monkeypatch.setattr("nutdamp.loop.study.PORTION", 6)
+    monkeypatch.setattr("nutdamp.control_loop.dispersion.PORTION", 6)
     seen: list[int] = []
     stopped = run(LoopResults(study(craft(), 30.0), 12), watch=seen.append, stopped=lambda: bool(seen) and seen[-1] > 8)
     assert stopped.done == 6
     assert np.array_equal(stopped.values[:, :6], small.values, equal_nan=True)
-    monkeypatch.setattr("nutdamp.loop.study.expects_alone", lambda *_: "a test")
+    monkeypatch.setattr("nutdamp.control_loop.dispersion.expects_alone", lambda *_: "a test")
     each = results_of(craft(), 2, 30.0).values
     rows = [row for row, name in enumerate(OUTPUTS) if name != "nutation"]  # alone it is looked for in pulses too
     assert np.allclose(small.values[rows, :2], each[rows], rtol=1e-9, atol=1e-12)
@@ -230,7 +228,7 @@ def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     ):
         with refused(error, f"loop.study-{key}"):
             loop_study(body)
-    monkeypatch.setattr("nutdamp.loop.study.MOST_SAMPLES", 10_000)
+    monkeypatch.setattr("nutdamp.control_loop.dispersion.MOST_SAMPLES", 10_000)
     affordable = study(craft())
     assert 0 < affordable.expect_affordable(2) <= 10_000
     with refused(BadRequest, "loop.study-too-dear"):

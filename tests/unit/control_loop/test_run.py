@@ -19,18 +19,16 @@ from support.loops import AXIAL, FOUR, fired_by, fires, four, ideal, rad, transv
 from support.process import Run as Process
 
 import nutdamp
-from nutdamp import flight
-from nutdamp.dop853 import Equations
+from nutdamp.control_loop.evaluation import loop_of, verify_loop
+from nutdamp.control_loop.law import Stop
+from nutdamp.control_loop.simulation import Run, fly
+from nutdamp.control_loop.stability import margins
 from nutdamp.errors import Infeasible
-from nutdamp.loop.diagnosis import Stop
-from nutdamp.loop.plan import loop_of
-from nutdamp.loop.run import Run, fly
-from nutdamp.loop.stability import margins
-from nutdamp.loop.verify import verify_loop
-from nutdamp.loop_settings import ACCELEROMETER, BANG, Loop, Sensor
-from nutdamp.physics.feed import Cold
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.verification import Equations
+from nutdamp.physics.thruster import Cold, Trapezoid
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Loop, Sensor
+from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 
 CRAFTS = {
     "prolate": nutdamp.example("magnus-a03"),
@@ -52,7 +50,7 @@ def test_a_continuous_gyro_and_prediction_give_the_four_pulse_schedule(name: str
     assert [pulse.channel for pulse in run.schedule] == [pulse.channel for pulse in planned]
     for fired, pulse in zip(run.schedule, planned, strict=True):
         assert (fired.start, fired.on_time) == pytest.approx((pulse.start, pulse.on_time), abs=1e-9)
-    around = flight.flown(craft, planned, run.until).around_pulses()
+    around = propagation.flown(craft, planned, run.until).around_pulses()
     for mine, other in zip(run.flight.around_pulses(), around, strict=True):
         assert np.degrees(mine.nutation) == pytest.approx(np.degrees(other.nutation), abs=1e-9)
         assert mine.momentum == pytest.approx(other.momentum, abs=1e-9)
@@ -234,14 +232,14 @@ def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(monke
     run = fly(slow, loop, 300_000.0)
     assert len(run.quiet) >= 3
     assert run.looked_at < 300_000.0 * 40.0 / 10.0
-    monkeypatch.setattr("nutdamp.loop.pilot.MOST", 100_000)
+    monkeypatch.setattr("nutdamp.control_loop.controller.MOST", 100_000)
     with refused(Infeasible, "loop.too-many-samples"):
         fly(GROWING, fires(Sensor(rate=1e6, noise=rad(0.25)), 80.0), 1e4)
 
 
 def check_flown_again(craft: Spacecraft, run: Run) -> None:
     """The schedule flown open-loop is the flight of the loop."""
-    again, times = flight.flown(craft, run.schedule, 60.0), np.linspace(0.0, 60.0, 150)
+    again, times = propagation.flown(craft, run.schedule, 60.0), np.linspace(0.0, 60.0, 150)
     for mine, other in zip(run.flight.motion(times), again.motion(times), strict=True):
         assert mine == pytest.approx(other, abs=1e-12)
     assert run.flight.residual.nutation == pytest.approx(again.residual.nutation, abs=1e-14)
@@ -299,7 +297,7 @@ CASES = {
 @pytest.mark.weekly
 @pytest.mark.parametrize("name", CASES)
 def test_dop853_fires_alike(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 1000)  # of schedules, which loops need not keep
+    monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 1000)  # of schedules, which loops need not keep
     craft, until = CASES[name]
     verdict = verify_loop(craft, until)
     assert len(verdict.pairs) >= 3
@@ -316,11 +314,11 @@ class Heavier(Equations):
 
 
 def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.loop.verify.Equations", Heavier)
+    monkeypatch.setattr("nutdamp.control_loop.evaluation.Equations", Heavier)
     verdict = verify_loop(CONTINUOUS, 5.0)
     assert (verdict.same, verdict.agree) == (True, False)
     assert verdict.worst > 1e-6
-    monkeypatch.setattr("nutdamp.loop.verify.EVALUATIONS", 200)
+    monkeypatch.setattr("nutdamp.control_loop.evaluation.EVALUATIONS", 200)
     verdict = verify_loop(CONTINUOUS, 5.0)
     assert (verdict.other, verdict.agree) == (None, False)
     check_text("loop.too-long-to-verify", verdict.missing)

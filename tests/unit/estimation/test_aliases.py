@@ -9,7 +9,7 @@ import pytest
 from support.hand_made_fit import silent, told
 
 import nutdamp
-from nutdamp.estimation.aliases import neighbours
+from nutdamp.estimation.initial_guess import neighbours
 from nutdamp.estimation.results import estimates
 
 BODY = nutdamp.example().with_(dispersions={"A": {"normal": "30 %"}, "C": {"normal": "30 %"}})

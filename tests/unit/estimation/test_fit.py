@@ -17,9 +17,8 @@ from support.telemetry_kinds import KINDS, telemetry
 
 from nutdamp.estimation.fit import Fit, fit
 from nutdamp.estimation.model import Vector
-from nutdamp.estimation.parameters import moments, prior
-from nutdamp.estimation.record import GYROS, quantisation
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.estimation.parameters import GYROS, moments, prior, quantisation
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.8, -0.5])

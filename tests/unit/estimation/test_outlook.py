@@ -16,13 +16,13 @@ from support.golden import check_text, refused
 from support.synthetic import motion
 
 import nutdamp
-from nutdamp import comparison
+from nutdamp.api import Fitted, fit
 from nutdamp.errors import BadRequest
-from nutdamp.estimation import outlook
-from nutdamp.estimation.outlook import Outlook, Prospect
+from nutdamp.estimation import forecast
+from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.results import Estimate
-from nutdamp.library.fits import Fitted, fit
-from nutdamp.presentation.fit_tables import _table, advice, fit_screen
+from nutdamp.planning import decision
+from nutdamp.views.fit_tables import _table, advice, fit_screen
 
 SPIN, LENGTH = math.pi, 30.0
 
@@ -87,11 +87,11 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
 
 
 def test_longer_coasts_tell_more_and_a_probe_pulse_its_thrust(fitted: Fitted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outlook, "CASES", 200)
-    monkeypatch.setattr(outlook, "LENGTHS", (0.25, 1.0, 4.0))
-    monkeypatch.setattr(comparison, "usual", lambda _: ("one-pulse",))
+    monkeypatch.setattr(forecast, "CASES", 200)
+    monkeypatch.setattr(forecast, "LENGTHS", (0.25, 1.0, 4.0))
+    monkeypatch.setattr(decision, "usual", lambda _: ("one-pulse",))
     done: list[int] = []
-    ahead = outlook.outlook(fitted.core, 45.0, done.append)
+    ahead = forecast.outlook(fitted.core, 45.0, done.append)
     ratios = [one.ratio for one in ahead.coasts]
     assert [one.length for one in ahead.coasts] == [7.5, 30.0, 120.0]
     assert ahead.now.ratio == pytest.approx(fitted.core.sigmas[fitted.core.index("C/A") or 0], rel=0.1)

@@ -14,15 +14,14 @@ from support.synthetic import Array, motion
 
 import nutdamp
 from nutdamp.errors import BadRequest, Infeasible, NutdampError, Unsuitable
-from nutdamp.estimation.doubts import doubts
 from nutdamp.estimation.fit import Fit, fit
-from nutdamp.estimation.guess import spin_of
+from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.record import ACCELERATION, AXIS, GYROS, Record, quantisation
-from nutdamp.estimation.results import Estimate, carried, estimates
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record, quantisation
+from nutdamp.estimation.results import Estimate, carried, doubts, estimates
 from nutdamp.physics import attitude
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 NOISE = math.radians(0.01)
 SPIN = math.pi

@@ -12,14 +12,16 @@ from support import reference
 from support.builders import cross, spinner
 from support.golden import check_text
 
-from nutdamp import flight, planning
-from nutdamp.flight import Flight
+from nutdamp.figures import geometry
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
 from nutdamp.physics import attitude
 from nutdamp.physics.attitude import angle_between
-from nutdamp.presentation import geometry
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.spacecraft import Attitude, Spacecraft, Steerable, Vector
-from nutdamp.track import Track
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -38,7 +40,7 @@ BODIES = {
 def flown(body: Spacecraft, scheme: str = "four-pulse", samples: int = 200) -> tuple[Flight, Track]:
     pulses = planning.plan(body, scheme).pulses
     end = pulses.end + body.inertial_period
-    made = flight.flown(body, pulses, end)
+    made = propagation.flown(body, pulses, end)
     return made, made.sampled(samples, end)
 
 
@@ -80,7 +82,7 @@ def test_a_body_cone_rolls_outside_the_space_cone_of_a_prolate_body_and_about_th
 def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float, float], spin: float) -> None:
     """The reference integrator's ω runs along the space cone in space, and along the body cone in the body."""
     body = spinner(moments=moments, spin=spin, degrees=25.0)
-    made = flight.flown(body, Schedule(), 1.0)
+    made = propagation.flown(body, Schedule(), 1.0)
     start = body.initial
     found = geometry.cones(made, start.rates, start.quaternion)
     back = attitude.matrix(start.quaternion).T
@@ -94,7 +96,7 @@ def test_the_cones_at_one_moment_foretell_the_motion(moments: tuple[float, float
 
 @pytest.mark.parametrize("body", [BODIES["prolate"], BODIES["oblate, reversed"], spinner(moments=(120, 100, 80))])
 def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
-    made = flight.flown(body, Schedule(), 4.0)
+    made = propagation.flown(body, Schedule(), 4.0)
     track = made.sampled(20, 4.0)
     marks = []
     for rates, quaternion in zip(track.rates, track.quaternion, strict=True):
@@ -107,7 +109,7 @@ def test_the_mark_stays_where_it_is_in_the_body(body: Spacecraft) -> None:
 
 def test_without_nutation_there_are_no_cones() -> None:
     body = spinner(degrees=0.0)
-    found = geometry.cones(flight.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion)
+    found = geometry.cones(propagation.flown(body, Schedule(), 1.0), body.omega0, body.initial.quaternion)
     assert len(found.body) == len(found.space) == 0
     assert np.isnan(geometry.body_mark(found, body.initial.quaternion)).all()
 
@@ -128,7 +130,7 @@ def test_in_n_the_spin_axis_begins_to_the_right_and_turns_as_seen_against_h() ->
 def test_in_a_celestial_frame_east_is_right_and_north_is_up() -> None:
     """H along x, right ascension and declination zero: east is y, north is z."""
     up = Attitude(attitude.from_matrix(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])))
-    made = flight.flown(spinner(degrees=0.0, attitude=up), Schedule(), 1.0)
+    made = propagation.flown(spinner(degrees=0.0, attitude=up), Schedule(), 1.0)
     plane = geometry.sky_plane(made, np.array([240.0, 0.0, 0.0]))
     seen = geometry.on_sky(plane, np.array([[1.0, math.tan(0.1), 0.0], [1.0, 0.0, math.tan(0.2)]]))
     assert seen == pytest.approx(np.degrees([[0.1, 0.0], [0.0, 0.2]]))
@@ -137,7 +139,7 @@ def test_in_a_celestial_frame_east_is_right_and_north_is_up() -> None:
 
 @pytest.mark.parametrize("momentum", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, -0.5, 0.2)])
 def test_the_sky_is_right_handed_everywhere(momentum: tuple[float, float, float]) -> None:
-    made = flight.flown(spinner(attitude=Attitude(np.array([1.0, 0, 0, 0]))), Schedule(), 1.0)
+    made = propagation.flown(spinner(attitude=Attitude(np.array([1.0, 0, 0, 0]))), Schedule(), 1.0)
     plane = geometry.sky_plane(made, np.array(momentum))
     assert plane @ plane.T == pytest.approx(np.eye(3), abs=1e-12)
     assert np.linalg.det(plane) == pytest.approx(1.0)
@@ -160,7 +162,7 @@ def turned(points: Vector) -> float:
 
 @pytest.mark.parametrize("samples", [2, 50])
 def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
-    made = flight.flown(spinner(), Schedule(), 300.0)
+    made = propagation.flown(spinner(), Schedule(), 300.0)
     fine = geometry.drawn(made, made.sampled(samples, 300.0))
     assert fine.t[-1] == 300.0
     assert turned(geometry.pole_path(fine)) < 2 * math.pi / geometry.ROWS_A_TURN * 1.01
@@ -168,7 +170,7 @@ def test_a_coarse_track_is_drawn_finely(samples: int) -> None:
 
 
 def test_of_a_very_long_time_the_first_part_is_drawn_and_all_pulses() -> None:
-    made = flight.flown(spinner(), Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),)), 1e6)
+    made = propagation.flown(spinner(), Schedule((Pulse(5000.0, 0.0, "x", np.array([1.0, 0, 0])),)), 1e6)
     fine = geometry.drawn(made, made.sampled(1000, 1e6))
     assert len(fine.t) < geometry.MOST_ROWS + 10
     assert 5000.0 <= fine.t[-1] < 1e6
@@ -183,7 +185,7 @@ SCHEDULES = {
 
 
 @pytest.mark.parametrize("pulses", SCHEDULES.values(), ids=SCHEDULES)
-@pytest.mark.parametrize("fly", [flight.flown, flight.by_impulses])
+@pytest.mark.parametrize("fly", [propagation.flown, propagation.by_impulses])
 def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse, ...], fly: type) -> None:
     made: Flight = fly(spinner(), Schedule(pulses), 6.0)
     track = made.sampled(50, 6.0)
@@ -198,14 +200,14 @@ def test_stretches_cover_the_track_and_name_every_pulse_once(pulses: tuple[Pulse
 
 
 def test_pulses_after_the_end_of_the_track_are_left_out() -> None:
-    made = flight.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
+    made = propagation.flown(spinner(), Schedule(SCHEDULES["widths"]), 6.0)
     assert [one.pulse for one in geometry.stretches(made, made.sampled(20, 1.0))] == [0, None]
 
 
 def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
     """The space cone of I1 ≠ I2 over a long time reaches as far as it does in one period, all around."""
     body = spinner(moments=(120.0, 100.0, 80.0), degrees=25.0)
-    made = flight.flown(body, Schedule(), 600.0)
+    made = propagation.flown(body, Schedule(), 600.0)
     found = geometry.cones(made, body.initial.rates, body.initial.quaternion)
     away = angle_between(found.swept, found.momentum)
     assert np.ptp(away) < 1e-9
@@ -214,7 +216,7 @@ def test_a_herpolhode_that_never_closes_fills_the_circle_about_it() -> None:
     unit = motion.rotation @ (motion.rates / np.linalg.norm(motion.rates))
     assert angle_between(unit, found.momentum) <= away[0] + 1e-9
     still = BODIES["oblate"]
-    cones = geometry.cones(flight.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion)
+    cones = geometry.cones(propagation.flown(still, Schedule(), 1.0), still.initial.rates, still.initial.quaternion)
     assert np.array_equal(cones.swept, cones.space)
 
 

@@ -12,13 +12,15 @@ from rich.text import Text
 from support.builders import cross, spinner
 from support.cases import deep
 
-from nutdamp import flight, planning
-from nutdamp.flight import Flight
-from nutdamp.presentation.braille import FAINT, Panel, framed, ticks
-from nutdamp.presentation.terminal import motion_drawing
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft, Steerable, Vector
-from nutdamp.track import Track
+from nutdamp.figures.braille import FAINT, Panel, framed, ticks
+from nutdamp.figures.terminal import motion_drawing
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -39,7 +41,7 @@ def flown(case: str) -> tuple[Flight, Track]:
     body, scheme = CASES[case]
     pulses = planning.plan(body, scheme).pulses
     end = pulses.end + body.inertial_period
-    made = flight.flown(body, pulses, end)
+    made = propagation.flown(body, pulses, end)
     return made, made.sampled(300, end)
 
 
@@ -179,7 +181,7 @@ def test_pulses_are_numbered_where_there_is_room() -> None:
 def test_the_dots_are_the_track() -> None:
     """Of free motion: every dot of the left panel lies on the circle of ω, and all of it is there."""
     made, track = flown("free")
-    made = flight.flown(made.spacecraft, Schedule(), made.spacecraft.body_period)
+    made = propagation.flown(made.spacecraft, Schedule(), made.spacecraft.body_period)
     drawing = motion_drawing(made, made.sampled(100, made.spacecraft.body_period))
     lines = drawing.pole_curve(45)[2:-3]
     begins = min(line.plain.index(sign) for line in lines for sign in "│┤" if sign in line.plain) + 1

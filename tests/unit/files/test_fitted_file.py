@@ -11,11 +11,11 @@ from support.golden import check_text
 from support.hand_made_fit import silent, told
 
 from nutdamp.estimation.results import carried, posterior, replaced
-from nutdamp.files.fitted_file import fitted_text, notes
-from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.schedule import Schedule, channel_pulse
+from nutdamp.files.editing import fitted_text, notes
+from nutdamp.files.overrides import parse_setting
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.physics.thruster import Trapezoid
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 GYROS = ("omega_1", "omega_2", "omega_3")
 FILE = """\

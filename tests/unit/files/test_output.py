@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from nutdamp.errors import CannotWrite
-from nutdamp.files.output import PREFIX, SUFFIX, json_text, make_folder, whole_file, write_whole
+from nutdamp.files.tabular import PREFIX, SUFFIX, json_text, make_folder, whole_file, write_whole
 
 KILLED = """
 import os, signal
-from nutdamp.files.output import whole_file
+from nutdamp.files.tabular import whole_file
 
 with whole_file("x.csv") as stream:
     stream.write(b"half")

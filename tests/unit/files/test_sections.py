@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal
 from jsonschema import Draft202012Validator
 from support.golden import check_text
 
-from nutdamp.files.fields import Quantity
-from nutdamp.files.schema import section_schema
-from nutdamp.files.sections import Field, Length, Problems, Section, Within
+from nutdamp.files.fields import Field, Length, Problems, Quantity, Section, Within
+from nutdamp.files.reader import section_schema
 
 Time = Annotated[float, Quantity("time", minimum=0)]
 

@@ -18,11 +18,11 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile
-from nutdamp.files.examples import example_text
-from nutdamp.files.settings import parse_setting
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.files.yaml_tree import KeyPath, dotted, read_tree
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.files.fields import KeyPath
+from nutdamp.files.overrides import parse_setting
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.files.yaml import dotted, read_tree
+from nutdamp.spacecraft.model import Spacecraft
 
 EXAMPLE = example_text()
 

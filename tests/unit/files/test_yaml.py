@@ -12,19 +12,9 @@ from support.cases import spread
 from support.golden import check_text
 
 from nutdamp.errors import BadRequest, CannotRead, FaultyFile
-from nutdamp.files.examples import example_text
-from nutdamp.files.yaml_edit import edited
-from nutdamp.files.yaml_tree import (
-    MAX_BYTES,
-    MAX_DEPTH,
-    MAX_NODES,
-    Place,
-    decode,
-    dotted,
-    read_text,
-    read_tree,
-    resolve,
-)
+from nutdamp.files.editing import edited
+from nutdamp.files.reader import example_text
+from nutdamp.files.yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, Place, decode, dotted, read_text, read_tree, resolve
 
 
 def plain(text: str) -> object:

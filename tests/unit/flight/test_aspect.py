@@ -19,17 +19,18 @@ from support.golden import check_text
 from support.process import Run
 from support.spinners import commanded
 
-from nutdamp import comparison, planning, remarks
-from nutdamp.aspect import aspects
-from nutdamp.compliance import Part
-from nutdamp.decision import decide
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import by_impulses, flown
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.end_state import aspects
+from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.physics import attitude
-from nutdamp.presentation import decisions, verdicts
-from nutdamp.recommendation import Share
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Keep, Limits, Spacecraft
+from nutdamp.planning import decision
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import decide
+from nutdamp.planning.recommendation import Share
+from nutdamp.spacecraft.model import Keep, Limits, Spacecraft
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.views import decisions, verdicts
 
 Array = NDArray[np.float64]
 
@@ -104,14 +105,14 @@ def test_a_cone_on_the_way_is_gone_round(scheme: str) -> None:
     body = watching(TURNING, Keep("Sun", between(TURNING, 0.5), least=math.radians(3.0)))
     straight = planning.judged(body, scheme, free.pulses, free.options)
     assert straight.astray is not None  # what is planned without the cone breaks it
-    assert "from Sun" in remarks.infeasibility(straight)
+    assert "from Sun" in decision.infeasibility(straight)
     routed = planning.plan(body, scheme)
-    assert routed.feasible, remarks.infeasibility(routed)
+    assert routed.feasible, decision.infeasibility(routed)
     assert routed.left is not None
     assert routed.left.aim < 1e-6
     assert routed.aspects[0].kept
     check_kept(routed)
-    assert any("way point" in remark for remark in remarks.remarks(routed))
+    assert any("way point" in remark for remark in decision.remarks(routed))
     assert 1.0 < routed.total_impulse / free.total_impulse < 1.3
 
 
@@ -131,8 +132,8 @@ def test_a_target_within_a_cone_is_refused_and_damping_into_one_warned_of() -> N
     body = replace(body, keep=(Keep("Sun", body.direction_in_n(0.05, 0.0), least=0.1),))
     damped = planning.plan(body, "four-pulse")
     assert damped.feasible
-    (warning,) = (remark for remark in remarks.remarks(damped) if "spin axis" in remark)
-    check_text("flight.cone-broken", f"{remarks.infeasibility(refused)}\n{warning}")
+    (warning,) = (remark for remark in decision.remarks(damped) if "spin axis" in remark)
+    check_text("flight.cone-broken", f"{decision.infeasibility(refused)}\n{warning}")
 
 
 def check_kept(plan: planning.Plan) -> None:
@@ -246,7 +247,7 @@ def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) ->
 def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
     """Though each meets what is required of the end: that the plan does is then not said."""
     text = BROKEN.replace("normal: 5 %", "normal: 1 %")
-    compared = comparison.compare(read_spacecraft(text, "broken.yaml"), ("one-pulse",), samples=100)
+    compared = decision.compare(read_spacecraft(text, "broken.yaml"), ("one-pulse",), samples=100)
     decided = decide(compared)
     assert decided is not None
     assert decided.cases is not None

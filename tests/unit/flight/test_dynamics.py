@@ -13,13 +13,14 @@ from support.cases import deep
 from support.places import CASES
 from support.strategies import schedules, symmetric_spinners, triaxial_spinners
 
-from nutdamp import dynamics, flight, planning, work
-from nutdamp.dynamics import Dynamics, make_dynamics
+from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.flight import Flight
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Spacecraft
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Dynamics, Flight, make_dynamics
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 THREE = spinner(moments=(100.0, 120.0, 80.0))
 
@@ -48,21 +49,21 @@ def test_what_is_remembered_changes_no_bit(body: Spacecraft, constant: float, ev
     remembering = make_dynamics(body).remembering()
     mixed = [Schedule((*one.pulses, *other.pulses)) for one in every for other in every]
     for made in (*every, *mixed, *every):
-        assert bits(flight.flown(body, made, dynamics=remembering)) == bits(flight.flown(body, made))
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
 
 
 @pytest.mark.parametrize("moved", [0, 3, 7])
 def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -> None:
     remembering = make_dynamics(THREE).remembering()
-    flight.flown(THREE, train(8), dynamics=remembering)
+    propagation.flown(THREE, train(8), dynamics=remembering)
     with work.budget("trial", 1e9) as trial:
-        flown = flight.flown(THREE, train(8, moved), dynamics=remembering)
-    assert bits(flown) == bits(flight.flown(THREE, train(8, moved)))
+        flown = propagation.flown(THREE, train(8, moved), dynamics=remembering)
+    assert bits(flown) == bits(propagation.flown(THREE, train(8, moved)))
     changed = [leg for leg in flown.legs if leg.end > 4.0 * moved + 0.75]  # a leg for each coast, pulse, and the end
     assert len(changed) == 2 * (8 - moved) + 1
     integrated = [leg for leg in changed if leg.end > leg.start]
     steps = sum(leg.path.steps for leg in integrated)
-    expected = len(changed) * dynamics.LEG + len(integrated) * dynamics.PULSE + steps * dynamics.STEP
+    expected = len(changed) * propagation.LEG + len(integrated) * propagation.PULSE + steps * propagation.STEP
     assert trial.done == pytest.approx(expected)
 
 
@@ -75,11 +76,11 @@ def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
 
 
 def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dynamics, "REMEMBERED", 3)
+    monkeypatch.setattr(propagation, "REMEMBERED", 3)
     body = spinner()
     remembering = make_dynamics(body).remembering()
     for made in (train(2), train(2, 1), train(2, 0)):
-        assert bits(flight.flown(body, made, dynamics=remembering)) == bits(flight.flown(body, made))
+        assert bits(propagation.flown(body, made, dynamics=remembering)) == bits(propagation.flown(body, made))
     assert 0 < len(remembering.known or ()) <= 3
 
 

@@ -16,24 +16,22 @@ from support.cases import deep, weekly
 from support.golden import check_text
 from support.spinners import FILE as SPINNER
 
-from nutdamp import planning
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.flown import RealWidths
+from nutdamp.control_loop.simulation import fly
 from nutdamp.errors import FaultyFile, Unsuitable
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import by_impulses, flown
-from nutdamp.lightening import lightened
-from nutdamp.loop.run import fly
-from nutdamp.physics.feed import Tank
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.schedule import Schedule, channel_pulse, on_command
-from nutdamp.schemes.tools import block_notes
-from nutdamp.schemes.tools.block_model import BlockModel
-from nutdamp.spacecraft import Spacecraft
-from nutdamp.supply import supplied
-from nutdamp.tolerances import Dispersions, Tolerance
-from nutdamp.verification import verify
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.propagation import by_impulses, flown, lightened
+from nutdamp.flight.propellant import supplied
+from nutdamp.flight.verification import verify
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.study import study_of
+from nutdamp.physics.thruster import Tank, Trapezoid
+from nutdamp.planning import plan as planning
+from nutdamp.schemes import command_block
+from nutdamp.schemes.block_model import BlockModel
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 Shed = tuple[float, float, float]
 
@@ -109,7 +107,7 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed,
 def test_verify_confirms_it_with_and_without_dissipation(
     growth: float | None, numbers: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nutdamp.verification.SAMPLES", 21)
+    monkeypatch.setattr("nutdamp.flight.verification.SAMPLES", 21)
     body = replace(craft(AXIAL), dissipation=growth)
     made = fires(body, *numbers)
     verified = verify(body, made)
@@ -201,7 +199,7 @@ def test_what_cannot_have_falling_moments_says_so() -> None:
         fly(body, body.loop)
     blocks = read_spacecraft(SPINNER, "f.yaml")
     lighter = replace(blocks, tank=Tank(10.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.3, 0.3, 0.2)))
-    cures = [block_notes.cures(BlockModel(one), one.channels, {}, Schedule(), []) for one in (blocks, lighter)]
+    cures = [command_block.cures(BlockModel(one), one.channels, {}, Schedule(), []) for one in (blocks, lighter)]
     check_text("flight.cures-of-blocks", "\n".join(cures))
 
 

@@ -20,15 +20,17 @@ from support.planner import Planner
 from support.process import Run
 
 import nutdamp
-from nutdamp import flight, planning
-from nutdamp.compliance import Part
-from nutdamp.outcome import ANGLE, deviations, seen_at, tolerated
-from nutdamp.presentation.figures.motion import title
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement, Steerable
+from nutdamp.figures.motion import title
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import ANGLE, deviations, seen_at, tolerated
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Schedule
 
 BODY = spinner(channels=cross(8.0, max_on_time=0.75), limits=Limits(horizon=60.0))
-FLIES = (flight.flown, flight.by_impulses)
+FLIES = (propagation.flown, propagation.by_impulses)
 
 
 @pytest.mark.parametrize("when", ["before the first", "within the second", "between", "long after"])
@@ -41,7 +43,7 @@ def test_it_is_the_motion_of_the_reference_integrator_at_that_time(planned: Plan
         "between": (0.5 * (second.end + third.start), 2),
         "long after": (pulses.end + 7.0, len(pulses)),
     }[when]
-    seen = seen_at(flight.flown(BODY, pulses, time), time)
+    seen = seen_at(propagation.flown(BODY, pulses, time), time)
     moments, start = BODY.inertia.moments, reference.frame_n(BODY.inertia.moments, BODY.omega0)
     motion = reference.fly(moments, BODY.omega0, events(pulses), time, start)
     before, after = (reference.momentum(moments, one) for one in (reference.Motion(BODY.omega0, start), motion))

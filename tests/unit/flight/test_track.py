@@ -19,18 +19,18 @@ from support import reference
 from support.builders import channel, pulse, spinner
 from support.process import Run
 
-from nutdamp import flight, track
-from nutdamp.files.output import number
-from nutdamp.files.track_csv import HEADER, track_array, write_track
-from nutdamp.flight import Flight
-from nutdamp.physics import attitude, cones
-from nutdamp.rounding import SAME_ANGLE
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Attitude
-from nutdamp.track import Track
+from nutdamp.common.numerics import SAME_ANGLE
+from nutdamp.files.tabular import HEADER, number, track_array, write_track
+from nutdamp.flight import propagation, track
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.physics import attitude
+from nutdamp.physics import body as rigid_body
+from nutdamp.spacecraft.model import Attitude
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 EPS = float(np.finfo(float).eps)
-FLIES = (flight.by_impulses, flight.flown)
+FLIES = (propagation.by_impulses, propagation.flown)
 WIDE = Schedule(
     (
         pulse(2.0, 0.5, np.array([5.0, 0.0, 0.0]), "one"),
@@ -45,7 +45,7 @@ def some_flight() -> Flight:
     """A flight with coasts and wide pulses, the first of them at once."""
     push = channel("T", 4.0, 1.0, 0.5)
     made = Schedule(tuple(channel_pulse(push, t, on_time) for t, on_time in ((0.25, 0.5), (4.0, 0.7), (20.0, 3.0))))
-    return flight.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
+    return propagation.flown(spinner(degrees=12.0, channels=(push,)), made, UNTIL)
 
 
 def cut(whole: Track, edges: Iterable[int]) -> list[Track]:
@@ -70,8 +70,8 @@ def test_a_track_goes_from_zero_to_its_end_in_order_and_no_row_comes_twice(fly: 
 
 
 def test_by_impulses_there_is_a_row_before_and_one_after_each_pulse() -> None:
-    rows = flight.by_impulses(spinner(), WIDE, 10.0).sampled(3, 10.0)
-    effective = flight.effective_impulses(spinner(), WIDE)
+    rows = propagation.by_impulses(spinner(), WIDE, 10.0).sampled(3, 10.0)
+    effective = propagation.effective_impulses(spinner(), WIDE)
     for index, (one, acting) in enumerate(zip(WIDE, effective, strict=True)):
         at = np.flatnonzero(rows.t == one.t)
         assert rows.pulse[at].tolist() == [index, index + 1]
@@ -81,7 +81,7 @@ def test_by_impulses_there_is_a_row_before_and_one_after_each_pulse() -> None:
 
 
 def test_flown_there_is_a_row_as_each_pulse_begins_and_one_as_it_ends() -> None:
-    rows = flight.flown(spinner(), WIDE, 10.0).sampled(3, 10.0)
+    rows = propagation.flown(spinner(), WIDE, 10.0).sampled(3, 10.0)
     for index, one in enumerate(WIDE):
         assert index in rows.pulse[rows.t == one.start]
         assert one.end in rows.t
@@ -90,7 +90,7 @@ def test_flown_there_is_a_row_as_each_pulse_begins_and_one_as_it_ends() -> None:
     assert np.diff(rows.rates[kick], axis=0)[0] == pytest.approx([3 / 120, 3 / 120, 0], abs=4 * EPS)
     # The row at the end of a pulse counts it as completed, the last one too.
     made = Schedule(WIDE.pulses[:2])
-    rows = flight.flown(spinner(), made, made.end).sampled(3, made.end)
+    rows = propagation.flown(spinner(), made, made.end).sampled(3, made.end)
     assert [rows.pulse[rows.t == one.end].max() for one in made] == [1, 2]
 
 
@@ -119,11 +119,11 @@ def test_motion_around_pulses(fly: object) -> None:
 
 def test_cone_angles_are_those_of_the_rates_axis_and_momentum_those_of_the_attitude() -> None:
     body = spinner(spin=-3.0, degrees=20.0)
-    rows = flight.flown(body, WIDE, 10.0).sampled(20, 10.0)
+    rows = propagation.flown(body, WIDE, 10.0).sampled(20, 10.0)
     omega, spin = np.hypot(rows.rates[:, 0], rows.rates[:, 1]), -rows.rates[:, 2]
-    assert rows.nutation == pytest.approx(cones.nutation_angle(120.0, 80.0, omega, spin), abs=4 * EPS)
-    assert rows.body_cone == pytest.approx(cones.body_cone(omega, spin), abs=4 * EPS)
-    assert rows.space_cone == pytest.approx(cones.space_cone(120.0, 80.0, omega, spin), abs=8 * EPS)
+    assert rows.nutation == pytest.approx(rigid_body.nutation_angle(120.0, 80.0, omega, spin), abs=4 * EPS)
+    assert rows.body_cone == pytest.approx(rigid_body.body_cone(omega, spin), abs=4 * EPS)
+    assert rows.space_cone == pytest.approx(rigid_body.space_cone(120.0, 80.0, omega, spin), abs=8 * EPS)
     between = [reference.angle(h, axis) for h, axis in zip(rows.momentum, rows.axis, strict=True)]
     assert rows.nutation == pytest.approx(between, abs=1e-13)
     for quaternion, rates, axis, h in zip(rows.quaternion, rows.rates, rows.axis, rows.momentum, strict=True):
@@ -169,7 +169,7 @@ def test_ranges_of_the_spin_axis(places: list[tuple[float, float]], expected: di
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     body = spinner(spin=spin, degrees=12.0)
     until = body.inertial_period
-    found = track.extremes([flight.flown(body, Schedule(), until).sampled(4001, until)])
+    found = track.extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
     for ends in (found.x, found.y):
         assert np.degrees(ends) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
     assert np.degrees([found.farthest[0], found.nearest[0]]) == pytest.approx([12.0, 12.0], abs=1e-12)
@@ -183,7 +183,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     place = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     facing = attitude.from_matrix(place @ attitude.matrix(spinner(degrees=12.0).initial.quaternion))
     there = spinner(degrees=12.0, attitude=Attitude(facing))
-    found = track.extremes([flight.flown(there, Schedule(), until).sampled(4001, until)])
+    found = track.extremes([propagation.flown(there, Schedule(), until).sampled(4001, until)])
     west = (right_ascension - 12) % 360
     assert np.degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
     assert np.degrees(found.right_ascension) == pytest.approx([west, west + 24], abs=1e-4)
@@ -203,7 +203,7 @@ def test_even_times_are_those_of_linspace(samples: int, first: float, second: fl
 def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = some_flight()
     whole = made.sampled(samples, UNTIL)
-    for module in (track, flight):
+    for module in (track, propagation):
         monkeypatch.setattr(module, "PIECE", FEW)
     pieces = list(made.pieces(samples, UNTIL))
     assert len(pieces) >= len(whole.t) // (2 * FEW)

@@ -19,19 +19,28 @@ from support.golden import check_text
 from support.planner import Planner
 from support.process import Run
 
-from nutdamp import basilisk, flight, planning, verification
-from nutdamp.basilisk import BasiliskFlight
-from nutdamp.cli.root import group
-from nutdamp.dop853 import integrate
+from nutdamp.cli.main import group
 from nutdamp.errors import MissingExtra
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.flight import basilisk, propagation, verification
+from nutdamp.flight.basilisk import BasiliskFlight
+from nutdamp.flight.verification import (
+    AGREE,
+    AS_FLOWN,
+    IDEAL,
+    Conservation,
+    Imperfection,
+    Verification,
+    integrate,
+    verify,
+)
 from nutdamp.physics import attitude
-from nutdamp.presentation.verify_tables import budget_note, conservation, verdict
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import Options
-from nutdamp.spacecraft import Disturbance, Inertia, Limits, Spacecraft, Steerable
-from nutdamp.verification import AGREE, AS_FLOWN, IDEAL, Conservation, Imperfection, Verification, verify
+from nutdamp.planning import plan as planning
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.verify_tables import budget_note, conservation, verdict
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 HEAVIER = replace(EXAMPLE, inertia=Inertia((120.00012, 120.00012, 80.0)))  # by 1 ppm
@@ -98,7 +107,7 @@ def test_basilisk_has_its_say_in_the_verdict(
     def of(body: Spacecraft) -> Callable[[Spacecraft, Schedule, float], BasiliskFlight]:
         def fly(_: Spacecraft, made: Schedule, until: float) -> BasiliskFlight:
             times = np.unique([*np.linspace(0.0, until, 50), *(pulse.end for pulse in made)])
-            return BasiliskFlight(times, *flight.flown(body, made, until).motion(times), 0.01)
+            return BasiliskFlight(times, *propagation.flown(body, made, until).motion(times), 0.01)
 
         return fly
 
@@ -132,7 +141,7 @@ def test_momentum_and_energy_keep_on_coasts_of_a_free_body_alone() -> None:
     # Dissipation is internal: it takes energy and leaves the momentum.
     body = replace(EXAMPLE, dissipation=20.0)
     verified = verify(body, Schedule())
-    rates, _ = flight.flown(body, Schedule(), body.inertial_period).motion(np.array([0.0, body.inertial_period]))
+    rates, _ = propagation.flown(body, Schedule(), body.inertial_period).motion(np.array([0.0, body.inertial_period]))
     before, after = (reference.energy(body.inertia.moments, one) for one in rates)
     assert verified.momentum.kept
     assert verified.momentum.drift < 1e-12
@@ -149,7 +158,7 @@ def test_what_a_budget_row_says_is_what_that_imperfection_does(planned: Planner)
     made = planned(ideal, "two-pulse").pulses
     rows, calm = left_in(verify(body, made)), left_in(verify(replace(body, dissipation=None), made))
     alone, damped, all_of_it = (
-        flight.flown(one, made).residual.nutation
+        propagation.flown(one, made).residual.nutation
         for one in (replace(body, dissipation=None), replace(body, disturbances=()), body)
     )
     # Dissipation is part of what plans include: it acts in every row but the one without.
@@ -209,7 +218,7 @@ def test_the_course_example_of_dissipation() -> None:
     body = Spacecraft("x", Inertia((2000.0, 2000.0, 1000.0)), np.array([0.1, 0.0, 2 * math.pi]), dissipation=100.0)
     times = np.array([0.0, 50.0, 100.0, 200.0, 300.0, 345.0, 600.0])
     motions = (integrate(body, Schedule(), times), *(
-        fly(body, Schedule(), 600.0).motion(times) for fly in (flight.flown, flight.by_impulses)
+        fly(body, Schedule(), 600.0).motion(times) for fly in (propagation.flown, propagation.by_impulses)
     ))  # fmt: skip
     by_torque, *others = (
         np.degrees(np.arctan2(2.0 * np.hypot(rates[:, 0], rates[:, 1]), rates[:, 2])) for rates, _ in motions
@@ -254,7 +263,7 @@ def test_a_motion_too_long_to_be_confirmed_is_not_called_confirmed(
     def missing(*_: object) -> BasiliskFlight:
         raise MissingExtra("verify", "a flight by Basilisk")
 
-    monkeypatch.setattr("nutdamp.dop853.EVALUATIONS", 50)
+    monkeypatch.setattr("nutdamp.flight.verification.EVALUATIONS", 50)
     monkeypatch.setattr(basilisk, "fly", missing)
     verified = verify(EXAMPLE, planned(EXAMPLE, "two-pulse").pulses)
     assert verified.checks == verified.disagreeing == ()

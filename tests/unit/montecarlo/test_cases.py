@@ -16,17 +16,26 @@ from support.builders import channel, spinner
 from support.cases import deep
 from support.golden import check_text, refused
 
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.correlation import grouped, groups_of, mixing, normal_of, together, value_of
-from nutdamp.dispersion.draws import BLOCK, Source
-from nutdamp.dispersion.elementwise import rotated, tilt_axes
-from nutdamp.dispersion.inputs import Input, list_inputs
-from nutdamp.dispersion.study import Results, Study, run
 from nutdamp.errors import BadRequest
-from nutdamp.physics.inertia import principal_axes
-from nutdamp.schedule import Schedule, channel_pulse, steerable_pulse
-from nutdamp.spacecraft import Channel, Inertia, Steerable
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.montecarlo.cases import Model, rotated, tilt_axes
+from nutdamp.montecarlo.inputs import (
+    BLOCK,
+    Input,
+    Source,
+    grouped,
+    groups_of,
+    list_inputs,
+    mixing,
+    normal_of,
+    together,
+    value_of,
+)
+from nutdamp.montecarlo.study import Results, Study, run
+from nutdamp.physics.body import principal_axes
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Inertia
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 def test_a_tilted_and_moved_force_gives_its_torque() -> None:

@@ -18,22 +18,20 @@ from support.flights import BODY_ERRORS, by_blocks
 from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
-from nutdamp import flight
-from nutdamp.commands import Block, SunSensor
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.flown import RealWidths, largest_nutation
-from nutdamp.dispersion.kernel import ClosedForm, nodes_for
-from nutdamp.dispersion.outputs import OUTPUTS, measure
-from nutdamp.dispersion.study import Results, Study, run
-from nutdamp.physics.arc_cones import arc_cones
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.rigid_cases import cos_sin
-from nutdamp.physics.valve import Trapezoid
-from nutdamp.schedule import Schedule, steerable_pulse
-from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Disturbance, Inertia, Steerable
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.flight import propagation
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.closed_form import ClosedForm, nodes_for
+from nutdamp.montecarlo.propagated import RealWidths, largest_nutation
+from nutdamp.montecarlo.statistics import OUTPUTS, measure
+from nutdamp.montecarlo.study import Results, Study, run, study_of
+from nutdamp.physics.batch import cos_sin
+from nutdamp.physics.thruster import Cold, Tank, Trapezoid
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.schemes.block_model import fired
+from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
+from nutdamp.spacecraft.model import Disturbance, Inertia
+from nutdamp.spacecraft.schedule import Schedule, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 CASES = 40
 PROLATE = dispersed.with_jets()
@@ -74,7 +72,7 @@ def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> Non
         true, made = realised(model, one)
         kicks = [
             reference.Kick(pulse.t, np.array([acting.real, acting.imag, pulse.impulse[2]]))
-            for pulse, acting in zip(made, flight.effective_impulses(true, made), strict=True)
+            for pulse, acting in zip(made, propagation.effective_impulses(true, made), strict=True)
         ]
         moments, until = true.inertia.moments, max(pulse.t for pulse in made)
         end = reference.fly(moments, true.omega0, kicks, until, np.eye(3), true.growth)
@@ -97,9 +95,12 @@ def test_the_impulse_sum_of_each_case_is_that_of_its_own_spacecraft(name: str) -
     draws = dispersed.first_cases(Study(model), CASES)
     by_sum = outputs(ClosedForm, model, draws)
     for case in range(0, CASES, 4):
-        left = flight.by_impulses(*realised(model, dispersed.one_of(draws, case))).residual
+        left = propagation.by_impulses(*realised(model, dispersed.one_of(draws, case))).residual
         assert by_sum[:2, case] == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
-    left, nominal = flight.by_impulses(model.spacecraft, model.schedule).residual, outputs(ClosedForm, model, {})[:, 0]
+    left, nominal = (
+        propagation.by_impulses(model.spacecraft, model.schedule).residual,
+        outputs(ClosedForm, model, {})[:, 0],
+    )
     assert nominal[:3] == pytest.approx([left.nutation, left.momentum_shift, left.axis_error], abs=1e-13)
     assert nominal[4] == pytest.approx(model.schedule.propellant or math.nan, nan_ok=True)
 
@@ -110,7 +111,7 @@ def test_the_impulse_sum_of_three_moments_has_their_H_and_the_body_of_their_mean
     mean = replace(
         body, inertia=Inertia((A, A, 80.0)), omega0=np.array([120.0, 105.0, 80.0]) * body.omega0 / [A, A, 80.0]
     )
-    left = flight.by_impulses(mean, model.schedule).residual
+    left = propagation.by_impulses(mean, model.schedule).residual
     nominal = outputs(ClosedForm, model, {})[:2, 0]
     assert nominal == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
 
@@ -120,7 +121,7 @@ def test_pulses_that_change_places_act_in_their_own_order() -> None:
     pulses = [steerable_pulse(Steerable(), t, angle, impulse=4.0) for t, angle in ((1.0, 0.3), (1.02, 2.0))]
     body = replace(spinner(), dispersions=Dispersions(timing=Tolerance("uniform", 0.05)))
     model, draws = Model(body, Schedule(tuple(pulses))), {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
-    left = flight.by_impulses(*realised(model, draws)).residual
+    left = propagation.by_impulses(*realised(model, draws)).residual
     by_sum = outputs(ClosedForm, model, draws)[:2, 0]
     assert by_sum == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
     body = replace(spinner(steerable=Steerable(20.0)), dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)))
@@ -134,7 +135,7 @@ def test_a_schedule_without_pulses_leaves_what_is_there() -> None:
     assert nutation == pytest.approx(math.atan(1.01 * math.tan(math.radians(5.0))))
     assert shift == 0.0
     body = THREE["three moments"].spacecraft
-    left = flight.flown(body, Schedule()).residual
+    left = propagation.flown(body, Schedule()).residual
     assert Study(Model(body, Schedule())).outputs_of({})[0] == pytest.approx(left.nutation)
 
 
@@ -218,7 +219,7 @@ def test_blocks_fire_what_their_valves_give(number: int) -> None:
     assert middles == pytest.approx([pulse.t for pulse in made], abs=1e-9)
     assert np.abs(np.array(middles) - [pulse.t for pulse in model.schedule]).max() > 0.05
     assert flown[:, number] == pytest.approx(flown_outputs(model, one), abs=1e-9, nan_ok=True)
-    spun = flight.flown(true, made).settled.spin - true.spin
+    spun = propagation.flown(true, made).settled.spin - true.spin
     assert flown[OUTPUTS.index("spin_change"), number] == pytest.approx(spun, abs=1e-9)
 
 
@@ -232,7 +233,7 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     model = Model(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     at_once = outputs(RealWidths, model, draws)
-    monkeypatch.setattr("nutdamp.physics.rigid_cases.BLOCK", 5)
+    monkeypatch.setattr("nutdamp.physics.batch.BLOCK", 5)
     assert outputs(RealWidths, model, draws) == pytest.approx(at_once, abs=1e-12, nan_ok=True)
 
 

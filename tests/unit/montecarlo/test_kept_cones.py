@@ -17,16 +17,18 @@ from support.flights import axis_path, by_blocks
 from support.process import Run
 from support.single_case import realised
 
-from nutdamp import comparison, flight, load, planning, robust
-from nutdamp.aspect import aspects
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.study import Results, Study
-from nutdamp.dispersion.study import run as fly_all
-from nutdamp.flight import Flight
+from nutdamp import load
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import aspects
+from nutdamp.flight.propagation import Flight
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.study import Results, Study, study_of
+from nutdamp.montecarlo.study import run as fly_all
 from nutdamp.physics import attitude
-from nutdamp.spacecraft import Disturbance, Keep, Requirement, Spacecraft
+from nutdamp.planning import decision, robust
+from nutdamp.planning import plan as planning
+from nutdamp.spacecraft.model import Disturbance, Keep, Requirement, Spacecraft
 
 
 def with_directions(model: Model, **fields: object) -> Model:
@@ -69,7 +71,7 @@ def test_angles_of_each_case_are_those_of_its_own_flight(name: str) -> None:
     angles = seen_in(model, draws)
     for case in range(0, 16, 5):
         true, made = realised(model, dispersed.one_of(draws, case))
-        alone = flight.flown(true, made)
+        alone = propagation.flown(true, made)
         for one, ends in zip(aspects(alone, end_of(alone)), angles[:, :, case], strict=False):  # a Sun besides
             within = 2e-8  # near the direction of the axis itself
             assert ends == pytest.approx((one.least, one.largest), abs=within)
@@ -80,7 +82,7 @@ def test_the_reference_integrator_sees_the_same_angles() -> None:
     draws = dispersed.first_cases(Study(model), 6)
     angles = seen_in(model, draws)
     true, made = realised(model, dispersed.one_of(draws, 5))
-    path = axis_path(true, made, end_of(flight.flown(true, made)), 400)
+    path = axis_path(true, made, end_of(propagation.flown(true, made)), 400)
     for keep, ends in zip(model.spacecraft.keep[:3], angles[:3, :, 5], strict=True):
         apart = attitude.angle_between(path, keep.direction)
         assert ends == pytest.approx((apart.min(), apart.max()), abs=1e-5)
@@ -179,7 +181,7 @@ def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
     (tmp_path / "keeper.yaml").write_text(FILE)
     body: Spacecraft = load(tmp_path / "keeper.yaml")
     names = "rhumb-line", "half-cone"
-    compared, counted = (comparison.compare(body, names, samples=samples) for samples in (0, 1000))
+    compared, counted = (decision.compare(body, names, samples=samples) for samples in (0, 1000))
     assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(names)
     attempts = robust.attempts(compared)
     judged = robust.compare(compared, attempts[:1] + attempts[-2:], samples=1000)

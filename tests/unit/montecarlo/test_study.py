@@ -14,21 +14,28 @@ from support import dispersed
 from support.cases import deep
 from support.golden import refused
 
-from nutdamp.dispersion import study as study_module
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.binomial import binomial_interval, cases_to_show
-from nutdamp.dispersion.cases import DispersedCases, Model
-from nutdamp.dispersion.draws import BLOCK
-from nutdamp.dispersion.kernel import ClosedForm, Ends
-from nutdamp.dispersion.outputs import OUTPUTS, ROWS, VECTORS, vectors
-from nutdamp.dispersion.rounds import PORTION
-from nutdamp.dispersion.sensitivity import first_order, sampled_shares
-from nutdamp.dispersion.statistics import Exact, Sketch, Worst
-from nutdamp.dispersion.study import EARLY, Results, Study, run
 from nutdamp.errors import BadRequest
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Goal, Requirement
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.montecarlo import study as dispersion
+from nutdamp.montecarlo.cases import DispersedCases, Model
+from nutdamp.montecarlo.closed_form import ClosedForm, Ends
+from nutdamp.montecarlo.inputs import BLOCK
+from nutdamp.montecarlo.statistics import (
+    OUTPUTS,
+    ROWS,
+    VECTORS,
+    Exact,
+    Sketch,
+    Worst,
+    binomial_interval,
+    cases_to_show,
+    first_order,
+    sampled_shares,
+    vectors,
+)
+from nutdamp.montecarlo.study import EARLY, PORTION, Results, Study, run, study_of
+from nutdamp.spacecraft.model import Goal, Requirement
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 MANY = BLOCK + 5_234
 JETS = dispersed.with_jets()
@@ -90,7 +97,7 @@ def test_cases_of_three_moments_do_not_depend_on_threads_or_interruptions() -> N
 
 def test_beyond_what_is_kept_singly_all_is_counted(plain: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     """As if 10,000 were the most: percentiles to 0.1 %, the same counts."""
-    monkeypatch.setattr(study_module, "EXACT_CASES", 10_000)
+    monkeypatch.setattr(dispersion, "EXACT_CASES", 10_000)
     counted = run(Results(a_study(), MANY), threads=2)
     assert counted.values is None
     assert not counted.exact

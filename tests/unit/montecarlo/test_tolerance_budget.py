@@ -9,10 +9,9 @@ import pytest
 from support.places import case
 
 import nutdamp
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.outputs import ROWS, vectors
-from nutdamp.dispersion.sensitivity import first_order
-from nutdamp.files.schedule_file import read_plan
+from nutdamp.files.schedules import read_plan
+from nutdamp.montecarlo.statistics import ROWS, first_order, vectors
+from nutdamp.montecarlo.study import study_of
 
 
 def test_the_budget_of_h_is_that_of_real_widths() -> None:

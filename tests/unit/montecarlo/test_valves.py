@@ -12,23 +12,20 @@ from support.builders import channel, spinner
 from support.golden import check_text
 from support.single_case import flown_outputs
 
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.draws import Source
-from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.inputs import list_inputs
-from nutdamp.dispersion.kernel import ClosedForm, Ends
-from nutdamp.dispersion.study import Results, run
 from nutdamp.errors import FaultyFile
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import flown
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Measured, Trapezoid, Valve
-from nutdamp.presentation.tolerance_tables import in_words, size_text
-from nutdamp.schedule import Pulse, Schedule, on_command
-from nutdamp.spacecraft import Requirement, Spacecraft
-from nutdamp.supply import supplied
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.propagation import flown
+from nutdamp.flight.propellant import supplied
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.closed_form import ClosedForm, Ends
+from nutdamp.montecarlo.inputs import Source, list_inputs
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
+from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views.tolerance_tables import in_words, size_text
 
 SLOW = Trapezoid(0.008, 0.012, 0.005, 0.010)
 TABLE = Measured(((0.01, 0.008, 0.011), (0.05, 0.047, 0.036), (0.2, 0.198, 0.11)))

@@ -20,13 +20,14 @@ from support.reference import Motion, coast
 from support.shown import cells, facts, section, sheet, tree
 
 import nutdamp
-from nutdamp import flight, guide
-from nutdamp.comparison import Comparison, compare
-from nutdamp.outcome import spin_phases
-from nutdamp.presentation.page.content import Repeat
-from nutdamp.presentation.page.document import Control
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Disturbance
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import spin_phases
+from nutdamp.page.content import Repeat
+from nutdamp.page.document import Control
+from nutdamp.planning.decision import Comparison, compare
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.model import Disturbance
+from nutdamp.views import guide
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -105,10 +106,10 @@ def test_the_spin_phase_is_the_integral_of_the_spin() -> None:
     """Against Euler's equations by DOP853, with three moments and a torque about axis 3."""
     body = nutdamp.example().replace(disturbances=(Disturbance(0.0, 0.4),), dispersions=None)
     times = np.array([0.0, 3.0, 11.0, 40.0])
-    phases = spin_phases(flight.flown(body, nutdamp.plan(body, "none").pulses, 41.0), times)
+    phases = spin_phases(propagation.flown(body, nutdamp.plan(body, "none").pulses, 41.0), times)
     assert phases == pytest.approx(body.spin * times + 0.5 * 0.4 / body.inertia.C * times**2, rel=1e-12)
     uneven = nutdamp.load(ACE)
-    made = flight.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
+    made = propagation.flown(uneven, nutdamp.plan(uneven, "none").pulses, 61.0)
     grid = np.linspace(0.0, 60.0, 6001)
     motions = coast(made.moments, Motion(uneven.omega0, np.eye(3)), np.zeros(3), grid[1:])
     spins = np.array([uneven.spin, *(one.rates[2] for one in motions)])

@@ -14,16 +14,15 @@ from support.process import Run
 from support.shown import section, sheet, tree
 from support.spinners import FILE
 
-from nutdamp import planning
-from nutdamp.comparison import compare
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.milestones import CASES, even, first_pulses, milestones
-from nutdamp.dispersion.study import Results, run
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.flight import flown
+from nutdamp.files.reader import load_spacecraft, read_spacecraft
+from nutdamp.flight.propagation import flown
+from nutdamp.montecarlo.checkpoints import CASES, even, first_pulses, milestones
+from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.page.content import _reading
 from nutdamp.physics import attitude
-from nutdamp.presentation.page.content import _reading
-from nutdamp.spacecraft import Goal, Spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import compare
+from nutdamp.spacecraft.model import Goal, Spacecraft
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

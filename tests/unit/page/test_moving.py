@@ -23,17 +23,17 @@ from support.places import case
 from support.process import Run
 from support.shown import WIDE, compared_text, tree
 
-from nutdamp import flight, planning
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import Plan
-from nutdamp.presentation.page import moving
-from nutdamp.presentation.page.document import Section
-from nutdamp.presentation.page.html import page_html
-from nutdamp.presentation.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
-from nutdamp.presentation.page.scales import EDGES, LEAD, strip_of
-from nutdamp.schedule import Schedule
-from nutdamp.spacecraft import Limits, Requirement
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.page import moving
+from nutdamp.page.document import Section
+from nutdamp.page.html import page_html
+from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
+from nutdamp.page.scales import EDGES, LEAD, strip_of
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Limits, Requirement
+from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -245,7 +245,7 @@ def test_sun_and_cones_of_the_file_are_on_the_globe(run: Run) -> None:
 @pytest.mark.parametrize("degrees", [0.5, 50.0])
 def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
     body = replace(WIDE, requirement=Requirement(nutation=math.radians(degrees)))
-    made = flight.flown(body, planning.plan(body, "two-pulse").pulses, 20.0)
+    made = propagation.flown(body, planning.plan(body, "two-pulse").pulses, 20.0)
     strip, (low, high) = strip_of(made, made.sampled(200, 20.0), 20.0)
     assert (low < degrees < high) == (strip.required is not None) == (degrees < 1.0)
     assert strip.outside == ("" if degrees < 1.0 else "50 deg")
@@ -253,7 +253,7 @@ def test_the_strip_says_where_the_required_nutation_is(degrees: float) -> None:
 
 def test_the_strip_has_the_times_without_firings() -> None:
     body = replace(WIDE, limits=Limits(earliest=2.0, blackout=((5.0, 7.0), (19.0, 25.0)), horizon=60.0))
-    made = flight.flown(body, Schedule(), 20.0)
+    made = propagation.flown(body, Schedule(), 20.0)
     strip, _ = strip_of(made, made.sampled(200, 20.0), 20.0)
     ends = [2000.0 * (LEAD + (1.0 - LEAD) * time / 20.0) for time in (0.0, 2.0, 5.0, 7.0, 19.0, 20.0)]
     for shown, first, last in zip(strip.closed, ends[::2], ends[1::2], strict=True):

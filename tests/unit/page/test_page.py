@@ -18,19 +18,17 @@ from support.pages import plain_page
 from support.process import Run
 from support.shown import cells, section, sheet, tree
 
-from nutdamp.comparison import Comparison, compare
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.study import Results, run
-from nutdamp.files.examples import example_text
-from nutdamp.files.plan_json import comparison_json
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.library.studies import trade
-from nutdamp.presentation.figures import style
-from nutdamp.presentation.page.content import Repeat, report_page
-from nutdamp.presentation.page.craft import spacecraft_facts
-from nutdamp.presentation.page.document import Prose
-from nutdamp.presentation.page.html import block_html, number_in, page_html
-from nutdamp.schemes import CLASSIC
+from nutdamp.api import trade
+from nutdamp.figures import style
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.craft import spacecraft_facts
+from nutdamp.page.document import Prose
+from nutdamp.page.html import block_html, number_in, page_html
+from nutdamp.planning.decision import Comparison, compare
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.views.plan_json import comparison_json
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -165,7 +163,7 @@ def test_pictures_are_inside_and_described() -> None:
 
 
 def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
-    css = (places.ROOT / "nutdamp" / "presentation" / "page" / "page.css").read_text(encoding="utf-8")
+    css = (places.ROOT / "nutdamp" / "page" / "page.css").read_text(encoding="utf-8")
     used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED)
     assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {colour.lower() for colour in used}
 

@@ -14,7 +14,8 @@ from support.cases import spread
 from support.reference import Array
 from support.spinning import EPS, about, spinners
 
-from nutdamp.physics import attitude, cones
+from nutdamp.physics import attitude
+from nutdamp.physics import body as rigid_body
 
 FLOWN = 1e-11
 """rad; what DOP853 at 1e-13 a step adds up over some tens of radians."""
@@ -39,7 +40,7 @@ def quaternion_of(axis: Array, angle: float) -> Array:
 
 def start_of(A: float, C: float, theta: float, spin: float) -> tuple[complex, reference.Motion]:
     """A motion with nutation θ, in a frame that is not N."""
-    omega = cmath.rect(cones.transverse_rate(A, C, theta, spin), 2.1)
+    omega = cmath.rect(rigid_body.transverse_rate(A, C, theta, spin), 2.1)
     return omega, reference.Motion(reference.vector(omega.real, omega.imag, spin), about((1, -2, 0.5), 1.2))
 
 
@@ -111,7 +112,7 @@ def test_frame_n(A: float, C: float, spin: float) -> None:
     sense = np.array([0.0, 0.0, math.copysign(1.0, spin)])
     for theta in (1e-12, 1e-9, 0.2, math.radians(89)):
         for phase in (0.0, 0.7, -2.0, math.pi):
-            omega = cmath.rect(cones.transverse_rate(A, C, theta, spin), phase)
+            omega = cmath.rect(rigid_body.transverse_rate(A, C, theta, spin), phase)
             quaternion = attitude.frame_n(A, C, omega, spin)
             rates = reference.vector(omega.real, omega.imag, spin)
             h = attitude.rotate(quaternion, np.array([A, A, C]) * rates)
@@ -144,38 +145,38 @@ def test_magnus_18_19_20_are_the_angles_between_the_vectors(
 ) -> None:
     """And λ = θ - μ, with its sign: negative for oblate bodies; relatively exact at small angles too."""
     A, C = body
-    size = cones.transverse_rate(A, C, theta, spin)
+    size = rigid_body.transverse_rate(A, C, theta, spin)
     omega = cmath.rect(size, phase)
     rates, axis = reference.vector(omega.real, omega.imag, spin), reference.vector(0, 0, math.copysign(1, spin))
     h, body_cone, space_cone = (
         np.array([A, A, C]) * rates,
-        cones.body_cone(size, spin),
-        cones.space_cone(A, C, size, spin),
+        rigid_body.body_cone(size, spin),
+        rigid_body.space_cone(A, C, size, spin),
     )
-    assert cones.nutation_angle(A, C, size, spin) == pytest.approx(reference.angle(h, axis), abs=4 * EPS)
+    assert rigid_body.nutation_angle(A, C, size, spin) == pytest.approx(reference.angle(h, axis), abs=4 * EPS)
     assert body_cone == pytest.approx(reference.angle(rates, axis), abs=4 * EPS)
     assert space_cone == pytest.approx(math.copysign(reference.angle(rates, h), A - C), abs=4 * EPS)
     assert space_cone + body_cone == pytest.approx(theta, rel=8 * EPS)
     # tan θ stretches the rounding of θ by 1/cos θ, which arctan undoes.
-    assert cones.nutation_angle(A, C, size, spin) == pytest.approx(theta, rel=4 * EPS)
+    assert rigid_body.nutation_angle(A, C, size, spin) == pytest.approx(theta, rel=4 * EPS)
 
 
 def test_limits_of_the_cones_and_of_arrays() -> None:
     for spin in (3.0, -3.0):
-        assert cones.nutation_angle(120.0, 80.0, 0.0, spin) == cones.space_cone(120.0, 80.0, 0.0, spin) == 0.0
-        assert cones.nutation_angle(120.0, 80.0, 1.0, 0.0) == 0.5 * math.pi
-        assert cones.space_cone(100.0, 100.0, 1.0, spin) == 0.0  # a sphere: ω along H
+        assert rigid_body.nutation_angle(120.0, 80.0, 0.0, spin) == rigid_body.space_cone(120.0, 80.0, 0.0, spin) == 0.0
+        assert rigid_body.nutation_angle(120.0, 80.0, 1.0, 0.0) == 0.5 * math.pi
+        assert rigid_body.space_cone(100.0, 100.0, 1.0, spin) == 0.0  # a sphere: ω along H
     omega, spins = np.array([0.0, 0.1, 2.0]), np.array([3.0, -3.0, 0.5])
     pairs = list(zip(omega.tolist(), spins.tolist(), strict=True))
-    assert cones.body_cone(omega, spins).tolist() == [cones.body_cone(*pair) for pair in pairs]
-    for cone in (cones.nutation_angle, cones.space_cone):
+    assert rigid_body.body_cone(omega, spins).tolist() == [rigid_body.body_cone(*pair) for pair in pairs]
+    for cone in (rigid_body.nutation_angle, rigid_body.space_cone):
         assert cone(120.0, 80.0, omega, spins).tolist() == [cone(120.0, 80.0, *pair) for pair in pairs]
 
 
 @spinners
 def test_magnus_12_omega_is_back_in_the_body_after_t_omega(A: float, C: float, spin: float) -> None:
     """And has gone a quarter turn, against the sign of aω3, after T_ω/4; a sphere has no such period."""
-    period = cones.body_period(A, C, spin)
+    period = rigid_body.body_period(A, C, spin)
     if A == C:
         assert period == math.inf
         return
@@ -189,13 +190,13 @@ def test_magnus_12_omega_is_back_in_the_body_after_t_omega(A: float, C: float, s
 @spinners
 def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: float, C: float, spin: float) -> None:
     """On its cone about H: half a turn after π/ω_n, back after 2π/ω_n."""
-    size, sense = cones.transverse_rate(A, C, math.radians(40), spin), math.copysign(1, spin)
+    size, sense = rigid_body.transverse_rate(A, C, math.radians(40), spin), math.copysign(1, spin)
     moments, rates = (A, A, C), reference.vector(size, 0.0, spin)
     start = reference.Motion(rates, reference.frame_n(moments, rates))
-    half = cones.half_turn(A, C, size, spin)
-    assert cones.inertial_period(A, C, size, spin) == pytest.approx(2 * half, rel=2 * EPS)
+    half = rigid_body.half_turn(A, C, size, spin)
+    assert rigid_body.inertial_period(A, C, size, spin) == pytest.approx(2 * half, rel=2 * EPS)
     h = float(np.linalg.norm(reference.momentum(moments, start)))
-    assert cones.inertial_rate(A, C, size, spin) == pytest.approx(h / A, rel=4 * EPS)
+    assert rigid_body.inertial_rate(A, C, size, spin) == pytest.approx(h / A, rel=4 * EPS)
     opposite, back = reference.coast(moments, start, np.zeros(3), half * np.array([1.0, 2.0]))
     x, y, z = sense * start.rotation[:, 2]
     assert sense * opposite.rotation[:, 2] == pytest.approx([-x, -y, z], abs=1e-11)

@@ -14,7 +14,7 @@ from support.cases import deep, spread
 from support.reference import Array, Motion, vector
 from support.spinning import EPS, Triple
 
-from nutdamp.physics import attitude, energy_sink, rigid
+from nutdamp.physics import attitude, energy_sink, taylor
 
 QUATERNION = vector(0.5, -0.1, 0.7, 0.5)  # of length 1
 START = attitude.matrix(QUATERNION)
@@ -176,7 +176,7 @@ def test_a_complex_step_gives_the_derivative_by_time() -> None:
 def test_powered_arcs_agree_with_dop853(moments: Triple, spin: float, torque: Triple) -> None:
     """And those without torque with the closed form, which has two equal moments."""
     rates0, growth = vector(0.5, -0.3, spin), math.copysign(0.05, moments[0] - 100)
-    pieces = rigid.integrate(moments, vector(*torque), rates0, QUATERNION, 0.0, 6.0, rigid.Forcing(growth=growth))
+    pieces = taylor.integrate(moments, vector(*torque), rates0, QUATERNION, 0.0, 6.0, taylor.Forcing(growth=growth))
     rates, turned = pieces[-1].final
     (expected,) = reference.sinking(moments, Motion(rates0, START), vector(*torque), np.array([6.0]), growth)
     assert rates == pytest.approx(expected.rates, abs=2e-12)
@@ -193,7 +193,9 @@ def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, gr
     rates, turned, energies = vector(0.4, 0.3, 2.0), QUATERNION, []
     h = attitude.rotate(turned, rates * moments)
     for start in np.arange(0.0, 200.0, 10.0).tolist():
-        pieces = rigid.integrate(moments, np.zeros(3), rates, turned, start, start + 10.0, rigid.Forcing(growth=growth))
+        pieces = taylor.integrate(
+            moments, np.zeros(3), rates, turned, start, start + 10.0, taylor.Forcing(growth=growth)
+        )
         rates, turned = pieces[-1].final
         energies.append(reference.energy(moments, rates))
         assert attitude.rotate(turned, rates * moments) == pytest.approx(h, abs=1e-10)
@@ -204,7 +206,7 @@ def test_three_moments_lose_energy_and_end_about_the_largest(moments: Triple, gr
 @pytest.mark.parametrize("aside", [0.0, 1e-12, 1e-6])
 def test_a_torque_through_rest_takes_few_steps(aside: float) -> None:
     """H passes zero, or nearly: the direction of H turns about at once there, and the series must not stop."""
-    torque, rates, forcing = vector(aside, 0, -8), vector(0, 0, 1), rigid.Forcing(growth=0.05)
-    pieces = rigid.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
+    torque, rates, forcing = vector(aside, 0, -8), vector(0, 0, 1), taylor.Forcing(growth=0.05)
+    pieces = taylor.integrate((120.0, 120.0, 80.0), torque, rates, QUATERNION, 0.0, 20.0, forcing)
     assert len(pieces) < 200
     assert pieces[-1].final[0][2] == pytest.approx(-1.0, abs=1e-9)

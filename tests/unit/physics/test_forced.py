@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support import reference
 from support.spinning import BODIES, driven, plain_spinners, spinners, turning
 
-from nutdamp.physics import forced
+from nutdamp.physics import response
 
 PROLATE = (120.0, 80.0, 3.0)
 RATE = (120.0 - 80.0) / 120.0 * 3.0
@@ -28,7 +28,7 @@ def rotating(
     times: list[float] | np.ndarray, omega0: complex, A: float, C: float, spin: float, *torques: tuple[complex, float]
 ) -> np.ndarray:
     sizes, rates = (np.array(part) for part in zip(*torques, strict=True))
-    return forced.rotating_torques(np.array(times), omega0, spin, A, C, sizes.astype(complex), rates)
+    return response.rotating_torques(np.array(times), omega0, spin, A, C, sizes.astype(complex), rates)
 
 
 @pytest.mark.parametrize("spin", [3.0, -3.0, 0.0])
@@ -41,14 +41,14 @@ def test_stepwise_torques_8_9_10(A: float, C: float, spin: float) -> None:
     for (begin, end), torque in zip(itertools.pairwise(edges.tolist()), torques, strict=True):
         motions += reference.coast((A, A, C), motions[-1], torque, np.array([0.5, 1.0]) * (end - begin))
         times += [0.5 * (begin + end), end]
-    omega, spins = forced.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
+    omega, spins = response.stepwise_torque(np.array(times), 0.1 - 0.2j, spin, A, C, edges, torques)
     expected = np.array([motion.rates for motion in motions])
     assert np.abs(np.column_stack([omega.real, omega.imag, spins]) - expected).max() < 1e-11
 
 
 @given(st.floats(-30, 30), st.floats(-5, 5) | st.sampled_from([0.0, 1e-9, -1e-6, 1e-3]), st.floats(0.01, 15))
 def test_phase_integral_by_quadrature(slope: float, bend: float, length: float) -> None:
-    integral = forced.phase_integral(np.array([slope]), np.array([bend]), np.array([length]))[0]
+    integral = response.phase_integral(np.array([slope]), np.array([bend]), np.array([length]))[0]
     edges = np.linspace(0.0, length, 400)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     half = 0.5 * (edges[1] - edges[0])
@@ -61,11 +61,11 @@ def test_phase_integral_by_quadrature(slope: float, bend: float, length: float) 
 def test_constant_torque_11_circles_the_centre_of_its_pole_cone() -> None:
     A, C, spin = PROLATE
     omega0, torque = 0.05 + 0.1j, 5.0 - 2.0j
-    centre = forced.steady_response(A, C, spin, torque)
+    centre = response.steady_response(A, C, spin, torque)
     # Magnus' centre: ω1P = M2/((A-C)ω3), ω2P = -M1/((A-C)ω3)
     assert centre == pytest.approx(complex(torque.imag, -torque.real) / ((A - C) * spin), rel=1e-14)
     times = np.linspace(0.0, 12.0, 40)
-    omega, _ = forced.stepwise_torque(
+    omega, _ = response.stepwise_torque(
         times, omega0, spin, A, C, np.array([0.0, 12.0]), np.array([[torque.real, torque.imag, 0.0]])
     )
     assert np.abs(omega - centre) == pytest.approx(abs(omega0 - centre), rel=1e-12)
@@ -75,7 +75,7 @@ def test_constant_torque_11_circles_the_centre_of_its_pole_cone() -> None:
 @plain_spinners
 def test_permanent_rotation_13_stays_and_has_the_euler_angles_14(A: float, C: float, spin: float) -> None:
     torque = 5.0 - 2.0j
-    steady = forced.permanent_rotation(A, C, spin, torque)
+    steady = response.permanent_rotation(A, C, spin, torque)
     start = start_of(steady.omega, spin)
     (later,) = reference.coast((A, A, C), start, reference.vector(5.0, -2.0, 0.0), np.array([7.0]))
     assert later.rates == pytest.approx(start.rates, abs=1e-13)
@@ -110,10 +110,10 @@ def test_the_resonant_torque_reaches_a_cone_when_it_says() -> None:
     A, C, spin = PROLATE
     torque = 0.5 + 0.2j
     for start in (0.0, 0.03 - 0.02j, -0.05 + 0.01j):
-        time = forced.resonant_time(A, C, start, spin, torque, math.radians(4.0))
+        time = response.resonant_time(A, C, start, spin, torque, math.radians(4.0))
         (omega,) = rotating([time], start, A, C, spin, (torque, -RATE))
         assert math.atan2(A * abs(omega), C * spin) == pytest.approx(math.radians(4.0), rel=1e-12)
-    assert forced.resonant_time(A, C, 1.0, spin, torque, 0.01) == 0.0
+    assert response.resonant_time(A, C, 1.0, spin, torque, 0.01) == 0.0
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, 2.5])
@@ -132,8 +132,8 @@ def test_26_opposite_rotation_and_its_straight_pole_curves(turn: float) -> None:
 def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
     A, C, spin, torque = 100.0, 10.0, 3.0, 0.4
     forced_term = 1j * torque / (A * spin) * A / C
-    assert forced.steady_response(A, C, spin, torque, -spin) == pytest.approx(forced_term, rel=1e-13)
-    largest, period = forced.beat(A, C, spin, torque, -spin)
+    assert response.steady_response(A, C, spin, torque, -spin) == pytest.approx(forced_term, rel=1e-13)
+    largest, period = response.beat(A, C, spin, torque, -spin)
     omega = rotating(np.linspace(0.0, period, 2001), 0.0, A, C, spin, (torque, -spin))
     assert np.abs(omega).max() == pytest.approx(largest, rel=1e-6)
     assert abs(omega[-1]) < 1e-12 * largest
@@ -141,16 +141,16 @@ def test_27_nearly_space_fixed_torque_and_its_beat() -> None:
 
 
 def test_a_sphere_and_a_resonance_have_no_steady_response() -> None:
-    assert math.isinf(abs(forced.steady_response(100.0, 100.0, 3.0, 1.0)))
-    assert forced.beat(100.0, 100.0, 3.0, 1.0, 0.0) == (math.inf, math.inf)
-    assert forced.permanent_rotation(100.0, 100.0, 3.0, 1.0).theta == pytest.approx(math.pi / 2)
+    assert math.isinf(abs(response.steady_response(100.0, 100.0, 3.0, 1.0)))
+    assert response.beat(100.0, 100.0, 3.0, 1.0, 0.0) == (math.inf, math.inf)
+    assert response.permanent_rotation(100.0, 100.0, 3.0, 1.0).theta == pytest.approx(math.pi / 2)
 
 
 @pytest.mark.parametrize("torque", [2.0 + 0.0j, -1.0 + 3.0j])
 @plain_spinners
 def test_precession_k14_k15_is_steady(A: float, C: float, spin: float, torque: complex) -> None:
     """Fixed in the despun frame (turning at -ω3 in the body) or in the body: there ω stands still, once steady."""
-    despun, body = forced.steady_response(A, C, spin, torque, -spin), forced.steady_response(A, C, spin, torque)
+    despun, body = response.steady_response(A, C, spin, torque, -spin), response.steady_response(A, C, spin, torque)
     assert despun == pytest.approx(1j * torque / (C * spin))
     assert body == pytest.approx(-1j * torque / ((A - C) * spin))
     times = np.linspace(0.0, 5.0, 11)

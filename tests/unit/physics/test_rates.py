@@ -15,7 +15,8 @@ from support.builders import within
 from support.cases import spread
 from support.spinning import BODIES, EPS, plain_spinners, spinners
 
-from nutdamp.physics import cones, damping, rates
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics import response
 
 FLOWN = 1e-11
 """rad/s, and half of it in rad; what DOP853 at 1e-13 a step adds up over the flights here, at rates of a few rad/s."""
@@ -25,7 +26,7 @@ def summed(A: float, C: float, start: reference.Array, kicks: list[reference.Kic
     """Rates (n, 3) by the impulse sum."""
     impulses = np.array([kick.impulse for kick in kicks]).reshape(-1, 3)
     fired, across = np.array([kick.t for kick in kicks]), impulses[:, 0] + 1j * impulses[:, 1]
-    omega, spin = rates.impulse_sum(
+    omega, spin = response.impulse_sum(
         np.array(until), complex(start[0], start[1]), float(start[2]), A, C, fired, across, impulses[:, 2]
     )
     return np.column_stack([omega.real, omega.imag, spin])
@@ -61,7 +62,7 @@ def test_a_pulse_acts_as_its_impulse_times_the_width_factor_at_its_centre(
 ) -> None:
     """M τ sinc(aω3τ/2) at any width and angle; with axial torque half the width is turned at the new spin."""
     start, torque = reference.vector(0.3, -0.2, spin), reference.vector(6.0, 9.0, C * spin_rate)
-    factor = rates.width_factor((A - C) / A, spin, spin_rate, on_time)
+    factor = response.width_factor((A - C) / A, spin, spin_rate, on_time)
     if not spin_rate:
         half = 0.5 * (A - C) / A * spin * on_time
         assert factor == pytest.approx(math.sin(half) / half if half else 1.0, abs=2 * EPS)
@@ -84,7 +85,7 @@ def test_width_factor_by_quadrature(a: float, spin: float, spin_rate: float, on_
         quad(lambda s, part=part: part(phase(s)), -half, half, epsabs=1e-13, epsrel=1e-13, limit=500)[0] / on_time
         for part in (math.cos, math.sin)
     )
-    factor = rates.width_factor(a, spin, spin_rate, on_time)
+    factor = response.width_factor(a, spin, spin_rate, on_time)
     assert factor == pytest.approx(complex(real, imaginary), abs=1e-12)
     assert abs(factor) <= 1.0 + 1e-13
 
@@ -96,9 +97,9 @@ def test_width_factor_of_long_pulses_and_where_the_axial_torque_vanishes() -> No
     weights = np.array([1.0, *([4.0, 2.0] * 199_999), 4.0, 1.0]) / (3.0 * 400_000)
     for spin_rate in (0.05, -0.2):
         values = np.exp(1j * a * (spin * s + 0.5 * spin_rate * (s + 0.5 * on_time) ** 2))
-        assert rates.width_factor(a, spin, spin_rate, on_time) == pytest.approx(complex(weights @ values), abs=1e-12)
-    plain = rates.width_factor(0.5, 3.0, 0.0, 1.5)
-    assert rates.width_factor(0.5, 3.0, 1e-14, 1.5) == pytest.approx(plain, abs=1e-13)
+        assert response.width_factor(a, spin, spin_rate, on_time) == pytest.approx(complex(weights @ values), abs=1e-12)
+    plain = response.width_factor(0.5, 3.0, 0.0, 1.5)
+    assert response.width_factor(0.5, 3.0, 1e-14, 1.5) == pytest.approx(plain, abs=1e-13)
 
 
 # --- on-time of one pulse --------------------------------------------------------------------------------------------
@@ -108,7 +109,7 @@ def test_width_factor_of_long_pulses_and_where_the_axial_torque_vanishes() -> No
 def test_one_pulse_of_the_on_time_of_the_formula_leaves_no_omega(A: float, C: float, spin: float) -> None:
     """τ = (2/(aω3)) asin(aω3 A|ω|/(2M)), centred where ω opposes the torque (US patent 4504032)."""
     a, size, torque = (A - C) / A, 0.2, 40.0
-    on_time = rates.on_time_for(A * size, torque, a, spin, 0.0, math.inf)
+    on_time = response.on_time_for(A * size, torque, a, spin, 0.0, math.inf)
     assert on_time is not None
     if a:
         assert on_time == pytest.approx(2 / (a * spin) * math.asin(a * spin * A * size / (2 * torque)), rel=4 * EPS)
@@ -125,21 +126,21 @@ def test_limits_of_on_times() -> None:
     For a to zero it is impulse over torque, and asin x / x = 1 + x²/6 …: nothing cancels.
     """
     for a in (1e-3, -1e-6, 1e-9, -1e-12, 1e-300, 0.0):
-        on_time, x = rates.on_time_for(12.0, 4.0, a, 2.0, 0.0, math.inf), 0.5 * a * 2.0 * 3.0
+        on_time, x = response.on_time_for(12.0, 4.0, a, 2.0, 0.0, math.inf), 0.5 * a * 2.0 * 3.0
         assert on_time == pytest.approx(3.0 * (1 + x * x / 6), rel=max(x**4, 4 * EPS))
     most = (3.0, 0.5, -2.0, 0.0, math.inf)
-    assert rates.on_time_for(6.0 * (1 - 1e-12), *most) == pytest.approx(math.pi, rel=1e-5)
-    assert rates.on_time_for(6.0 * (1 + 1e-12), *most) is None
+    assert response.on_time_for(6.0 * (1 - 1e-12), *most) == pytest.approx(math.pi, rel=1e-5)
+    assert response.on_time_for(6.0 * (1 + 1e-12), *most) is None
     for spin_rate, longest, on_time in ((0.0, 10.0, 10.0), (0.0, 9.999, None), (0.1, 9.999, None)):
-        assert rates.on_time_for(10.0, 1.0, 0.0, 1.0, spin_rate, longest) == on_time
+        assert response.on_time_for(10.0, 1.0, 0.0, 1.0, spin_rate, longest) == on_time
     for spin_rate in (0.0, 0.2):
-        assert rates.on_time_for(0.0, 5.0, 0.3, 1.0, spin_rate, math.inf) == 0.0
+        assert response.on_time_for(0.0, 5.0, 0.3, 1.0, spin_rate, math.inf) == 0.0
 
 
 def assert_gives(impulse: float, torque: float, a: float, spin: float, spin_rate: float) -> None:
-    on_time = rates.on_time_for(impulse, torque, a, spin, spin_rate, math.inf)
+    on_time = response.on_time_for(impulse, torque, a, spin, spin_rate, math.inf)
     assert on_time is not None
-    acts = torque * on_time * abs(rates.width_factor(a, spin, spin_rate, on_time))
+    acts = torque * on_time * abs(response.width_factor(a, spin, spin_rate, on_time))
     assert acts == pytest.approx(impulse, rel=1e-13)
 
 
@@ -166,7 +167,7 @@ def test_on_time_where_the_curve_bends() -> None:
 def test_on_time_of_a_near_sphere_with_axial_torque_takes_no_time_to_find() -> None:
     """The search begins with the pulse without axial torque, not with one of 10⁹ turns of the body."""
     with within(100_000):
-        on_time = rates.on_time_for(10.0, 5.0, 1e-9, 3.0, 0.01, math.inf)
+        on_time = response.on_time_for(10.0, 5.0, 1e-9, 3.0, 0.01, math.inf)
     assert on_time == pytest.approx(2.0, rel=1e-12)
 
 
@@ -181,7 +182,7 @@ def test_the_search_for_an_on_time_ends(
 ) -> None:
     """Also where the on-time without axial torque is too small for a number: it was then stretched for ever."""
     with within(3_000_000):
-        on_time = rates.on_time_for(impulse, torque or 1.0, a, spin, spin_rate, longest or math.inf)
+        on_time = response.on_time_for(impulse, torque or 1.0, a, spin, spin_rate, longest or math.inf)
     assert on_time is None or 0.0 <= on_time <= (longest or math.inf)
 
 
@@ -217,12 +218,12 @@ def after_two(
 def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: float) -> None:
     """One impulse against ω takes out all and moves H by θ; two leave H where it was, for not a gram more."""
     theta = math.radians(degrees)
-    size = cones.transverse_rate(A, C, theta, spin)
+    size = rigid_body.transverse_rate(A, C, theta, spin)
     omega = cmath.rect(size, 0.7)
     nutation, shift, _ = after(A, C, spin, omega, (0.0, -A * omega))
     assert nutation < 2 * EPS * max(1.0, math.tan(theta))  # the rounding of A|ω|, as an angle
     assert shift == pytest.approx(theta, abs=8 * EPS)
-    halves = damping.half_pulses(A, C, size, spin)
+    halves = rigid_body.half_pulses(A, C, size, spin)
     assert halves.first + halves.second == pytest.approx(A * size, rel=2 * EPS)
     assert min(halves) > 0.0
     assert max(after_two(A, C, spin, omega, *halves)) < 2 * FLOWN
@@ -231,8 +232,8 @@ def test_magnus_21_and_22_made_exact(A: float, C: float, spin: float, degrees: f
 @pytest.mark.parametrize("half_turns", [3, 9])
 @pytest.mark.parametrize(("A", "C"), BODIES[:2])
 def test_the_second_pulse_may_come_any_odd_number_of_half_turns_later(A: float, C: float, half_turns: int) -> None:
-    size = cones.transverse_rate(A, C, math.radians(25), -2.0)
-    first, second, wait = damping.half_pulses(A, C, size, -2.0)
+    size = rigid_body.transverse_rate(A, C, math.radians(25), -2.0)
+    first, second, wait = rigid_body.half_pulses(A, C, size, -2.0)
     assert max(after_two(A, C, -2.0, size + 0j, first, second, half_turns * wait)) < 2 * FLOWN
 
 
@@ -245,8 +246,8 @@ def test_magnus_22_as_printed_displaces_h_by_the_figures_of_the_physics_sheet(
     A: float, C: float, spin: float, degrees: float, before: float, after_first: float, approximation: float
 ) -> None:
     """Equal halves, with Δt from the ω before or after the first, or πA/(Cω3): to the last digit, for every body."""
-    size = cones.transverse_rate(A, C, math.radians(degrees), spin)
-    printed = damping.half_pulses_as_printed(A, C, size, spin)
+    size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
+    printed = rigid_body.half_pulses_as_printed(A, C, size, spin)
     assert printed.first == printed.second == 0.5 * A * size
     halfway, small = math.pi / math.hypot(0.5 * size, C / A * spin), math.pi * A / (C * abs(spin))
     for wait, figure in ((printed.wait, before), (halfway, after_first), (small, approximation)):
@@ -260,8 +261,8 @@ def test_magnus_22_as_printed_displaces_h_by_the_figures_of_the_physics_sheet(
 @spinners
 def test_two_actuators_at_the_mounting_angle_give_both_pulses(A: float, C: float, spin: float, degrees: float) -> None:
     """The second actuator stands along ω, either way, as the axis has gone half a turn; at small angles -σπA/C."""
-    size = cones.transverse_rate(A, C, math.radians(degrees), spin)
-    halves, angle = damping.half_pulses(A, C, size, spin), damping.mounting_angle(A, C, size, spin)
+    size = rigid_body.transverse_rate(A, C, math.radians(degrees), spin)
+    halves, angle = rigid_body.half_pulses(A, C, size, spin), rigid_body.mounting_angle(A, C, size, spin)
     assert 0.0 <= angle < math.pi
     _, _, omega = after(A, C, spin, complex(size), (0.0, complex(-halves.first)), (halves.wait, 0j))
     assert abs((omega * cmath.exp(-1j * angle)).imag) < 2 * FLOWN * max(size, 1.0)
@@ -292,7 +293,7 @@ def test_sign_table_of_magnus(A: float, C: float, spin: float, thruster: int) ->
     direction = complex(math.copysign(1, thruster)) * (1 if abs(thruster) == 1 else 1j)
     damps, pumps = (moment(A, C, spin, thruster, wrong == ((A - C) * spin > 0)) for wrong in (False, True))
     for omega, phase, change in ((damps, 0.0, -3.0 / A), (pumps, math.pi, 3.0 / A)):
-        assert abs(damping.phase_to_oppose(omega, direction)) == phase
+        assert abs(rigid_body.phase_to_oppose(omega, direction)) == phase
         _, _, left = after(A, C, spin, omega, (0.0, 3.0 * direction))
         assert abs(left) == pytest.approx(abs(omega) + change, rel=4 * EPS)
 
@@ -302,5 +303,5 @@ def test_sign_table_of_magnus(A: float, C: float, spin: float, thruster: int) ->
 def test_phase_to_oppose_is_the_turn_left_to_the_opposite_of_the_torque(phase: float, torque: complex) -> None:
     """ω turns at -aω3: after the time phase/(aω3) it stands against the torque."""
     omega = cmath.rect(0.3, phase)
-    then = omega * cmath.exp(-1j * damping.phase_to_oppose(omega, torque))
+    then = omega * cmath.exp(-1j * rigid_body.phase_to_oppose(omega, torque))
     assert then / abs(then) == pytest.approx(-torque / abs(torque), abs=8 * EPS)

@@ -14,9 +14,8 @@ from support.reference import Array, vector
 from support.spinning import EPS, Triple, about, driven, turning
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude, rigid, rigid_cases
-from nutdamp.physics import driven as symmetric
-from nutdamp.physics.rigid import Forcing
+from nutdamp.physics import attitude, batch, taylor
+from nutdamp.physics.taylor import Forcing
 
 FLOWN = 1e-11
 """rad, rad/s; what DOP853 at 1e-13 a step adds up over some tens of radians."""
@@ -38,7 +37,7 @@ CASES = {
 
 def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float) -> tuple[Array, Array]:
     """Rates and quaternion at the end of a flight from `START`."""
-    return rigid.integrate(moments, torque, rates, START, begin, end)[-1].final
+    return taylor.integrate(moments, torque, rates, START, begin, end)[-1].final
 
 
 @spread("turns", [False, True], quick=2, ids=["fixed", "turning"])
@@ -46,7 +45,7 @@ def last(moments: Triple, torque: Array, rates: Array, begin: float, end: float)
 def test_motion_under_fixed_and_turning_torques(moments: Triple, torque: Triple, rates: Triple, turns: bool) -> None:
     """At the ends of the pieces, which join without gap or jump, and within them."""
     times, acting = np.linspace(1.3, 10.0, 11), turning(*TURNING) if turns else lambda _: (0.0, 0.0, 0.0)
-    pieces = rigid.integrate(
+    pieces = taylor.integrate(
         moments, np.array(torque), np.array(rates), START, 1.3, 10.0, Forcing(TURNING if turns else ())
     )
     assert (len(pieces) > 3, pieces[0].start) == (True, 1.3)
@@ -99,7 +98,7 @@ def test_units_do_not_matter(mass: float, time: float) -> None:
 def test_a_late_clock_that_cannot_tell_the_steps_does_not_stop_them() -> None:
     """At 1e17 s a second is less than a rounding; the motion over the 64 s is that of any other time."""
     torque, start = vector(0.3, -0.2, 0.1), vector(0.2, 0.1, 3.0)
-    late, early = (rigid.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
+    late, early = (taylor.integrate((120.0, 100.0, 80.0), torque, start, START, t, t + 64.0) for t in (1e17, 0.0))
     assert len(late) == len(early)
     assert np.concatenate(late[-1].final) == pytest.approx(np.concatenate(early[-1].final), abs=1e-12)
 
@@ -110,7 +109,7 @@ def test_what_cannot_be_integrated_is_refused() -> None:
             last((120.0, 100.0, 80.0), vector(torque, 0, 0), np.ones(3), 0.0, 1e9)
     body, rates = (120.0, 120.0, 80.0), vector(0.1, 0.0, 3.0)
     with refused(Infeasible, "physics.too-many-steps"):
-        rigid.integrate(body, vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
+        taylor.integrate(body, vector(1, 0, 0), rates, START, 0.0, 100.0, most=20)
     with refused(Infeasible, "physics.too-long"):
         last(body, vector(1, 0, 0), rates, 0.0, 1e6)
 
@@ -124,23 +123,23 @@ def test_few_cases_fly_as_each_alone_does(forcing: Forcing) -> None:
     rates, torque = rng.normal(size=(3, count)), 20.0 * rng.normal(size=(3, count))
     now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
     omega, quaternion = rates.copy(), np.repeat(START[:, None], count, axis=1)
-    bodies = rigid_cases.Bodies(moments, np.zeros(3), forcing)
-    rigid_cases.advance(rigid_cases.Stretch(bodies, now, omega, quaternion, torque), duration)
+    bodies = batch.Bodies(moments, np.zeros(3), forcing)
+    batch.advance(batch.Stretch(bodies, now, omega, quaternion, torque), duration)
     for case, (first, second, third) in enumerate(moments.T.tolist()):
         begin, end = float(now[case]), float(now[case] + duration[case])
         body = first, second, third
-        pieces = rigid.integrate(body, torque[:, case], rates[:, case], START, begin, end, forcing)
+        pieces = taylor.integrate(body, torque[:, case], rates[:, case], START, begin, end, forcing)
         alone = np.concatenate(pieces[-1].final)
         assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(alone, abs=1e-12)
 
 
 def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:
     """A sphere at rest, spun up by so much that its last turns are much faster than the first."""
-    drive = symmetric.Drive(np.array([0.0]), np.array([0.3 + 0.1j]), np.array([0.0]))
+    drive = taylor.Drive(np.array([0.0]), np.array([0.3 + 0.1j]), np.array([0.0]))
     rest, none, duration = np.zeros(1, dtype=complex), np.zeros(1), np.array([40.0])
-    steps = list(symmetric.steps(drive, rest, none, none, duration, 1))
-    assert steps[0].duration[0] < 40.0 / symmetric.count_for(drive, rest, none, duration)
+    steps = list(taylor.steps(drive, rest, none, none, duration, 1))
+    assert steps[0].duration[0] < 40.0 / taylor.count_for(drive, rest, none, duration)
     assert sum(len(one.starts) * one.duration[0] for one in steps) == pytest.approx(40.0)
-    turn = symmetric.whole(np.concatenate([one.turn.sum(axis=0) for one in steps], axis=1))
+    turn = taylor.whole(np.concatenate([one.turn.sum(axis=0) for one in steps], axis=1))
     angle = 0.5 * abs(0.3 + 0.1j) * 40.0**2  # about one axis: the turn is that of the angle
     assert turn[0, 0] == pytest.approx(math.cos(0.5 * angle), abs=1e-11)

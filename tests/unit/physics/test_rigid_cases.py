@@ -17,11 +17,10 @@ from support.reference import Array, Kick, Motion, Push
 from support.spinning import Triple, driven, turning
 
 from nutdamp.errors import Infeasible
-from nutdamp.physics import attitude
-from nutdamp.physics import rigid_cases as many
-from nutdamp.physics.axis_watch import AxisWatch
-from nutdamp.physics.rigid import NOTHING, Forcing
-from nutdamp.physics.rigid_cases import Bodies, Pulses, Stretch
+from nutdamp.physics import attitude, batch
+from nutdamp.physics.batch import Bodies, Pulses, Stretch
+from nutdamp.physics.sky import AxisWatch
+from nutdamp.physics.taylor import NOTHING, Forcing
 
 STILL = np.zeros(3)
 
@@ -39,7 +38,7 @@ class Case(NamedTuple):
     pulses: Pulses
 
     def fly(self) -> tuple[Array, Array]:
-        return many.fly(*self)
+        return batch.fly(*self)
 
     def some(self, which: Any) -> Case:
         return Case(self.bodies.some(which), self.rates[:, which], self.quaternion[:, which], self.pulses.some(which))
@@ -149,12 +148,12 @@ def test_no_pulses_and_no_time_and_what_is_given_stays() -> None:
 
 
 def test_blocks_hold_what_single_cases_give_and_the_same_block_the_same_bits() -> None:
-    case = cases(many.BLOCK + 3, on_times=(0.5, 0.0))
+    case = cases(batch.BLOCK + 3, on_times=(0.5, 0.0))
     flown = case.fly()
-    for number in (0, many.BLOCK - 1, many.BLOCK, many.BLOCK + 2):
+    for number in (0, batch.BLOCK - 1, batch.BLOCK, batch.BLOCK + 2):
         for alone, of_many in zip(case.some([number]).fly(), flown, strict=True):
             assert_allclose(alone[:, 0], of_many[:, number], atol=1e-14)
-    case, half = cases(2 * many.BLOCK), slice(many.BLOCK, None)
+    case, half = cases(2 * batch.BLOCK), slice(batch.BLOCK, None)
     for alone, of_many in zip(case.some(half).fly(), case.fly(), strict=True):
         assert_array_equal(alone, of_many[:, half])
 
@@ -222,7 +221,7 @@ def test_a_long_free_coast_is_exact_and_motions_too_long_to_integrate_are_refuse
 
 def test_cosine_and_sine_by_the_half_angle() -> None:
     angles = np.concatenate([np.linspace(-400.0, 400.0, 2001), [0.0, 1e-300, math.pi, math.pi / 2, 1e-9]])
-    assert_allclose(many.cos_sin(angles), (np.cos(angles), np.sin(angles)), atol=1e-15)
+    assert_allclose(batch.cos_sin(angles), (np.cos(angles), np.sin(angles)), atol=1e-15)
 
 
 @pytest.mark.weekly

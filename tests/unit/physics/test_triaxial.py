@@ -17,7 +17,8 @@ from support.cases import deep
 from support.golden import refused
 from support.reference import Array
 
-from nutdamp.physics import attitude, cones, rates, triaxial
+from nutdamp.physics import attitude, response, triaxial
+from nutdamp.physics import body as rigid_body
 
 START = np.array([0.5, -0.5, 0.5, 0.5])
 
@@ -186,7 +187,7 @@ def test_extremes_where_they_are_reached() -> None:
 @pytest.mark.parametrize("axial", [80.0, 160.0, 239.0])
 def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
     first, omega0, times = 120.0, 0.3 - 0.2j, np.linspace(0.0, 50.0, 51)
-    ideal, _ = rates.impulse_sum(times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0))
+    ideal, _ = response.impulse_sum(times, omega0, spin, first, axial, np.zeros(0), np.zeros(0, complex), np.zeros(0))
     arc = attitude.arc(first, axial, START, omega0, spin, times)
     for apart in (1e-6, 1e-9, 1e-12, 0.0):
         moments, rates0 = (first, first * (1.0 + apart), axial), [omega0.real, omega0.imag, spin]
@@ -194,9 +195,9 @@ def test_symmetric_limit_is_continuous(axial: float, spin: float) -> None:
         assert np.abs(track[:, 0] + 1j * track[:, 1] - ideal).max() < 1e-12 + 100 * apart
         assert np.abs(track[:, 2] - spin).max() < 1e-14 + 10 * apart
         assert turned(attitudes, arc) < 1e-12 + 1000 * apart
-        close = pytest.approx(cones.body_period(first, axial, spin), rel=1e-15 + 5 * apart)
+        close = pytest.approx(rigid_body.body_period(first, axial, spin), rel=1e-15 + 5 * apart)
         assert triaxial.nutation_period(moments, rates0) == close
-        angle = cones.nutation_angle(first, axial, abs(omega0), spin)
+        angle = rigid_body.nutation_angle(first, axial, abs(omega0), spin)
         assert extremes(moments, rates0) == pytest.approx((angle, angle), rel=1e-14 + 10 * apart)
         rate = triaxial.body_nutation_rate(moments, spin)
         assert rate == pytest.approx((first - axial) / first * spin, rel=1e-15 + 5 * apart)

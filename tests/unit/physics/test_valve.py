@@ -12,9 +12,8 @@ from scipy.integrate import quad
 from support import reference
 from support.spinning import Triple
 
-from nutdamp.physics import rates
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Measured, Ramp, Trapezoid, Valve, shape_factor, spread
+from nutdamp.physics import response
+from nutdamp.physics.thruster import Cold, Measured, Ramp, Tank, Trapezoid, Valve, shape_factor, spread
 
 TABLE = Measured(((0.02, 0.015, 0.016), (0.05, 0.046, 0.033), (0.1, 0.095, 0.058)))
 PLAIN = Trapezoid(0.008, 0.012, 0.005, 0.010)
@@ -119,7 +118,7 @@ def test_the_shape_factor_of_a_rectangle_is_the_width_factor(turns: Triple) -> N
     for on_time in (1e-4, 0.3, 9.0):
         _, centroid, ramps = Trapezoid().thrust(on_time)
         factor = shape_factor(0.4, 3.0, turns[0], ramps, centroid, *turns[1:])
-        assert factor == pytest.approx(rates.width_factor(0.4, 3.0, turns[0], on_time, *turns[1:]), abs=1e-13)
+        assert factor == pytest.approx(response.width_factor(0.4, 3.0, turns[0], on_time, *turns[1:]), abs=1e-13)
 
 
 def test_cold_pulses_warm_up_and_blowdown_keeps_pressure_times_volume() -> None:

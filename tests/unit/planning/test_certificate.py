@@ -17,13 +17,14 @@ from support.certificate_checker import check
 from support.golden import check_text, refused
 from support.process import Run
 
-from nutdamp.certificate import certificate
 from nutdamp.errors import BadRequest
-from nutdamp.files.certificate_json import certificate_json
-from nutdamp.files.output import json_text
-from nutdamp.planning import plan
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Goal, Limits, Spacecraft, Steerable
+from nutdamp.files.tabular import json_text
+from nutdamp.planning.plan import plan
+from nutdamp.planning.tradeoff import certificate
+from nutdamp.schemes.catalogue import OptimalOptions
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
+from nutdamp.views.certificate_json import certificate_json
 
 WEAK, STRONG = cross(8.0), cross(4_000.0)
 PLAIN, IMPULSE = OptimalOptions(), OptimalOptions(least="impulse")

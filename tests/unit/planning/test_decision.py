@@ -21,20 +21,18 @@ from support.places import case
 from support.process import Run
 
 import nutdamp
-from nutdamp.comparison import Comparison, compare
-from nutdamp.compliance import Part
-from nutdamp.decision import Decision, decide
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.study import Results
-from nutdamp.dispersion.study import run as fly
-from nutdamp.flight import by_impulses
-from nutdamp.outcome import seen_at
-from nutdamp.planning import Plan, plan
-from nutdamp.presentation import decisions, verdicts
-from nutdamp.schedule import Pulse, Schedule
-from nutdamp.schemes import CLASSIC
-from nutdamp.screening import Candidate, Cases, cases_of
-from nutdamp.spacecraft import Goal, Inertia, Keep, Requirement, Spacecraft
+from nutdamp.flight.end_state import seen_at
+from nutdamp.flight.propagation import by_impulses
+from nutdamp.montecarlo.study import Results, study_of
+from nutdamp.montecarlo.study import run as fly
+from nutdamp.planning.decision import Comparison, Decision, compare, decide
+from nutdamp.planning.plan import Plan, plan
+from nutdamp.planning.screening import Candidate, Cases, cases_of
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.model import Goal, Inertia, Keep, Requirement, Spacecraft
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views import decisions, verdicts
 
 
 @cache

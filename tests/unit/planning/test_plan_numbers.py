@@ -13,11 +13,11 @@ from support import reference
 from support.builders import channel, cross, events, spinner
 from support.cases import deep
 
-from nutdamp.actuators import STANDARD_GRAVITY
-from nutdamp.planning import Plan, plan
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC
-from nutdamp.spacecraft import Channel, Spacecraft, Steerable, Vector
+from nutdamp.planning.plan import Plan, plan
+from nutdamp.schemes.catalogue import CLASSIC
+from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel, Steerable
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 
 def jet(name: str, position: tuple[float, float, float], force: tuple[float, float, float]) -> Channel:

@@ -15,20 +15,21 @@ from support.builders import BOTH, HALF_A_DEGREE, channel, cross, judged, spinne
 from support.cases import deep, weekly
 from support.golden import check_text
 
-from nutdamp import planning, schemes, velocity_change
-from nutdamp.comparison import compare
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import by_impulses
-from nutdamp.limits import Limit, Windows, breaches, keeps_limits
-from nutdamp.outcome import seen_at
-from nutdamp.planning import plan
-from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Ground, Standing
-from nutdamp.remarks import broken_limits, infeasibility, remarks
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC, two_pulse
-from nutdamp.schemes.options import OptimalOptions, SchemeOptions
-from nutdamp.spacecraft import Channel, Limits, Requirement, Spacecraft
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight import end_state
+from nutdamp.flight.end_state import seen_at
+from nutdamp.flight.propagation import by_impulses
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import broken_limits, compare, infeasibility, remarks
+from nutdamp.planning.plan import plan
+from nutdamp.planning.recommendation import Ground, Standing
+from nutdamp.schemes import catalogue, two_pulse
+from nutdamp.schemes.catalogue import CLASSIC, OptimalOptions, SchemeOptions
+from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limits
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views import verdicts
 
 DRIFT_ONLY = Requirement(momentum_shift=math.radians(0.2))
 KEPT = OptimalOptions(free_axis=False)
@@ -58,7 +59,7 @@ def test_a_requirement_is_met_where_every_part_of_it_is_by_the_flown_motion() ->
     ):
         assert judged("a", nutation, shift=shift, required=required).meets_requirement is meets
     # The printed two pulses leave no nutation, but 5.1° of shift.
-    made = plan(spinner(degrees=30.0, requirement=BOTH), "two-pulse", schemes.Options(literal=True))
+    made = plan(spinner(degrees=30.0, requirement=BOTH), "two-pulse", catalogue.Options(literal=True))
     assert made.meets_requirement is False
 
 
@@ -74,7 +75,7 @@ def test_an_infeasible_plan_has_nulls_and_says_why_and_an_unknown_scheme_is_a_ke
 
 def test_without_nutation_there_is_an_empty_schedule_and_none_is_free_motion() -> None:
     """Nor are 1e-14 degrees, which trimmed pulses leave with I1 ≠ I2, worth a number."""
-    for scheme in schemes.NAMES:
+    for scheme in catalogue.NAMES:
         for degrees in (0.0, 1e-11):
             made = plan(spinner(degrees=degrees, channels=cross(20.0), requirement=BOTH), scheme)
             assert (made.feasible, len(made.pulses), made.meets_requirement) == (True, 0, True)
@@ -108,7 +109,7 @@ def test_a_scheme_with_a_bug_leaves_the_others_also_where_it_shows_only_when_the
         for one, other in zip(compared.plans, whole.plans, strict=True):
             assert one.scheme == "two-pulse" or one.pulses.total_impulse == other.pulses.total_impulse
         assert compared.recommended is not None
-    monkeypatch.setattr(velocity_change, "momentum_gained", raising(IndexError))
+    monkeypatch.setattr(end_state, "momentum_gained", raising(IndexError))
     jet = channel("T", 0.0, 8.0, 0.0, isp=220.0, thrust=10.0, force=(10.0, 0.0, 0.0))
     compared = compare(spinner(channels=(jet,), mass=100.0), ("one-pulse",))
     assert ([type(one.failure) for one in compared.failed], compared.recommended) == ([IndexError], None)

@@ -14,17 +14,17 @@ from support.golden import check_text
 from support.places import case
 
 import nutdamp
-from nutdamp import planning, schemes
-from nutdamp.commands import Block
-from nutdamp.comparison import Comparison, compare, usual
-from nutdamp.decision import decide
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import Plan
-from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Gain, Ground, Standing, cheapest, recommend
-from nutdamp.schedule import Schedule
-from nutdamp.screening import Candidate, Cases
-from nutdamp.spacecraft import Goal, Requirement, Vector
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import Comparison, compare, decide, usual
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Gain, Ground, Standing, cheapest, recommend
+from nutdamp.planning.screening import Candidate, Cases
+from nutdamp.schemes import catalogue
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Goal, Requirement, Vector
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.views import verdicts
 
 SPIN = Goal(spin=3.0)
 PERIOD = spinner().inertial_period
@@ -219,7 +219,7 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
 @pytest.mark.parametrize("degrees", [8, 60])
 def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -> None:
     text = case("nothing-damps.yaml").read_text(encoding="utf-8").replace("8 deg", f"{degrees} deg")
-    compared = compare(read_spacecraft(text, "nothing-damps.yaml"), schemes.CLASSIC)
+    compared = compare(read_spacecraft(text, "nothing-damps.yaml"), catalogue.CLASSIC)
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
     assert compared.recommended is not None
     assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
@@ -235,7 +235,7 @@ def test_a_spin_is_met_within_a_thousandth() -> None:
 
 def test_a_scheme_that_cannot_set_the_spin_says_so_and_one_that_is_kept_by_itself_takes_no_channel() -> None:
     body = replace(spinner(channels=cross(20.0)), goal=Goal(spin=3.3))
-    compared = compare(body, (*schemes.CLASSIC, "half-cone"))
+    compared = compare(body, (*catalogue.CLASSIC, "half-cone"))
     assert {one.feasible for one in compared.plans} == {False}
     check_text("plan.spin-not-set", "\n".join(sorted({one.refusal or "" for one in compared.plans})))
     assert "optimal" in usual(body)
@@ -243,7 +243,7 @@ def test_a_scheme_that_cannot_set_the_spin_says_so_and_one_that_is_kept_by_itsel
     assert not planning.plan(replace(body, omega0=body.omega0 * [0, 0, 1]), "four-pulse").feasible  # without nutation
     kept = replace(body, goal=SPIN)
     assert planning.plan(kept, "two-pulse").meets_requirement is True
-    assert usual(kept) == (*schemes.CLASSIC, "optimal")
+    assert usual(kept) == (*catalogue.CLASSIC, "optimal")
 
 
 MANY, FEW = made("many", 0.0, 0.1, pulses=10), made("few", 0.0, 0.1049, pulses=5)
@@ -326,7 +326,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
     """Unless schemes are named, it is of use to nothing else."""
     for degrees, needless in ((0.4, True), (0.6, False)):
         body = spinner(degrees=degrees, channels=cross(20.0), requirement=HALF_A_DEGREE)
-        assert usual(body) == ("none",) * needless + (*schemes.CLASSIC, "optimal")
+        assert usual(body) == ("none",) * needless + (*catalogue.CLASSIC, "optimal")
         names = [name for name in usual(body) if name != "optimal"]
         plans = tuple(planning.plan(body, name) for name in names)
         for named, those, idle in (

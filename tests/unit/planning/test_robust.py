@@ -18,26 +18,28 @@ from support.places import case
 from support.single_case import flown_outputs
 
 import nutdamp
-from nutdamp import planning, robust, screening, trimming, work
-from nutdamp.commands import Block
-from nutdamp.comparison import Comparison, compare
-from nutdamp.compliance import Part
-from nutdamp.dispersion import SEED, study_of
-from nutdamp.dispersion.cases import DispersedCases
-from nutdamp.dispersion.inputs import Input
-from nutdamp.dispersion.kernel import Ends
-from nutdamp.dispersion.study import Results, run
+from nutdamp.common import work
 from nutdamp.errors import BadRequest
-from nutdamp.files.robust_json import robust_json
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.planning import Plan
-from nutdamp.recommendation import Ground
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import CLASSIC, Options, four_pulse
-from nutdamp.screening import Candidate, Cases
-from nutdamp.spacecraft import Goal, Limits, Requirement, Spacecraft, Steerable
-from nutdamp.tightening import Tightening
-from nutdamp.tolerances import Dispersions
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.montecarlo.cases import DispersedCases
+from nutdamp.montecarlo.closed_form import Ends
+from nutdamp.montecarlo.inputs import Input
+from nutdamp.montecarlo.study import SEED, Results, run, study_of
+from nutdamp.planning import plan as planning
+from nutdamp.planning import robust, screening
+from nutdamp.planning.chance_plan import Tightening
+from nutdamp.planning.decision import Comparison, compare
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Ground
+from nutdamp.planning.screening import Candidate, Cases
+from nutdamp.schemes import four_pulse
+from nutdamp.schemes.catalogue import CLASSIC, Options
+from nutdamp.spacecraft.equipment import Block, Steerable
+from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.views.robust_json import robust_json
 
 SAMPLES = 2_048
 """Cases of each plan: enough for what is tested here."""
@@ -194,7 +196,7 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert chosen is found.candidates[0]
     assert (found.ground, found.usual, found.comparison.recommended) == (Ground.COST, whole, whole.plan)
     ratios = [short.on_time / long.on_time for short, long in zip(chosen.plan.pulses, whole.plan.pulses, strict=True)]
-    assert all(trimming.SHORTEST**2 < ratio <= 1.0 for ratio in ratios)
+    assert all(robust.SHORTEST**2 < ratio <= 1.0 for ratio in ratios)
     assert chosen.plan.pulses.cost < 0.999 * whole.plan.pulses.cost
     assert found.cost is not None
     assert found.cost.impulse == chosen.plan.pulses.total_impulse - whole.plan.pulses.total_impulse < 0.0
@@ -209,7 +211,7 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert found.fresh is not None
     assert found.fresh.met == share(body, chosen.plan, robust.FRESH) >= 0.99
     # A little shorter and too few comply.
-    shorter = trimming._scaled(chosen.plan, [0, 1], 0.997)
+    shorter = robust._scaled(chosen.plan, [0, 1], 0.997)
     assert shorter is None or min(share(body, shorter), share(body, shorter, robust.FRESH)) < 0.99
 
 
@@ -230,21 +232,21 @@ def asked(least: list[float], plan: Plan, *, first: list[Plan] | None = None) ->
     def ratios(one: Plan) -> list[float]:
         return [short.on_time / long.on_time for short, long in zip(one.pulses, plan.pulses, strict=True)]
 
-    return ratios(trimming.trimmed(plan, complies))
+    return ratios(robust.trimmed(plan, complies))
 
 
 def test_on_times_are_shortened_together_and_then_each_alone() -> None:
     plan = planning.plan(dispersed(requirement=WIDE), "two-pulse")
     for least, together in (([0.9, 0.9], 0.9), ([0.93, 0.6], 0.93), ([0.6, 0.93], 0.93), ([0.5, 0.5], 0.8)):
         left = asked(least, plan)
-        step, finer = 0.2 / 2**trimming.HALVINGS, 0.2 / 2**trimming.FINER
+        step, finer = 0.2 / 2**robust.HALVINGS, 0.2 / 2**robust.FINER
         for ratio, share in zip(left, least, strict=True):
-            alone = max(share, together * trimming.SHORTEST)
+            alone = max(share, together * robust.SHORTEST)
             assert alone <= ratio <= alone + step + (finer if alone < together else 0.0), least
     tried: list[Plan] = []
     assert asked([1.0, 1.0], plan, first=tried) == [1.0, 1.0]
-    assert len(tried) == trimming.HALVINGS + 2 * trimming.FINER
-    assert trimming.trimmed(plan, lambda _: False) is plan
+    assert len(tried) == robust.HALVINGS + 2 * robust.FINER
+    assert robust.trimmed(plan, lambda _: False) is plan
 
 
 def test_what_cannot_be_shortened_stays() -> None:
@@ -261,7 +263,7 @@ def test_what_cannot_be_shortened_stays() -> None:
         planning.plan(steered, "two-pulse"),
     ):
         assert fixed.feasible
-        assert trimming.trimmed(fixed, lambda _: pytest.fail("it is not to be tried")) is fixed
+        assert robust.trimmed(fixed, lambda _: pytest.fail("it is not to be tried")) is fixed
     longest = min(pulse.on_time for pulse in pulses)
     bound = [
         replace(one, thrusters=tuple(replace(each, min_on_time=0.95 * longest) for each in one.thrusters))
@@ -271,12 +273,12 @@ def test_what_cannot_be_shortened_stays() -> None:
     assert 0.95 - 1e-9 <= shortest < 0.96
     many = replace(body, channels=tuple(one.of(thrust=10.0, isp=220.0) for one in cross(8.0, max_on_time=0.2)))
     long = planning.plan(many, "four-pulse")
-    assert len(long.pulses) > trimming.FEW
+    assert len(long.pulses) > robust.FEW
     tried: list[Plan] = []
     left = asked([0.9] * len(long.pulses), long, first=tried)
     assert left == pytest.approx([left[0]] * len(left))
     assert 0.9 <= left[0] < 0.902
-    assert len(tried) == trimming.HALVINGS
+    assert len(tried) == robust.HALVINGS
 
 
 LUCKY = """

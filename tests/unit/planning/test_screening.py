@@ -11,16 +11,17 @@ from support import places
 from support.builders import HALF_A_DEGREE, judged
 
 import nutdamp
-from nutdamp import screening, work
-from nutdamp.comparison import Comparison, compare
-from nutdamp.decision import decide
-from nutdamp.dispersion import SEED, study
-from nutdamp.dispersion.flown import RealWidths
+from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.planning import Plan
-from nutdamp.recommendation import Share, recommend
-from nutdamp.screening import Candidate, Cases
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.montecarlo import study as dispersion
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.study import SEED
+from nutdamp.planning import screening
+from nutdamp.planning.decision import Comparison, compare, decide
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Share, recommend
+from nutdamp.planning.screening import Candidate, Cases
 
 SHORT, LONG, ALL = 2_048, 8_192, 20_000
 NEVER = "cannot be flown"
@@ -133,7 +134,7 @@ def test_more_cases_than_are_kept_one_by_one_are_counted_and_have_the_budget_of_
 ) -> None:
     body, samples = nutdamp.example(), 24_000
     kept = compare(body, ["two-pulse"], samples=samples)
-    monkeypatch.setattr(study, "EXACT_CASES", 20_000)
+    monkeypatch.setattr(dispersion, "EXACT_CASES", 20_000)
     monkeypatch.setattr(screening, "EXACT_CASES", 20_000)
     monkeypatch.setattr(work, "CASES", 45.0)  # 8,192 cases take 49 units, so that it is known that enough comply
     counted = compare(body, ["two-pulse"], samples=samples)

@@ -16,22 +16,21 @@ from support.commands import WIDER
 from support.dispersed import normal
 
 import nutdamp
-from nutdamp import robust, surest, tightening
-from nutdamp.comparison import compare
-from nutdamp.dispersion import study_of
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.inputs import Input
-from nutdamp.dispersion.sensitivity import by_differences
-from nutdamp.dispersion.study import Results, run
-from nutdamp.planning import plan
-from nutdamp.presentation import robust_verdicts
-from nutdamp.presentation.tolerance_tables import stated_text
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes.optimal.columns import Columns
-from nutdamp.spacecraft import Limits, Requirement, Spacecraft
-from nutdamp.tightening import scaled
-from nutdamp.tolerances import Dispersions, Tolerance
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.inputs import Input
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.statistics import by_differences
+from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.planning import chance_plan, robust
+from nutdamp.planning.chance_plan import scaled
+from nutdamp.planning.decision import compare
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.optimal.linear_program import Columns
+from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views import robust_verdicts
+from nutdamp.views.tolerance_tables import stated_text
 
 EARLY = ("earliest end", "by ")
 """How variants begin that end as early as they can, or little later."""
@@ -85,7 +84,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     channels = [one.name for one in body.channels]
     pulses = [(channels.index(one.channel), one.t, one.on_time) for one in plan(body, "optimal").pulses]
     assert len(pulses) >= 2
-    search, columns = surest._Search(body, body), columns_of(pulses)
+    search, columns = chance_plan._Search(body, body), columns_of(pulses)
     made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
     model = Model(body, made)
     names = [one.name for one in model.inputs.drawn]
@@ -109,7 +108,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
 
 def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
     body = replace(a_body(), requirement=Requirement(math.radians(0.05), None, 0.95))
-    search = surest._Search(body, body)
+    search = chance_plan._Search(body, body)
     chance, costs, turns = search.chance, [], np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
     channels = [one.name for one in search.program.channels]
     for margin in (0.0, 1.0, 2.0):
@@ -151,15 +150,15 @@ def test_limits_and_windows_are_kept() -> None:
     known = cross(8.0, min_on_time=0.05)
     body = spinner(channels=known, limits=limits, requirement=Requirement(math.radians(0.6), None, 0.95))
     body = replace(body, dispersions=Dispersions(A=share_of(0.004), thrust={one.name: share_of(0.02) for one in known}))
-    made = [made for _, made in surest.plans(body)]
+    made = [made for _, made in chance_plan.plans(body)]
     assert made
     assert [violations(body, one.pulses) for one in made] == [[]] * len(made)
 
 
 def test_nothing_where_nothing_is_required_and_nothing_has_to_shrink_where_enough_cases_comply() -> None:
     body = a_body()
-    assert list(surest.plans(replace(body, requirement=None))) == []
-    assert list(surest.plans(replace(body, dispersions=None))) == []
+    assert list(chance_plan.plans(replace(body, requirement=None))) == []
+    assert list(chance_plan.plans(replace(body, dispersions=None))) == []
     found = robustly(replace(body, requirement=Requirement(math.radians(0.15), None, 0.5)), "optimal", most=1)
     assert (found.tightening, robust_verdicts.tightened(found)) == (None, "")
 
@@ -173,8 +172,8 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
     That holds in draws which nothing was chosen by, more than it was checked in.
     """
     if probability < 0.99:  # which fewer cases show
-        monkeypatch.setattr(tightening, "CASES", 2_048)
-        monkeypatch.setattr(tightening, "SAMPLES", 4_096)
+        monkeypatch.setattr(chance_plan, "CASES", 2_048)
+        monkeypatch.setattr(chance_plan, "SAMPLES", 4_096)
     given = Requirement(math.radians(0.5), math.radians(0.2), probability)
     wider = {"dispersions": {key: {"normal": size} for key, size in WIDER.items()}}
     body = replace(nutdamp.example().with_(**wider), requirement=given)
@@ -219,7 +218,9 @@ def test_two_channels_that_fire_one_after_the_other_share_the_time_between_them(
     requirement = Requirement(math.radians(0.55), math.radians(0.48), 0.997)
     tolerances = Dispersions(A=share_of(0.004), C=share_of(0.004), thrust=thrust)
     body = replace(body, dispersions=tolerances, requirement=requirement)
-    shares = [run(Results(study_of(body, one.pulses), SAMPLES)).met_fraction or 0.0 for _, one in surest.plans(body)]
+    shares = [
+        run(Results(study_of(body, one.pulses), SAMPLES)).met_fraction or 0.0 for _, one in chance_plan.plans(body)
+    ]
     assert max(shares) > 0.9
 
 

@@ -22,12 +22,14 @@ from support.places import case
 from support.process import Run
 
 import nutdamp
-from nutdamp import fronts, planning, work
-from nutdamp.compliance import SAME_COST
-from nutdamp.planning import Plan
-from nutdamp.schedule import Bounds, Pulse, Schedule
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Limits, Spacecraft
+from nutdamp.common import work
+from nutdamp.planning import plan as planning
+from nutdamp.planning import tradeoff
+from nutdamp.planning.plan import Plan
+from nutdamp.schemes.catalogue import OptimalOptions
+from nutdamp.spacecraft.model import Limits, Spacecraft
+from nutdamp.spacecraft.requirements import SAME_COST
+from nutdamp.spacecraft.schedule import Bounds, Pulse, Schedule
 
 BODY = spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), limits=Limits(horizon=40.0))
 STEERED = str(places.CONFIGS / "steerable-stage.yaml")
@@ -51,11 +53,11 @@ def given(end: float, cost: float, degrees: float = 0.0, least: float = 0.1, wit
     )
 
 
-def points(plans: list[Given]) -> list[fronts.Point]:
-    return [fronts.Point(one, 40.0, "kg") for one in plans]
+def points(plans: list[Given]) -> list[tradeoff.Point]:
+    return [tradeoff.Point(one, 40.0, "kg") for one in plans]
 
 
-def figures(points: tuple[fronts.Point, ...]) -> list[tuple[float, float]]:
+def figures(points: tuple[tradeoff.Point, ...]) -> list[tuple[float, float]]:
     return [(point.plan.pulses.end, point.cost) for point in points]
 
 
@@ -76,8 +78,8 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
         asked.append((options.least, options.free_axis, body.horizon))
         return next(results)
 
-    monkeypatch.setattr(fronts, "plan", search)
-    made = fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf), progress=done.append)
+    monkeypatch.setattr(tradeoff, "plan", search)
+    made = tradeoff.fronts(BODY, OptimalOptions(), count=4, shifts=(math.inf, 0.0, math.inf), progress=done.append)
     assert [front.shift for front in made] == [0.0, math.inf]
     # The fastest of the free front keeps H too; what saves less than a thousandth is no point.
     assert figures(made[0].points) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
@@ -89,14 +91,14 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
         assert [(least, freed) for least, freed, _ in searches] == [(least, free) for least in leasts]
         assert [horizon for *_, horizon in searches] == pytest.approx(horizons)
     assert done == list(range(1, 9))
-    numbers = [(number, front.shift) for number, front, _ in fronts.numbered(made)]
+    numbers = [(number, front.shift) for number, front, _ in tradeoff.numbered(made)]
     assert numbers == [(number, 0.0 if number < 4 else math.inf) for number in range(1, 8)]
 
 
 def test_the_first_order_least_of_a_front_never_rises_with_time() -> None:
     """A schedule that a stricter front found has the least of that one, which may be more than this front needs."""
     plans = [given(10.0, 3.0, 0.0, 2.0, 10.0), given(20.0, 2.0, 0.0, 2.2, 20.0), given(30.0, 1.0, 0.0, 0.7, 40.0)]
-    front = fronts.Front(0.0, tuple(points(plans)))
+    front = tradeoff.Front(0.0, tuple(points(plans)))
     assert [front.least(point) for point in front.points] == [2.0, 2.0, 0.7]
 
 
@@ -107,8 +109,8 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
         strict, more = (
             points([given(*one) for one in (1.0 + draw.uniform(0.0, [10.0, 0.01], (8, 2))).tolist()]) for _ in range(2)
         )
-        first = fronts.undominated(strict)
-        second = fronts.undominated([*strict, *more], first)
+        first = tradeoff.undominated(strict)
+        second = tradeoff.undominated([*strict, *more], first)
         for one, two in (*itertools.pairwise(figures(first)), *itertools.pairwise(figures(second))):
             assert one[0] < two[0]
             assert one[1] > two[1]
@@ -121,7 +123,7 @@ def test_no_point_is_beaten_by_one_of_a_stricter_front() -> None:
 @pytest.mark.weekly
 def test_fronts_that_are_searched_fly() -> None:
     half = math.radians(0.5)
-    made = fronts.fronts(BODY, OptimalOptions(), count=4, shifts=(math.inf, 0.0, half))
+    made = tradeoff.fronts(BODY, OptimalOptions(), count=4, shifts=(math.inf, 0.0, half))
     assert [front.shift for front in made] == [0.0, half, math.inf]
     for front in made:
         assert len(front.points) >= 2
@@ -144,8 +146,8 @@ def test_fronts_that_are_searched_fly() -> None:
 def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known() -> None:
     """The fastest schedule, looked for by time, once counted in kg beside N m s, and beat all others."""
     body = replace(BODY, channels=tuple(one.of(isp=220.0, thrust=10.0) for one in BODY.channels))
-    (front,) = fronts.fronts(body, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
-    (known,) = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
+    (front,) = tradeoff.fronts(body, OptimalOptions(least="impulse"), count=3, shifts=(0.0,))
+    (known,) = tradeoff.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
     assert [{point.bounds.unit for point in one.points} for one in (front, known)] == [{"N m s"}, {"kg"}]
     assert len(front.points) == len(known.points) >= 2
     for by_impulse, by_propellant in zip(front.points, known.points, strict=True):  # all thrusters are alike
@@ -156,7 +158,7 @@ def test_impulse_is_traded_in_one_unit_also_where_the_propellant_is_known() -> N
 def test_no_front_holds_what_a_schedule_of_another_front_beats_in_everything() -> None:
     """On ticks no schedule leaves H just where it was: one that leaves it as near, as soon and as cheaply counts."""
     body = nutdamp.load(places.CONFIGS / "couples-minisat.yaml")
-    made = fronts.fronts(body, OptimalOptions(), count=6, shifts=(0.0, math.inf))
+    made = tradeoff.fronts(body, OptimalOptions(), count=6, shifts=(0.0, math.inf))
     for point, other in itertools.product([point for front in made for point in front.points], repeat=2):
         same = math.isclose(point.cost, other.cost, rel_tol=SAME_COST)
         sooner = other.plan.end < 0.999 * point.plan.end
@@ -170,7 +172,7 @@ def test_what_plan_finds_is_traded_where_the_fastest_is_not_found(monkeypatch: p
     body = nutdamp.load(case("nothing-damps.yaml"))
     made = planning.plan(body, "optimal")
     monkeypatch.setattr(work, "FRONTS", 4_000.0)
-    (front,) = fronts.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
+    (front,) = tradeoff.fronts(body, OptimalOptions(), count=3, shifts=(0.0,))
     assert ([point.plan.end for point in front.points], front.why) == ([made.end], None)
 
 

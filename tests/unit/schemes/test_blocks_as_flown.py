@@ -18,21 +18,20 @@ from support.golden import refused
 from support.spinners import FILE, commanded, flown_by_reference, some_body
 
 import nutdamp
-from nutdamp import flight, planning
-from nutdamp.commands import Block
 from nutdamp.errors import Infeasible
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.limits import commandable_widths
-from nutdamp.outcome import left_by
-from nutdamp.physics import attitude, sun_train
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Trapezoid, Valve
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
-from nutdamp.schemes.tools.block_model import BlockModel, State, Trial
-from nutdamp.schemes.tools.sun_pulses import fired, sun_clock, sun_pulses
-from nutdamp.spacecraft import Channel, Spacecraft, SunSensor
-from nutdamp.supply import Supply
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import left_by
+from nutdamp.flight.propellant import Supply
+from nutdamp.physics import attitude, precession
+from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
+from nutdamp.planning import plan as planning
+from nutdamp.schemes.block_model import BlockModel, State, Trial, fired, sun_clock, sun_pulses
+from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft.constraints import commandable_widths
+from nutdamp.spacecraft.equipment import Block, Channel, SunSensor
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 SLOW = Trapezoid(open_delay=0.015, close_delay=0.015)
 UNEVEN = Trapezoid(open_delay=0.015, close_delay=0.006, rise_time=0.01, fall_time=0.03)
@@ -68,7 +67,7 @@ def in_form(body: Spacecraft, *blocks: Block) -> tuple[BlockModel, State]:
 def turns(body: Spacecraft, *blocks: Block) -> np.ndarray:
     """By how much blocks turn H, rad: in closed form, and flown."""
     model, state = in_form(body, *blocks)
-    return np.array([float(model.left(state).aim), left_by(flight.flown(body, fired(body, blocks))).aim])
+    return np.array([float(model.left(state).aim), left_by(propagation.flown(body, fired(body, blocks))).aim])
 
 
 def blocks_of(turn: float, late: float = 0.96) -> tuple[Block, Block]:
@@ -86,7 +85,7 @@ def test_blocks_fire_from_the_sun_pulses_of_the_nutating_body(seed: int | None) 
     blocks = (Block("T", 1, 0.5, 0.2, 6, 1),) if seed is None else blocks_of(2.0 * math.pi / abs(body.spin))
     made, (motion, starts) = fired(body, blocks), flown_by_reference(body, blocks)
     assert [one.start for one in made] == pytest.approx(starts, abs=1e-8)
-    settled = flight.flown(body, made).settled
+    settled = propagation.flown(body, made).settled
     assert settled.rates == pytest.approx(motion.rates, abs=1e-7 * abs(body.spin))
     assert reference.turned(attitude.matrix(settled.quaternion), motion.rotation) < 1e-7
 
@@ -116,14 +115,14 @@ def test_a_rhumb_line_is_the_solution_of_its_equations(heading: float) -> None:
         return [math.cos(heading), math.sin(heading) / math.sin(y[0]), math.sin(heading) / math.tan(y[0])]
 
     expected = solve_ivp(slope, (0.0, 0.7), [1.2, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    assert [float(one) for one in sun_train.rhumb_end(1.2, heading, 0.7)] == pytest.approx(expected, abs=1e-10)
-    assert math.isnan(float(sun_train.rhumb_end(0.3, math.pi, 0.4).sun_angle))
+    assert [float(one) for one in precession.rhumb_end(1.2, heading, 0.7)] == pytest.approx(expected, abs=1e-10)
+    assert math.isnan(float(precession.rhumb_end(0.3, math.pi, 0.4).sun_angle))
 
 
 def test_phasors_of_a_train_add_up() -> None:
     steps = (0.3, 0.0, 2 * math.pi, 4 * math.pi, -2 * math.pi, math.pi, 7.1)
     for step, count in itertools.product(steps, (1, 2, 5, 8)):
-        assert abs(sun_train.phasor_sum(count, step) - np.exp(1j * step * np.arange(count)).sum()) < 1e-9
+        assert abs(precession.phasor_sum(count, step) - np.exp(1j * step * np.arange(count)).sum()) < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -139,7 +138,7 @@ def test_the_closed_form_is_the_flight_but_for_small_terms(seed: int) -> None:
         blocks.append(Block(name, number + wait, delay, width, int(rng.integers(1, 12)), 1))
         number = blocks[-1].sun_pulses[-1] + 1
     model, state = in_form(body, *blocks)
-    flown = flight.flown(body, fired(body, blocks))
+    flown = propagation.flown(body, fired(body, blocks))
     form, off, left = model.left(state), model.apart(state, flown), left_by(flown)
     # Pulses turn H by 0.3 deg or less: what is left out is of second order in that.
     assert (float(form.nutation), float(form.aim)) == pytest.approx((left.nutation, left.aim), abs=math.radians(0.03))
@@ -168,7 +167,7 @@ def test_a_late_centroid_turns_the_heading(valve: Valve) -> None:
     body, given = at_rest(), valve.thrust(0.15)
     late = 1.0 + given.centroid - 0.5 * given.on_time
     flights = [
-        flight.flown(each, fired(each, (Block("+M2", 1, delay, width, 20),))).final.momentum
+        propagation.flown(each, fired(each, (Block("+M2", 1, delay, width, 20),))).final.momentum
         for each, delay, width in (
             (through(body, valve), 1.0, 0.15),
             (body, late, given.on_time),
@@ -186,7 +185,7 @@ def test_commands_begin_at_the_delay_after_the_sun_pulses_of_the_motion_that_the
     body = through(commanded(spinner(degrees=2.0, spin=-2.0, channels=cross(8.0)), SUN), valve)
     body, blocks = replace(body, cold=Cold(0.7, 3.0)), blocks_of(TURN, 0.93)
     made = fired(body, blocks)
-    moments = sun_pulses(flight.flown(body, made, made.end + TURN), made.end)
+    moments = sun_pulses(propagation.flown(body, made, made.end + TURN), made.end)
     due = [moments[number - 1] + block.delay for block in blocks for number in block.sun_pulses]
     assert [pulse.loaded[0] for pulse in made] == pytest.approx(due, abs=1e-8)
     assert any(begins < one < ends for one in moments for begins, ends in (pulse.thrust for pulse in made))
@@ -303,7 +302,7 @@ def test_cold_pulses_leave_the_nutation_of_the_closed_form() -> None:
     for count in range(2, 12):
         block = Block(body.channels[0].name, 1, 1.0, 0.2, count)
         model, state = in_form(body, block)
-        flown = left_by(flight.flown(body, fired(body, (block,))))
+        flown = left_by(propagation.flown(body, fired(body, (block,))))
         assert float(model.left(state).nutation) == pytest.approx(flown.nutation, abs=math.radians(2e-3))
 
 

@@ -15,14 +15,15 @@ from support.checker import violations
 from support.feasible import feasible_by, left
 from support.golden import check_text, refused
 
-from nutdamp import flight, planning
 from nutdamp.errors import SenselessOption
-from nutdamp.physics import damping
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
-from nutdamp.schemes.options import FourPulseOptions
-from nutdamp.spacecraft import Channel, Limits, Spacecraft, Steerable
+from nutdamp.flight import propagation
+from nutdamp.physics import body as rigid_body
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.schemes.catalogue import FourPulseOptions, Options
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 NANODEGREE = math.radians(1e-9)
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 190.0), (100.0, 10.0)]
@@ -47,7 +48,7 @@ def check_exact(spacecraft: Spacecraft, scheme: str, count: int, *, by_reference
 
 def check_opposed(spacecraft: Spacecraft, made: Schedule) -> None:
     """Each effective impulse is straight against ω at its moment."""
-    before, _ = flight.by_impulses(spacecraft, made).around_pulses()
+    before, _ = propagation.by_impulses(spacecraft, made).around_pulses()
     for pulse, rates in zip(made, before.rates, strict=True):
         along = transverse(pulse.impulse) / transverse(rates)
         assert along.real < 0.0
@@ -253,7 +254,7 @@ def test_literal_reproduces_the_printed_scheme(spin: float) -> None:
 
 
 def test_the_second_waits_for_a_later_half_turn_where_a_window_or_a_gap_rules_out_the_first() -> None:
-    half = damping.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
+    half = rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
     assert check_exact(spinner(), "two-pulse", 2).pulses.end == pytest.approx(half, rel=1e-12)
     covered = spinner(limits=Limits(blackout=((0.5 * half, 2.0 * half),), earliest=0.0))
     assert check_exact(covered, "two-pulse", 2).pulses.end >= 2.0 * half
@@ -274,8 +275,8 @@ def test_where_fixed_channels_never_line_up_the_cost_is_that_of_the_physics_shee
 
 def test_channels_at_the_mounting_angle_need_no_more_than_the_floor() -> None:
     """Two fixed actuators that push both ways: half a turn apart, for A|ω0| and the width."""
-    omega, wait = spinner().transverse_rate, damping.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
-    angle = damping.mounting_angle(120.0, 80.0, omega, 3.0)
+    omega, wait = spinner().transverse_rate, rigid_body.half_pulses(120.0, 80.0, spinner().transverse_rate, 3.0).wait
+    angle = rigid_body.mounting_angle(120.0, 80.0, omega, 3.0)
     turns = 2000.0 * np.exp(1j * np.array([0.0, math.pi, angle, angle + math.pi]))
     pair = tuple(channel(f"T{number}", one.real, one.imag, 0.0) for number, one in enumerate(turns))
     made = feasible_by("two-pulse", spinner(channels=pair)).pulses

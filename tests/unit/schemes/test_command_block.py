@@ -17,21 +17,22 @@ from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.spinners import FILE, commanded, flown_by_reference, some_body
 
-from nutdamp import compliance, flight, load, planning, remarks
-from nutdamp.aspect import aspects
-from nutdamp.commands import Block, Commands
-from nutdamp.comparison import usual
+from nutdamp import load
 from nutdamp.errors import Infeasible
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.limits import usable
-from nutdamp.outcome import left_by
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import aspects, left_by
 from nutdamp.physics import attitude
-from nutdamp.schemes import Options
-from nutdamp.schemes.command_block import Flown, Search
-from nutdamp.schemes.tools.block_model import BlockModel, Trial
-from nutdamp.schemes.tools.block_search import FLOWN, Found
-from nutdamp.schemes.tools.sun_pulses import fired
-from nutdamp.spacecraft import Disturbance, Keep, Limits, Requirement, Spacecraft, SunSensor
+from nutdamp.planning import decision
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import usual
+from nutdamp.schemes.block_model import BlockModel, Trial, fired
+from nutdamp.schemes.catalogue import Options
+from nutdamp.schemes.command_block import FLOWN, Flown, Found, Search
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import usable
+from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
+from nutdamp.spacecraft.model import Disturbance, Keep, Limits, Requirement, Spacecraft
 
 ONE = Options(max_blocks=1)
 
@@ -43,7 +44,7 @@ def within(nutation: float, shift: float | None = None) -> Requirement:
 
 def planned(body: Spacecraft, options: Options | None = None, *, met: bool = True) -> planning.Plan:
     plan = planning.plan(body, "command-block", options)
-    assert plan.feasible, remarks.infeasibility(plan)
+    assert plan.feasible, decision.infeasibility(plan)
     assert not met or plan.meets_requirement
     return plan
 
@@ -60,7 +61,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
 
     Of those that carry H the shorter way round the Sun.
     """
-    model, bounds, commands = BlockModel(body), compliance.bounds(body), body.commands
+    model, bounds, commands = BlockModel(body), requirements.bounds(body), body.commands
     assert commands is not None
     delays = (commands.delay_step * np.arange(round(commands.delay_max / commands.delay_step) + 1))[:, None, None]
     widths, counts = commands.widths[:, None], np.arange(1, commands.max_count + 1)
@@ -68,7 +69,7 @@ def scanned(body: Spacecraft) -> tuple[float, float]:
     for one, every, wait in itertools.product(body.channels, commands.every, range(24 if body.transverse_rate else 1)):
         after = model.after(model.start, one, Trial(wait, delays, widths, counts, every))
         left = model.left(after)
-        shares = np.max([compliance.left_of(bound.part, left, body) / bound.most for bound in bounds], axis=0)
+        shares = np.max([requirements.left_of(bound.part, left, body) / bound.most for bound in bounds], axis=0)
         longer = False if body.goal.axis is None else np.abs(after.longitude - ahead) > math.pi
         shares = np.where(np.isnan(shares) | longer, np.inf, shares)
         cost, failed = np.broadcast_to(widths * counts * one.strength, shares.shape), np.where(shares <= 1, 0.0, shares)
@@ -120,7 +121,7 @@ def test_blocks_behind_cheap_first_ones_are_looked_for_too() -> None:
     body = load(places.CONFIGS / "lunar-prospector.yaml")
     delays = ((1, "-M2", 2.45), (3, "+M2", 2.15), (5, "-M2", 1.85))
     known = fired(body, tuple(Block(name, first, delay, 0.2, 2, 1) for first, name, delay in delays))
-    assert left_by(flight.flown(body, known)).nutation < math.radians(0.2)
+    assert left_by(propagation.flown(body, known)).nutation < math.radians(0.2)
     assert planned(body).pulses.cost <= known.cost
 
 
@@ -233,7 +234,7 @@ def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> N
     keep = Keep("cone", centre, least=0.4 * min(float(attitude.angle_between(centre, one)) for one in (start, end)))
     plan = planning.plan(replace(body, keep=(keep,), requirement=within(1.0, 0.5)), "command-block")
     if not plan.feasible:
-        assert "from cone" in remarks.infeasibility(plan)
+        assert "from cone" in decision.infeasibility(plan)
         return
     motion, nearest, now = reference.Motion(body.omega0, attitude.matrix(body.initial.quaternion)), math.inf, 0.0
     for pulse in plan.pulses:
@@ -275,7 +276,7 @@ def test_where_there_are_no_blocks_the_reason_is_said() -> None:
     for name, aim in (("no keys", False), ("out of view", True), ("dark", True)):  # it is compared where there are keys
         assert ("command-block" in usual(cases[name])) is aim
     assert "command-block" in usual(replace(body, goal=replace(body.goal, axis=None)))
-    check_text("blocks.why-not", "\n".join(f"{name}: {remarks.infeasibility(plan)}" for name, plan in plans.items()))
+    check_text("blocks.why-not", "\n".join(f"{name}: {decision.infeasibility(plan)}" for name, plan in plans.items()))
 
 
 @pytest.mark.weekly

@@ -15,23 +15,20 @@ from support import reference
 from support.builders import aimed, channel, cross, spinner
 from support.cases import deep, spread, weekly
 
-from nutdamp import planning
-from nutdamp.dispersion.cases import Model
-from nutdamp.dispersion.flown import RealWidths
-from nutdamp.dispersion.kernel import ClosedForm
-from nutdamp.flight import by_impulses, flown
-from nutdamp.limits import breaches, effective_on_times
-from nutdamp.physics.feed import Cold, Tank
-from nutdamp.physics.valve import Measured, Trapezoid, Valve
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, channel_pulse, on_command
-from nutdamp.schemes import Options
-from nutdamp.schemes.options import RhumbLineOptions
-from nutdamp.schemes.registry import RHUMB_LINE
-from nutdamp.schemes.tools import commanding
-from nutdamp.schemes.tools.least_squares import TAIL, Correction
-from nutdamp.spacecraft import Limits, Spacecraft
-from nutdamp.verification import verify
+from nutdamp.flight.propagation import by_impulses, flown
+from nutdamp.flight.verification import verify
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.closed_form import ClosedForm
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility
+from nutdamp.schemes import valve_commands
+from nutdamp.schemes.catalogue import RHUMB_LINE, Options, RhumbLineOptions
+from nutdamp.schemes.correction import TAIL, Correction
+from nutdamp.spacecraft.constraints import breaches, effective_on_times
+from nutdamp.spacecraft.model import Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
 
 MICRODEGREE = math.radians(1e-6)
 
@@ -269,7 +266,7 @@ def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> Non
     body, on_times = replace(SHORT, cold=Cold(0.8, 4.0)), [0.4, 0.3, 0.03, 0.03, 0.03, 0.03]
     pulses = (channel_pulse(body.channels[0], 2.0 * n, on_time) for n, on_time in enumerate(on_times))
     silencing = Silencing(RHUMB_LINE, RhumbLineOptions(), silenced)
-    made = commanding.as_commands(body, Schedule(tuple(pulses)), silencing)
+    made = valve_commands.as_commands(body, Schedule(tuple(pulses)), silencing)
     train = [pulse.loaded[1] for pulse in made.pulses[2:]]
     assert len(train) == 3
     assert said_of(made) == pytest.approx([min(train), max(train)], rel=1e-3)

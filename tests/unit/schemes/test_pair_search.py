@@ -15,14 +15,15 @@ from support.feasible import feasible_by, left
 from support.golden import check_text
 from support.places import case
 
-from nutdamp import planning
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.physics import pointing
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule
-from nutdamp.schemes import Options
-from nutdamp.schemes.tools.symmetric_model import model_of
-from nutdamp.spacecraft import Attitude, Limits, Spacecraft, Steerable
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.physics import precession
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility
+from nutdamp.schemes.catalogue import Options
+from nutdamp.schemes.sequential import model_of
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Attitude, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule
 
 BODIES = [(120.0, 80.0), (80.0, 120.0), (100.0, 100.0), (60.0, 119.0)]
 TARGETS = [(1.0, 10.0), (10.0, 45.0), (60.0, -120.0), (120.0, 200.0)]
@@ -86,13 +87,14 @@ def test_from_a_pure_spin_cones_cost_the_closed_form(cones: int, A: float, C: fl
 def test_more_cones_cost_less_down_to_the_floor_and_as_many_are_taken_as_are_worth_it() -> None:
     """One more would save less than 1 %."""
     h, angle = 240.0, math.radians(60.0)
-    costs = [pointing.half_cones_impulse(h, angle, cones) for cones in range(1, 200)]
+    costs = [precession.half_cones_impulse(h, angle, cones) for cones in range(1, 200)]
     assert costs == sorted(costs, reverse=True)
     assert costs[0] == pytest.approx(2 * h * math.tan(math.radians(30.0)), rel=1e-15)
     assert h * angle < costs[-1] < h * angle * (1 + 1e-5)
     for tilt, cones in ((5.0, 1), (10.0, 1), (60.0, 3), (120.0, 4)):
         fewer, taken, more = (
-            pointing.half_cones_impulse(h, math.radians(tilt), max(number, 1)) for number in range(cones - 1, cones + 2)
+            precession.half_cones_impulse(h, math.radians(tilt), max(number, 1))
+            for number in range(cones - 1, cones + 2)
         )
         assert len(feasible_by("half-cone", aimed(spinner(degrees=0.0), tilt, 0.0)).pulses) == cones + 1
         assert more > 0.99 * taken
@@ -106,7 +108,7 @@ def test_cones_take_a_nutation_along(degrees: float, tilt: float, azimuth: float
     spacecraft = aimed(spinner(degrees=degrees), tilt, azimuth)
     for cones in (1, 2, 4):
         cost = acquired(spacecraft, "half-cone", cones=cones).total_impulse
-        farthest = pointing.half_cones_impulse(240.0, math.radians(tilt + degrees), cones)
+        farthest = precession.half_cones_impulse(240.0, math.radians(tilt + degrees), cones)
         assert floor(spacecraft) <= cost <= spacecraft.least_impulse + farthest
 
 
@@ -268,9 +270,9 @@ def test_a_target_by_right_ascension_in_a_given_attitude() -> None:
 
 def test_arc_efficiency_is_the_mean_of_the_turning_torque_and_on_time_its_inverse() -> None:
     mean = abs(np.exp(3j * (np.arange(200_000) + 0.5) / 200_000 * 0.6).mean())
-    assert pointing.arc_efficiency(3.0, 0.6) == pytest.approx(mean, rel=1e-9)
-    assert pointing.arc_efficiency(0.0, 0.6) == 1.0
-    enough, too_far = pointing.on_times_to_turn(np.array([40.0 * 0.6 * mean, 100.0]), 40.0, -3.0)
+    assert precession.arc_efficiency(3.0, 0.6) == pytest.approx(mean, rel=1e-9)
+    assert precession.arc_efficiency(0.0, 0.6) == 1.0
+    enough, too_far = precession.on_times_to_turn(np.array([40.0 * 0.6 * mean, 100.0]), 40.0, -3.0)
     assert enough == pytest.approx(0.6, rel=1e-9)
     assert np.isnan(too_far)
 

@@ -15,14 +15,13 @@ from support.cases import spread
 from support.feasible import feasible_by
 from support.golden import check_text
 
-from nutdamp import planning
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.physics import pointing
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schemes import Options
-from nutdamp.schemes.options import RhumbLineOptions
-from nutdamp.spacecraft import Limits, Spacecraft, Steerable
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.physics import precession
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.schemes.catalogue import Options, RhumbLineOptions
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Limits, Spacecraft
 
 TURN = 2.0 * math.pi / 3.0
 """s of the bodies here."""
@@ -98,7 +97,7 @@ def test_arc_efficiency(torque: float, on_time: float) -> None:
     body = still(tilt=60.0, channels=cross(torque), limits=Limits(horizon=2000.0))
     made = feasible_by("rhumb-line", body, Options(on_time=on_time)).pulses
     assert {pulse.on_time for pulse in made} == {on_time}
-    turned = sum(pulse.magnitude * pointing.arc_efficiency(3.0, pulse.on_time) for pulse in made)
+    turned = sum(pulse.magnitude * precession.arc_efficiency(3.0, pulse.on_time) for pulse in made)
     assert 1.0 < turned / body.turning_impulse < 1.0 + 3.0 / len(made)
 
 
@@ -213,10 +212,10 @@ def test_where_there_is_no_train_the_reason_is_said() -> None:
 def test_course_and_way_of_a_rhumb_line(seed: int) -> None:
     """Small steps on the course as it is at each point end on the target after the way reported at first."""
     here, target, sun = (axis / np.linalg.norm(axis) for axis in np.random.default_rng(seed).normal(size=(3, 3)))
-    _, way = pointing.course(here, target, sun)
+    _, way = precession.course(here, target, sun)
     steps, courses = 4000, []
     for number in range(steps):
-        ahead, left = pointing.course(here, target, sun)
+        ahead, left = precession.course(here, target, sun)
         assert left == pytest.approx(way * (1 - number / steps), abs=2e-3 * way + 1e-6)
         if left > 0.05 * way:  # its angle to the Sun is the same all the way
             bright = sun - (sun @ here) * here

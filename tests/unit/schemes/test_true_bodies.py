@@ -18,18 +18,19 @@ from support.golden import check_text
 from support.places import case
 from support.process import Run
 
-from nutdamp import flight, planning
-from nutdamp.files.check_json import checked_json
-from nutdamp.files.examples import example_text
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.physics import forced, inertia, rigid
-from nutdamp.planning import plan
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import CLASSIC, Options
-from nutdamp.schemes.tools.impulse_builder import ImpulseBuilder
-from nutdamp.schemes.tools.symmetric_model import model_of, steady_omega
-from nutdamp.spacecraft import Channel, Disturbance, Inertia, Limits, Spacecraft, Steerable
+from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics import response, taylor
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.catalogue import CLASSIC, Options
+from nutdamp.schemes.sequential import ImpulseBuilder, model_of, steady_omega
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views.check_json import checked_json
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 DISTURBED = Options(with_disturbances=True)
@@ -72,7 +73,7 @@ def test_a_plan_says_how_much_is_due_to_unequal_moments() -> None:
     made = plan(replace(body(123.0, 117.0, 80.0), limits=Limits(tick=0.05)), "four-pulse")
     (said,) = [remark for remark in remarks(made) if "I1 ≠ I2" in remark]
     symmetric = replace(made.spacecraft, inertia=Inertia((120.0, 120.0, 80.0)))
-    without, flown = flight.flown(symmetric, made.pulses).residual.nutation, left(made).nutation
+    without, flown = propagation.flown(symmetric, made.pulses).residual.nutation, left(made).nutation
     shares = [f"{math.degrees(angle):.3g}°" for angle in (abs(flown - without), flown, without)]
     assert len(set(shares)) == 3
     assert [word.strip(":,") for word in said.split() if "°" in word] == shares
@@ -128,7 +129,7 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
     spacecraft, times = under(Disturbance(0.3 + 0.1j, rate=2.0)), np.linspace(0.0, 5.0, 7)
     shape, start = spacecraft.inertia, steady_omega(spacecraft, 0.0)
     torque = np.array([0.3 + 0.1j]), np.array([2.0])
-    moved = forced.rotating_torques(times, start, spacecraft.spin, shape.A, shape.C, *torque)
+    moved = response.rotating_torques(times, start, spacecraft.spin, shape.A, shape.C, *torque)
     assert moved == pytest.approx(np.array([steady_omega(spacecraft, time) for time in times]), rel=1e-12)
     for beats, settles in ((0.9, False), (1.1, True)):
         rate = 2.0 * math.pi * beats / EXAMPLE.horizon - EXAMPLE.inertia.a * EXAMPLE.spin
@@ -173,10 +174,10 @@ def test_within_rounding_of_a_sphere_plan_and_check_agree_that_it_is_one() -> No
 def test_on_either_side_of_the_tolerance_every_scheme_answers(off: float, scheme: str) -> None:
     """The sphere within it; beyond it a body whose nutation takes years to turn in the body."""
     for first, second, third in ((1 + off, 1, 1), (1, 1 + 2 * off, 1 + off), (1, 1, 1 - off)):
-        if off > inertia.DEGENERATE and first != second:
+        if off > rigid_body.DEGENERATE and first != second:
             continue  # no spin about an axis of the middle moment
         moments = 100.0 * first, 100.0 * second, 100.0 * third
-        assert (Inertia(moments).a == 0.0) == (off <= inertia.DEGENERATE)
+        assert (Inertia(moments).a == 0.0) == (off <= rigid_body.DEGENERATE)
         for plain in (
             spinner(moments=moments, phase=math.pi, channels=cross(8.0)),
             spinner(moments=moments, phase=0.7, channels=cross(8.0), spin=-3.0),
@@ -238,13 +239,13 @@ def test_random_bodies_are_damped_and_the_flight_is_true(scheme: str) -> None:
 @pytest.mark.parametrize("spin", [2.0, -2.0])
 def test_a_walk_coasts_as_the_flight_does(C: float, spin: float) -> None:
     body, times = replace(spinner(100.0, C, spin, degrees=50.0), dissipation=12.0), np.linspace(0.0, 40.0, 9)
-    rates, _ = flight.flown(body, Schedule(), 40.0).motion(times)
+    rates, _ = propagation.flown(body, Schedule(), 40.0).motion(times)
     omegas = [ImpulseBuilder(body).omega_at(float(time)) for time in times]
     assert omegas == pytest.approx(rates[:, 0] + 1j * rates[:, 1], abs=1e-12)
     # The example of a course is in no flat spin at 345 s: 45.08° by its book.
     plain = spinner(2000.0, 1000.0, 2.0 * math.pi, 0.0)
     course = replace(plain, omega0=np.array([0.1, 0.0, 2.0 * math.pi]), dissipation=100.0)
-    rates, _ = flight.flown(course, Schedule(), 345.0).motion(np.array([345.0]))
+    rates, _ = propagation.flown(course, Schedule(), 345.0).motion(np.array([345.0]))
     nutation = math.degrees(reference.nutation(course.inertia.moments, rates[0], 1.0))
     assert nutation == pytest.approx(45.08, abs=0.005)
 
@@ -270,13 +271,13 @@ def test_alignments_are_found_while_the_spin_falls_and_none_in_flat_spin() -> No
 @pytest.mark.parametrize("scheme", ["one-pulse", "two-pulse", "four-pulse", deep("optimal")])
 def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With dissipation, only the pulses are integrated: a long wait between them costs nothing."""
-    spans, integrate = list[float](), rigid.integrate
+    spans, integrate = list[float](), taylor.integrate
 
     def counted(*args: object, **named: object) -> object:
         spans.append(float(args[5]) - float(args[4]))  # type: ignore[arg-type]
         return integrate(*args, **named)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(rigid, "integrate", counted)
+    monkeypatch.setattr(taylor, "integrate", counted)
     body = spinner(channels=jets(5.0, 3, 0.5), limits=Limits(horizon=400.0))
     assert plan(replace(body, dissipation=300.0), scheme).feasible
     assert spans

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.builders import channel, fan, spinner
 
-from nutdamp.limits import Windows, commandable, for_pairs, free_windows, longest_on_time, rooms
-from nutdamp.schedule import TOUCHING, channel_pulse, steerable_pulse
-from nutdamp.spacecraft import Limits, Steerable
+from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, free_windows, longest_on_time, rooms
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Limits
+from nutdamp.spacecraft.schedule import TOUCHING, channel_pulse, steerable_pulse
 
 THRUSTER = channel("T", 8.0, 0.0, 0.0)
 

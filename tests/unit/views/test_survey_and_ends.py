@@ -22,20 +22,22 @@ from support.golden import check_text
 from support.places import CASES, case
 from support.process import Run
 
-from nutdamp import flight, planning, rounding, survey
-from nutdamp.files.examples import example_text
-from nutdamp.files.plan_json import final_json, plan_json, target_json
-from nutdamp.files.spacecraft_file import read_spacecraft
-from nutdamp.flight import Residual
-from nutdamp.physics import attitude, forced
-from nutdamp.presentation import figures
-from nutdamp.presentation.plan_tables import channel_text, pulse_table
-from nutdamp.presentation.text import longitude, steering, vector
-from nutdamp.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.schemes import one_pulse
-from nutdamp.schemes.options import SchemeOptions
-from nutdamp.schemes.tools import sun_pulses
-from nutdamp.spacecraft import Attitude, Disturbance, Spacecraft, Steerable
+from nutdamp.common import numerics
+from nutdamp.figures import export, overview
+from nutdamp.files.reader import example_text, read_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Residual
+from nutdamp.physics import attitude, response
+from nutdamp.planning import plan as planning
+from nutdamp.schemes import block_model, one_pulse
+from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.spacecraft.equipment import Steerable
+from nutdamp.spacecraft.model import Attitude, Disturbance, Spacecraft
+from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.views import survey
+from nutdamp.views.plan_json import final_json, plan_json, target_json
+from nutdamp.views.plan_tables import channel_text, pulse_table
+from nutdamp.views.text import longitude, steering, vector
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -57,7 +59,7 @@ SUN_BODY = read_spacecraft(SUNNY, "sunny.yaml")
 
 def fired(body: Spacecraft, on_time: float) -> Residual:
     """What one pulse of the first channel leaves."""
-    return flight.flown(body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))).residual
+    return propagation.flown(body, Schedule((channel_pulse(body.channels[0], 5.0, on_time),))).residual
 
 
 HALF = 0.5 * CALM.body_period
@@ -122,7 +124,7 @@ def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> N
     assert effect.tilt is None
     mark, time = effect.resonant[0]
     assert mark == pytest.approx(math.radians(10.0))
-    assert flight.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
+    assert propagation.flown(body, Schedule(), time).sampled(2, time).nutation[-1] == pytest.approx(mark, rel=1e-9)
 
 
 def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
@@ -137,14 +139,14 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         (effect,) = survey.consequences(body)
         assert effect.tilt is not None
         assert effect.beat is not None
-        swollen = flight.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
+        swollen = propagation.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
         assert swollen.max() == pytest.approx(effect.beat, rel=1e-4)
         assert swollen[-1] < 1e-12
-        steady = forced.steady_response(A, C, 3.0, torque, rate)
+        steady = response.steady_response(A, C, 3.0, torque, rate)
         assert effect.precession == pytest.approx(abs(steady), rel=1e-12)
         assert precession is None or effect.precession == pytest.approx(precession, rel=1e-12)
         kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
-        angles = flight.flown(kept, Schedule(), 10.0).sampled(50, 10.0).nutation
+        angles = propagation.flown(kept, Schedule(), 10.0).sampled(50, 10.0).nutation
         assert np.abs(angles - effect.tilt).max() < 1e-12
 
 
@@ -158,7 +160,7 @@ def test_sun_pulses_are_those_of_the_motion() -> None:
     assert SUN_BODY.sun is not None
     seen = then.rotation.T @ SUN_BODY.sun
     assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
-    times = sun_pulses.sun_pulses(flight.flown(SUN_BODY, Schedule(), 900.0), 900.0)
+    times = block_model.sun_pulses(propagation.flown(SUN_BODY, Schedule(), 900.0), 900.0)
     assert (times[-1] - times[0]) / (len(times) - 1) == pytest.approx(clock.turn, rel=1e-3)
     assert survey.sun_clock(EXAMPLE) is None
 
@@ -189,9 +191,9 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
     assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
     blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
     shown = " ".join(run("check", "-", stdin=blind).stdout.split())
-    seen = sun_pulses.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
-    first = sun_pulses.first_sun_pulse(SUN_BODY)
-    assert seen == pytest.approx(first + sun_pulses.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
+    seen = block_model.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
+    first = block_model.first_sun_pulse(SUN_BODY)
+    assert seen == pytest.approx(first + block_model.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
     assert f"Sun pulses one every 1.998 s on average; the first at {seen:.4g} s" in shown
 
 
@@ -343,18 +345,18 @@ def test_dates_that_no_calendar_has_are_left_out() -> None:
 def test_a_steering_angle_is_the_same_everywhere() -> None:
     body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = figures.flight_figure("timeline", *figures.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    figure = overview.flight_figure("timeline", *export.shown(planning.Plan(body, "x", Schedule((pulse,)))))
     assert any("289.88°" in text.get_text() for text in figure.axes[0].texts)
 
 
 def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
     """Vectors of a track and a check have components of the order of one, or zero."""
     noisy = np.array([[1.0, -4.484e-18, 0.0], [1e-20, 2e-20, -0.0], [5.0, 6e-13, -4.9e-13]])
-    cleaned = rounding.cleaned(noisy)
+    cleaned = numerics.cleaned(noisy)
     assert cleaned.tolist() == [[1.0, 0.0, 0.0], [1e-20, 2e-20, 0.0], [5.0, 6e-13, 0.0]]
     assert not np.signbit(cleaned).any()
     assert vector([4.484e-18, -0.0, 8.0]) == "(0, 0, 8)"
-    assert [rounding.cleaned_change(change, 3.0) for change in (4e-16, -4e-12)] == [0.0, -4e-12]
+    assert [numerics.cleaned_change(change, 3.0) for change in (4e-16, -4e-12)] == [0.0, -4e-12]
     tilted = str(case("tensor-microsat.yaml"))
     rows = list(csv.reader(io.StringIO(run("simulate", tilted, "--scheme", "none", "--csv", "-").stdout)))
     file = json.loads(run("check", tilted, "--json", "-").stdout)["files"][0]

@@ -25,16 +25,16 @@ from support.builders import (
 from support.golden import check_text
 
 import nutdamp
-from nutdamp import compliance, planning, schemes
-from nutdamp.comparison import Comparison, compare
-from nutdamp.compliance import Part
-from nutdamp.hindrance import Hindrance, Obstacle
-from nutdamp.planning import Plan
-from nutdamp.presentation import verdicts
-from nutdamp.recommendation import Standing
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft import Disturbance, Goal, Limits, Requirement, Spacecraft
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import Comparison, compare, infeasibility, remarks
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Hindrance, Obstacle, Standing
+from nutdamp.schemes import catalogue
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement, Spacecraft
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.views import verdicts
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -65,7 +65,7 @@ def test_reasons_and_warnings_say_what_decided_and_what_is_missed() -> None:
     }
     texts = [f"{name}: {said(*each)}; {warned(*each)}" for name, each in plans.items()]
     bodies = (short, replace(short, goal=Goal(spin=3.1)), spinner(channels=(channel("A", 0.0, 0.0, 8.0),)))
-    texts += [verdicts.reason(compare(body, schemes.CLASSIC)) for body in bodies]
+    texts += [verdicts.reason(compare(body, catalogue.CLASSIC)) for body in bodies]
     texts += [verdicts.reason(compare(short, ("optimal",))), verdicts.required(replace(far.spacecraft, goal=WIDE))]
     check_text("verdicts.reasons", "\n".join(texts))
     assert warned(damped) == warned(judged("a", 0.4, required=HALF_A_DEGREE)) == ""  # it complies
@@ -115,7 +115,7 @@ HINDERED: dict[str, tuple[Spacecraft, str]] = {
 def test_what_stands_in_the_way_is_named_and_nothing_else() -> None:
     texts = []
     for name, (body, scheme) in HINDERED.items():
-        compared = compare(body, (scheme,), schemes.Options(with_disturbances=name == "steady tilt"))
+        compared = compare(body, (scheme,), catalogue.Options(with_disturbances=name == "steady tilt"))
         (plan,) = compared.plans
         why = plan.hindrance
         texts += [f"{name}: {why.obstacle}, binding {why.binding}, suspected {why.suspected}", verdict(compared)]
@@ -185,9 +185,9 @@ def test_the_severity_of_many_is_that_of_each() -> None:
     body, generator = replace(spinner(requirement=BOTH), goal=WIDE), np.random.default_rng(1)
     nutation, aim = generator.uniform(0.0, 0.02, (2, 50))
     spin = 3.0 + generator.normal(size=50) * 0.003
-    many = compliance.severity(body, compliance.Left(nutation, aim, spin))
+    many = requirements.severity(body, requirements.Left(nutation, aim, spin))
     for row in range(50):
-        alone = compliance.severity(body, compliance.Left(nutation[row], aim[row], spin[row]))
+        alone = requirements.severity(body, requirements.Left(nutation[row], aim[row], spin[row]))
         assert many[row] == alone
         within = nutation[row] <= math.radians(0.5) and aim[row] <= math.radians(0.2)
         assert (alone <= 1.0) == (within and abs(spin[row] / 3.0 - 1.0) <= 1e-3)
@@ -226,13 +226,13 @@ def test_with_unequal_moments_the_largest_nutation_counts() -> None:
     assert largest > min(angles) * 1.05
     for share, kept in ((1.001, True), (0.999, False)):
         needed = replace(body, requirement=Requirement(nutation=share * largest))
-        assert compliance.unaided(needed) is kept
+        assert requirements.unaided(needed) is kept
         text = verdicts.needless(compare(needed, ("four-pulse",)))
         assert (text is not None) is kept
         assert text is None or f"{math.degrees(largest):.4g} deg" in text
     easy = replace(body, requirement=Requirement(nutation=1.0))
-    assert not compliance.unaided(replace(easy, dissipation=40.0))
-    assert not compliance.unaided(replace(easy, goal=Goal(spin=body.spin)))
+    assert not requirements.unaided(replace(easy, dissipation=40.0))
+    assert not requirements.unaided(replace(easy, goal=Goal(spin=body.spin)))
 
 
 def test_what_dissipation_makes_of_it_counts() -> None:
@@ -240,11 +240,11 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     calm = spinner(degrees=0.3, channels=cross(8.0), requirement=HALF_A_DEGREE, limits=Limits(horizon=20.0))
     growing = replace(calm, dissipation=40.0)
     assert growing.growth > 0.0
-    assert compliance.unaided(growing)
-    assert not compliance.unaided(replace(growing, limits=Limits(horizon=21.0)))
-    assert not compliance.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
+    assert requirements.unaided(growing)
+    assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
+    assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
     check_text("verdicts.needless-growing", verdicts.needless(compare(growing, ("four-pulse",))) or "")
-    assert not compliance.unaided(replace(calm, disturbances=TILTING))
+    assert not requirements.unaided(replace(calm, disturbances=TILTING))
 
 
 @pytest.mark.parametrize(
@@ -256,11 +256,11 @@ def test_changes_of_spin_count(A: float, C: float, degrees: float, horizon: floa
     body = spinner(A, C, degrees=degrees, requirement=Requirement(nutation=math.radians(30)))
     body = replace(body, dissipation=30.0, goal=WIDE, limits=Limits(horizon=horizon))
     ended = reference.fly(body.inertia.moments, body.omega0, [], horizon, growth=body.growth)
-    assert bool(abs(ended.rates[2] - 3.0) <= 3e-3) is kept is compliance.unaided(body)
+    assert bool(abs(ended.rates[2] - 3.0) <= 3e-3) is kept is requirements.unaided(body)
 
 
 SHAKEN = replace(FIRED, disturbances=(Disturbance(0.02 + 0j, rate=-FIRED.spin),), limits=Limits(horizon=20.0))
-AWARE = schemes.Options(with_disturbances=True)
+AWARE = catalogue.Options(with_disturbances=True)
 
 
 def test_planning_with_the_disturbances_is_the_first_cure_where_it_helps() -> None:

@@ -13,18 +13,18 @@ from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.places import case
 
-from nutdamp import flight
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.limits import free_windows
-from nutdamp.planning import plan
-from nutdamp.remarks import remarks
-from nutdamp.schedule import Bounds, Schedule, channel_pulse
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning.decision import remarks
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Program, Solution
 from nutdamp.schemes.optimal.search import _Search
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Disturbance, Goal, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.constraints import free_windows
+from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Bounds, Schedule, channel_pulse
 
 TIGHT = 1e-9
 NOTHING = Allowed()
@@ -161,7 +161,7 @@ def test_a_change_of_spin_that_brings_the_phase_sooner_is_allowed_for() -> None:
     first = channel_pulse(spin_up, 0.0, 80.0 * 0.1 / 1e9)
     made = Schedule((replace(first, t=0.5 * first.on_time), channel_pulse(push, wait, body.least_impulse / 1e9)))
     assert made.end <= body.horizon
-    cost, left = made.total_impulse, flight.flown(body, made).residual.nutation
+    cost, left = made.total_impulse, propagation.flown(body, made).residual.nutation
     assert left < 1e-7
     assert body.least_impulse * (1.0 - 1e-6) <= proved(body, Allowed(left), cost=cost) <= cost * (1.0 + TIGHT)
     fixed, with_plenty = replace(body, channels=(push,)), replace(body, limits=Limits(horizon=60.0))

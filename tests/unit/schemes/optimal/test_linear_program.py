@@ -18,18 +18,18 @@ from support.golden import check_text
 from support.optimal import flies
 from support.places import case
 
-from nutdamp import flight
-from nutdamp.files.spacecraft_file import load_spacecraft
-from nutdamp.planning import plan
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes.optimal import lp_solver, reach, residual_equations
+from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import propagation
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.catalogue import OptimalOptions
+from nutdamp.schemes.optimal import highs, refinement
+from nutdamp.schemes.optimal.highs import GrowingProgram, Optimum
 from nutdamp.schemes.optimal.linear_program import Program
-from nutdamp.schemes.optimal.lp_solver import GrowingProgram, Optimum
 from nutdamp.schemes.optimal.problem import Problem
-from nutdamp.schemes.optimal.residual_equations import Equations
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Goal, Limits, Vector
+from nutdamp.schemes.optimal.refinement import Equations
+from nutdamp.spacecraft.model import Goal, Limits, Vector
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 BODY = spinner(channels=cross(8.0, max_on_time=2.0), limits=Limits(horizon=30.0))
 
@@ -146,7 +146,7 @@ def test_the_optimum_and_its_prices(seed: int) -> None:
         check_same(found, solved(program.grown(5, 8, level=level)))
 
 
-@pytest.mark.parametrize("ways", range(1, 1 + len(lp_solver.WAYS)))
+@pytest.mark.parametrize("ways", range(1, 1 + len(highs.WAYS)))
 def test_every_way_of_solving_finds_the_same(ways: int, monkeypatch: pytest.MonkeyPatch) -> None:
     usual = solved(small(1).grown())
     Failing(monkeypatch, lambda call, _: call <= ways)
@@ -180,7 +180,7 @@ assert other.run() == highspy.HighsStatus.kOk
 """
 SOLVED_IN_SILENCE = """
 import numpy as np
-from nutdamp.schemes.optimal.lp_solver import GrowingProgram
+from nutdamp.schemes.optimal.highs import GrowingProgram
 program = GrowingProgram(np.ones(1), np.zeros(0), np.ones(1))
 program.add(np.array([3.0, 2.0]), np.array([[1.0, 1.0]]), np.array([9.0, 9.0]))
 found = program.optimum()
@@ -260,14 +260,14 @@ def test_goals_within_and_beyond_reach_are_told_apart(seed: int, rows: int) -> N
     assert found.x is not None
     size = float(found.x[-1])
     assert size > 0.01
-    told = [reach.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
+    told = [highs.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
     assert [one is not False for one in told] == [True] * 3 + [False] * 3
     assert all(told[:3])
 
 
 def test_by_so_much_the_goal_may_be_missed() -> None:
     most, goal = np.eye(4) * 0.5, np.array([0.5, 0.5, 0.9, 0.5])
-    assert [reach.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [False, False, True]
+    assert [highs.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [False, False, True]
 
 
 @pytest.mark.weekly
@@ -292,11 +292,11 @@ def test_the_equations_along_a_flight_say_what_a_short_firing_adds(spin: float, 
     body = spinner(100.0, 150.0, spin, 25.0, channels=(channel("T", 3.0, 1.0, 0.4), *cross(4.0)))
     body = replace(body, dissipation=dissipation)
     last = channel_pulse(body.channels[1], 9.0, 0.5)
-    influence = residual_equations.along(flight.flown(body, Schedule((last,))), Equations(), 0.05)
+    influence = refinement.along(propagation.flown(body, Schedule((last,))), Equations(), 0.05)
     for at in (2.0, 6.0):
         added = channel_pulse(body.channels[0], at, 1e-3)
         without, more = (
-            residual_equations.misses(flight.flown(body, Schedule(made)), Equations(shift=False))
+            refinement.misses(propagation.flown(body, Schedule(made)), Equations(shift=False))
             for made in ((last,), (added, last))
         )
         expected = np.hypot(*(influence.rows(np.array([at]))[0] @ added.impulse)[:2])

@@ -15,14 +15,14 @@ from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
 
-from nutdamp.compliance import SAME_COST
-from nutdamp.planning import plan
-from nutdamp.remarks import infeasibility, remarks
-from nutdamp.schemes import Options
+from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.planning.plan import plan
+from nutdamp.schemes.catalogue import OptimalOptions, Options
 from nutdamp.schemes.optimal.linear_program import Program
-from nutdamp.schemes.optimal.residual_equations import Equations, small_angles
-from nutdamp.schemes.options import OptimalOptions
-from nutdamp.spacecraft import Channel, Goal, Limits, Spacecraft
+from nutdamp.schemes.optimal.refinement import Equations, small_angles
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
+from nutdamp.spacecraft.requirements import SAME_COST
 
 STRONG = 1e7
 """N m that make practically ideal impulses: they need a microsecond."""

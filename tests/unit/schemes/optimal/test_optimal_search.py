@@ -19,24 +19,22 @@ from support.optimal import as_found, flies, random_layout
 from support.places import CASES, case
 
 import nutdamp
-from nutdamp import work
-from nutdamp.compliance import DAMPED_ANGLE, SAME_COST
-from nutdamp.files.spacecraft_file import load_spacecraft, read_spacecraft
-from nutdamp.planning import plan
-from nutdamp.remarks import infeasibility
-from nutdamp.schedule import Schedule, channel_pulse
-from nutdamp.schemes import SCHEMES, Options, two_pulse
-from nutdamp.schemes.optimal import candidates, repair, starting_points
-from nutdamp.schemes.optimal.columns import Burn
-from nutdamp.schemes.optimal.descent import Descent
+from nutdamp.common import work
+from nutdamp.files.reader import load_spacecraft, read_spacecraft
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.plan import plan
+from nutdamp.schemes import correction, two_pulse
+from nutdamp.schemes.catalogue import SCHEMES, OptimalOptions, Options, SchemeOptions, TwoPulseOptions
+from nutdamp.schemes.optimal import multistart, problem, search
+from nutdamp.schemes.optimal.descent import Descent, Task
+from nutdamp.schemes.optimal.linear_program import Burn
 from nutdamp.schemes.optimal.problem import DEARER, Problem
-from nutdamp.schemes.optimal.residual_equations import Equations
+from nutdamp.schemes.optimal.refinement import Equations
 from nutdamp.schemes.optimal.search import HALVINGS, _Search
-from nutdamp.schemes.optimal.sequences import Task
-from nutdamp.schemes.options import OptimalOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.tools import least_squares
-from nutdamp.schemes.tools.reasons import bounded_by, no_channels
-from nutdamp.spacecraft import Goal, Limits, Spacecraft
+from nutdamp.schemes.sequential import bounded_by, no_channels
+from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 BODY = spinner(channels=cross(8.0), limits=Limits(horizon=400.0))
 """400 s are 128 inertial nutation periods, so that the horizon can be halved six times."""
@@ -127,7 +125,7 @@ def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
 def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
     body = aimed(spinner(channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)), 60, 10)
     sunny = replace(body, goal=replace(body.goal, sun=np.array([1.0, 0.0, 0.0])))
-    for one, other in zip(*(candidates.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
+    for one, other in zip(*(search.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
         assert [pulse.t for pulse in one] == [pulse.t for pulse in other]
         assert violations(body, one) == []
 
@@ -157,7 +155,7 @@ def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: floa
     body = spinner(channels=cross(8.0, min_on_time=shortest, max_on_time=longest), limits=Limits(horizon=30.0, gap=gap))
     program = Problem(body, PLAIN).program()
     long = tuple(Burn(body.channels[1], t, on) for t, on in ((2.0, 1.1), (5.3, 0.7), (17.0, 2.0)))
-    assert repair._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
+    assert problem._divide(program, (*long, Burn(body.channels[0], 9.0, 0.9 * longest)))
     assert not program.forbidden[[0, 2, 3]].any()  # nothing is too long there
     runs = [(key, len(list(group))) for key, group in itertools.groupby(program.forbidden[1].tolist())]
     assert max(count for key, count in runs if not key) * program.width <= longest + 1e-12
@@ -196,11 +194,11 @@ def test_the_last_pulses_are_corrected_and_for_a_spin_the_one_that_gives_most_to
     scheme: str, spin: float | None, free: int, corrected: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chosen: list[tuple[int, ...]] = []
-    monkeypatch.setattr(least_squares, "correct", lambda *_, **options: chosen.append(options["chosen"]))
+    monkeypatch.setattr(correction, "correct", lambda *_, **options: chosen.append(options["chosen"]))
     axial = (0.0, 0.7, 0.1, 0.0, 0.0, 0.2)
     made = tuple(pulse(5.0 * at, 0.1, np.array([1.0, 0.0, one])) for at, one in enumerate(axial))
     body = replace(BODY, goal=Goal(None, spin))
-    least_squares.Correction(SCHEMES[scheme], SchemeOptions())(body, Schedule(made), free)
+    correction.Correction(SCHEMES[scheme], SchemeOptions())(body, Schedule(made), free)
     assert chosen == [corrected]
 
 
@@ -288,7 +286,7 @@ def test_on_times_are_none_or_at_least_the_least() -> None:
 
 @pytest.mark.deep
 def test_the_same_plan_every_time() -> None:
-    one, two = (starting_points.schedules(task_of(strong()))[0] for _ in range(2))
+    one, two = (multistart.schedules(task_of(strong()))[0] for _ in range(2))
     assert [(pulse.start, pulse.on_time) for pulse in one] == [(pulse.start, pulse.on_time) for pulse in two]
 
 
@@ -303,7 +301,7 @@ def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.Mon
         return flown(self, which, x, kicks)
 
     monkeypatch.setattr(Task, "misses", counted)
-    starting_points.schedules(task_of(replace(strong(40.0, horizon), channels=fan(count, 2e4))))
+    multistart.schedules(task_of(replace(strong(40.0, horizon), channels=fan(count, 2e4))))
     assert 0 < len(calls) < 2000
     assert sum(calls) < 400_000
 
@@ -312,7 +310,7 @@ def test_the_work_is_bounded(horizon: float, count: int, monkeypatch: pytest.Mon
 def test_misses_are_those_of_the_reference_integrator(seed: int) -> None:
     body = replace(strong(30.0, 4.0), channels=cross(3e2))
     task = task_of(body)
-    sequences, x = starting_points.random_starts(task, 4, 1, np.random.default_rng(seed))
+    sequences, x = multistart.random_starts(task, 4, 1, np.random.default_rng(seed))
     which, (starts, on_times) = sequences.which[0].tolist(), np.split(x[0], 2)
     fired = zip(which, starts, on_times, strict=True)
     pulses = (channel_pulse(body.channels[one], start + 0.5 * on, on) for one, start, on in fired)
@@ -334,7 +332,7 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     starts: int, runs: int, looked_at: int, tries: int
 ) -> None:
     task = task_of(strong(30.0, 3.0))
-    begun = starting_points.random_starts(task, 4, starts, np.random.default_rng(5))
+    begun = multistart.random_starts(task, 4, starts, np.random.default_rng(5))
     rows, levels = task.bounds(begun.sequences)
     descent = Descent(task, *begun, kicks=1)
     for _ in range(runs):
@@ -365,5 +363,5 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
 )
 def test_it_costs_no_more_than_a_omega_where_that_can_be_had(body: Spacecraft, shift: bool, near: float) -> None:
     """By one pulse against ω where H is free, by the two exact ones once channels stand in every direction."""
-    made = starting_points.schedules(task_of(body, Equations(shift=shift)))[0]
+    made = multistart.schedules(task_of(body, Equations(shift=shift)))[0]
     assert made.total_impulse == pytest.approx(body.least_impulse, rel=near)

@@ -1,0 +1,238 @@
+"""The one place that turns errors into messages and exit statuses; a real bug keeps its traceback.
+
+The ``nutdamp`` command: its subcommands, loaded when they are used.
+"""
+
+from __future__ import annotations
+
+import gc
+import io
+import os
+import signal
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import FrameType
+
+import click
+
+from nutdamp import __version__
+from nutdamp.cli.screen import say
+from nutdamp.errors import Infeasible, nearest
+
+DONE = 0
+UNREADABLE = 1
+INTERNAL = 1
+BAD_INPUT = 2
+INFEASIBLE = 3
+REQUIREMENT_MISSED = 4
+INTERRUPTED = 128 + signal.SIGINT
+TERMINATED = 128 + signal.SIGTERM
+
+
+class Terminated(BaseException):
+    """SIGTERM came: the run ends in order, so that no temporary file stays behind."""
+
+
+def run(group: click.Group) -> None:
+    """Run ``group`` on the arguments of the process and leave with its exit status."""
+    _open_streams()
+    if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _terminate)
+    try:
+        status = group.main(standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.Exit as leave:
+        status = leave.exit_code
+    except click.ClickException as wrong:
+        message = io.StringIO()
+        wrong.show(file=message)
+        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as what steers a terminal
+        status = BAD_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        say("interrupted")
+        status = INTERRUPTED
+    except Terminated:
+        say("terminated")
+        status = TERMINATED
+    except BrokenPipeError:
+        # The reader of our output has left (`| head`): nothing more to say, and nothing to flush at exit.
+        _silence_stdout()
+        status = UNREADABLE
+    except OSError as wrong:
+        # Files name themselves and become CannotRead or CannotWrite; what has no name is standard output.
+        if wrong.filename is not None:
+            raise
+        _silence_stdout()
+        say(f"nutdamp: cannot write standard output: {wrong.strerror or wrong}")
+        status = UNREADABLE
+    except Exception as wrong:
+        status = _explain(wrong)
+    sys.exit(status if isinstance(status, int) else DONE)
+
+
+def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = False) -> None:
+    """End with the exit status of the first that holds, if any.
+
+    ``failed``: something has a bug or disagrees; ``infeasible``: there is no result; ``missed``: the requirement is.
+    """
+    for holds, status in ((failed, INTERNAL), (infeasible, INFEASIBLE), (missed, REQUIREMENT_MISSED)):
+        if holds:
+            sys.exit(status)
+
+
+def interruption(number: int) -> BaseException:
+    """What ends a run after a signal."""
+    return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one would interrupt the clearing up
+    raise Terminated
+
+
+def _open_streams() -> None:
+    """See that everything can be printed.
+
+    A process that was started without standard output or error (`>&-`) gets some that lead nowhere; where the screen's
+    encoding lacks a character, such as ω in Latin-1, it becomes a question mark.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - until the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _silence_stdout() -> None:
+    """Let what is still buffered for standard output go nowhere, so that Python does not stumble over it at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def tell(wrong: Exception) -> None:
+    """Say on standard error what is wrong; faults of a file begin with its name, all else with that of the program."""
+    from nutdamp.errors import FaultyFile
+
+    say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
+
+
+def _explain(wrong: Exception) -> int:
+    """Say on standard error what the user can cure, and give its exit status; a bug is raised again."""
+    from nutdamp import errors  # here, because a run without errors need not load it
+
+    statuses: dict[type[errors.NutdampError], int] = {
+        errors.CannotRead: UNREADABLE,
+        errors.CannotWrite: UNREADABLE,
+        errors.MissingExtra: UNREADABLE,
+        errors.BadRequest: BAD_INPUT,
+        errors.FaultyFile: BAD_INPUT,
+        errors.Infeasible: INFEASIBLE,
+    }
+    if not isinstance(wrong, errors.NutdampError):
+        raise wrong
+    tell(wrong)
+    return next(status for kind, status in statuses.items() if isinstance(wrong, kind))
+
+
+COMMANDS = {
+    "plan": "Plan pulse schedules that damp the nutation, and compare them.",
+    "simulate": "Propagate a scheme or a schedule; cone angles and axis track.",
+    "trade": "What an earlier end costs: a front of cheapest schedules.",
+    "loop": "Fire from a gyro or an accelerometer, in a closed loop.",
+    "budget": "Hold the nutation: pulses a day, propellant a year.",
+    "fit": "Estimate motion, C/A and thrust from telemetry; re-plan.",
+    "disperse": "Fly many dispersed cases; percentiles, tolerance budget.",
+    "verify": "Fly a schedule by independent means; an error budget.",
+    "report": "One page to hand on, in HTML.",
+    "animate": "Film the body cone rolling on the space cone.",
+    "check": "Check spacecraft files: all faults, derived quantities.",
+    "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",
+    "import": "A spacecraft file from a CCSDS attitude parameter message.",
+    "explain": "The schemes, the equations, the keys of the file, the units.",
+    "init": "Write a commented spacecraft file to start from.",
+    "schema": "JSON Schema of the spacecraft file, for editors.",
+}
+"""The subcommands in the order of a first use, and what the help page says of each."""
+
+
+SHARED = {
+    "animate": "simulate",
+    "budget": "loop",
+    "explain": "check",
+    "import": "export",
+    "init": "check",
+    "schema": "check",
+    "verify": "check",
+}
+"""Commands whose module is that of another one."""
+
+
+class Commands(click.Group):
+    """Subcommands live in modules of their name, or as `SHARED` has it, and load little of others."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
+        """Names in the order of a first use."""
+        return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """The commands on the help page, without loading any of them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that a command line names; a usage error says which one a misspelt name may mean."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-"):
+            close = nearest(name, COMMANDS)
+            ctx.fail(f"there is no command {name!r}" + (f"; did you mean {close!r}?" if close else ""))
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command; where nothing that was asked for is feasible, its JSON file says so all the same."""
+        try:
+            return super().invoke(ctx)
+        except Infeasible as reason:
+            from nutdamp.cli.job import write_infeasible
+
+            write_infeasible(ctx, reason)
+            raise
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """The command of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, function = SHARED.get(cmd_name, cmd_name), f"{cmd_name}_command" if cmd_name in SHARED else "command"
+        command: click.Command = getattr(import_module(f"nutdamp.cli.{module}"), function)
+        return command
+
+
+@click.command(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=(
+        "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 none of the "
+        "schemes is feasible; 4 no feasible plan meets the requirement; 130 interrupted; 143 terminated."
+    ),
+)
+@click.version_option(__version__, prog_name="nutdamp")
+def group() -> None:
+    """Plan which thruster of a nutating spinner to fire, when and for how long.
+
+    Begin with `nutdamp plan`: it plans the built-in example. `nutdamp init` writes a commented spacecraft file to
+    start from.
+    """
+
+
+RARELY = 100_000
+"""New objects between two searches for cycles: loading modules makes very many objects, and few that are garbage."""
+
+
+def main() -> None:
+    """Entry point: run the command line and leave with its exit status."""
+    gc.set_threshold(RARELY)
+    # Read when numpy is loaded. Matrices are small here, so that threads within their products cost more than they
+    # save; dispersed cases have threads of their own.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    run(group)

@@ -1,0 +1,426 @@
+"""Options that plan: the goal, which every command that plans takes, and those of each scheme, of `plan` alone.
+
+The latter are made from the fields of the scheme's options; the help page shows them under a heading per scheme.
+
+Kinds of parameters that several commands take: files, quantities, directions.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+
+import click
+from click.shell_completion import CompletionItem
+
+from nutdamp.cli.screen import debug_option
+from nutdamp.errors import SenselessOption, nearest
+from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, Kind, Options, SchemeOptions, names_of
+
+if TYPE_CHECKING:
+    from nutdamp.spacecraft.model import Spacecraft, Vector
+
+
+if TYPE_CHECKING:
+    ParamType = click.ParamType
+    Choice = click.Choice
+else:
+
+    class ParamType(click.ParamType):
+        """`click.ParamType`, which takes the type of its values in brackets from click 8.4 on only."""
+
+        def __class_getitem__(cls, _: object) -> type[ParamType]:
+            return cls
+
+    class Choice(click.Choice):
+        """`click.Choice`, likewise from click 8.2 on only."""
+
+        def __class_getitem__(cls, _: object) -> type[Choice]:
+            return cls
+
+
+class Named(Choice[str]):
+    """One of some names; for a misspelt one the error names the nearest."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name; a usage error for anything else."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as wrong:
+            close = nearest(str(value), self.choices)
+            if close is None:
+                raise
+            self.fail(f"{wrong.message.rstrip('.')}; did you mean {close!r}?", param, ctx)
+
+
+class SchemeName(Named):
+    """The name of a scheme; there are more of them than a line of the help page holds."""
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
+        """Shown in the help page."""
+        return "SCHEME"
+
+
+class Bare(float):
+    """A number that was written without a unit."""
+
+
+def is_number(word: str) -> bool:
+    """Whether a word of the command line is a number without a unit."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+class FileName(ParamType[str]):
+    """A file name as it is, which shells complete; whether it can be read or written is seen when it is."""
+
+    name = "file"
+    completed_as = "file"
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - signature of click
+        param: click.Parameter,  # noqa: ARG002
+        incomplete: str,
+    ) -> list[CompletionItem]:
+        """Leaves it to the shell to complete the name."""
+        return [CompletionItem(incomplete, type=self.completed_as)]
+
+
+class FolderName(FileName):
+    """The same for a folder."""
+
+    name = "folder"
+    completed_as = "dir"
+
+
+FILE = FileName()
+FOLDER = FolderName()
+
+
+class Quantity(ParamType[float]):
+    """A number in SI or a text with a unit, as in a spacecraft file."""
+
+    name = "quantity"
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The SI value; a usage error for anything else."""
+        from nutdamp.units import parse
+
+        try:
+            number = parse(value, self.kind, bare=True)
+        except ValueError as wrong:
+            self.fail(str(wrong), param, ctx)
+        return Bare(number) if isinstance(value, str) and is_number(value) else number
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
+        """Shown in the help page; click gives a context from 8.2 on."""
+        return self.kind.upper()
+
+
+class EndTime(Quantity):
+    """A time after t = 0."""
+
+    def __init__(self) -> None:
+        super().__init__("time")
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The time in s; a usage error for anything else."""
+        time = super().convert(value, param, ctx)
+        if time <= 0.0:
+            self.fail("expected a time after t = 0", param, ctx)
+        return time
+
+
+class FinalSpin(Quantity):
+    """A rate, or ``keep``."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The rate in rad/s, or ``keep`` as it is."""
+        return value if value == "keep" else super().convert(value, param, ctx)
+
+
+def reading_of(value: float, kind: str, meant: str) -> str:
+    """How a number without unit is read, and what to write if another unit is ``meant``."""
+    from nutdamp.files.plausibility import reading
+
+    return reading(int(value) if value.is_integer() else float(value), kind, meant)
+
+
+class Angles(NamedTuple):
+    """Two angles in rad that name a direction."""
+
+    first: float
+    second: float
+
+    @property
+    def readings(self) -> tuple[str, ...]:
+        """How the numbers without unit are read that are more likely degrees: whole ones, and more than a turn."""
+        bare = [one for one in self if isinstance(one, Bare)]
+        doubtful = [one for one in bare if one and (one.is_integer() or abs(one) > 2.0 * math.pi)]
+        return tuple(reading_of(one, "angle", "deg") for one in doubtful)
+
+
+class Direction(ParamType[Angles]):
+    """Two angles with a comma between them."""
+
+    name = "angle,angle"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Angles:
+        """Both in rad; a usage error for anything else."""
+        if isinstance(value, Angles):
+            return value
+        parts = [part.strip() for part in str(value).split(",")]
+        if len(parts) != 2:
+            self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
+        first, second = (Quantity("angle").convert(part, param, ctx) for part in parts)
+        return Angles(first, second)
+
+
+class Count(ParamType[int]):
+    """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
+
+    name = "count"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; a usage error for anything else."""
+        try:
+            number = float(value)
+        except ValueError:
+            number = 0.0
+        if not (1.0 <= number <= 1e12 and number.is_integer()):
+            self.fail(f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx)
+        return int(number)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
+        """Shown in the help page."""
+        return "N"
+
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+GOAL = "Goal and motion"
+"""Heading of the options that say what is to be reached."""
+
+FASTEST = 100.0
+"""rad/s; no spacecraft spins faster, so a larger number without unit is more likely one of rpm, as a whole one is."""
+
+COUNT_FROM_ONE = click.IntRange(1)
+
+WIDEST = 26
+"""Characters of an option that its help comes beside; below a longer one."""
+
+SHARED = names_of(SchemeOptions)
+"""Options of every scheme."""
+
+
+NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
+
+
+class Grouped(click.Option):
+    """An option under a heading of its own on the help page."""
+
+    def __init__(self, *args: Any, group: str, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.group = group
+
+
+class PlanningCommand(click.Command):
+    """A command whose help page has headings, and which says where the options of the schemes are."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options under their headings, those without one first."""
+        groups: dict[str, list[tuple[str, str]]] = {"Options": [], GOAL: []}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None and isinstance(parameter, click.Option):
+                groups.setdefault(getattr(parameter, "group", "Options"), []).append(record)
+        for heading, records in groups.items():
+            if records:
+                with formatter.section(heading):
+                    formatter.write_dl(records, col_max=WIDEST)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does; an option of a scheme that this command does not take says where to give it."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as wrong:
+            name = wrong.option_name.removeprefix("--").replace("-", "_")
+            if name == "sun":
+                raise click.UsageError(NO_SUN, ctx) from None
+            readers = [scheme for scheme, entry in SCHEMES.items() if name in names_of(entry.options)]
+            if not readers:
+                raise
+            message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
+            if any(parameter.name == "schedule" for parameter in self.params):
+                message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
+            raise click.UsageError(message, ctx) from None
+
+
+def goal_options(command: Command, *, several: bool = True) -> Command:
+    """What is to be reached: gathered into ``aim`` for `load`, and ``options`` of every scheme.
+
+    ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
+    """
+
+    @functools.wraps(command)
+    def gathered(*args: Any, with_disturbances: bool, **parameters: Any) -> Any:
+        own = parameters.pop("options", Options())
+        options = Options(**own.chosen, with_disturbances=with_disturbances)
+        aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
+        return command(*args, options=options, aim=aim, **parameters)
+
+    wrapped: Any = gathered
+    option = functools.partial(click.option, cls=Grouped, group=GOAL)
+    sun = option(
+        "--sun",
+        type=Direction(),
+        metavar="ANGLE,ANGLE",
+        help="The Sun, as --target; rhumb-line keeps its phase.",
+    )
+    for add in (
+        *((debug_option,) if several else ()),
+        option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
+        *((sun,) if several else ()),
+        option(
+            "--spin",
+            type=FinalSpin("rate"),
+            metavar="RATE|keep",
+            help="Final spin rate, such as 30rpm; optimal can set it.",
+        ),
+        option(
+            "--target",
+            type=Direction(),
+            metavar="ANGLE,ANGLE",
+            help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
+        ),
+    ):
+        wrapped = add(wrapped)
+    return cast(Command, wrapped)
+
+
+def scheme_options(command: Command) -> Command:
+    """The options of all schemes, gathered into ``options``."""
+    names = [name for name, _, _ in _fields()]
+
+    @functools.wraps(command)
+    def gathered(*args: Any, **parameters: Any) -> Any:
+        taken = {name: parameters.pop(name) for name in names}
+        given = {name: value for name, value in taken.items() if value is not False}  # flags that were not given
+        try:
+            options = Options(**given)
+        except SenselessOption as wrong:
+            hint = f"--{wrong.name.replace('_', '-')}"
+            raise click.BadParameter(wrong.problem, param_hint=hint) from None
+        return command(*args, options=options, **parameters)
+
+    wrapped: Any = gathered
+    for name, field, schemes in reversed(list(_fields())):
+        kind: Kind = field.metadata["kind"]
+        settings: dict[str, Any] = {"is_flag": True} if kind.flag else {"type": _type(kind), "default": field.default}
+        if field.default is not None and not kind.flag:
+            settings["show_default"] = True
+        if settings.get("type") is COUNT_FROM_ONE:
+            settings["metavar"] = "N"
+        wrapped = click.option(
+            f"--{name.replace('_', '-')}",
+            cls=Grouped,
+            group=f"Scheme {' and '.join(schemes)}",
+            help=field.metadata["help"],
+            **settings,
+        )(wrapped)
+    return cast(Command, wrapped)
+
+
+def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
+    """Each option that not all schemes have: its name, its field, and the schemes that have it."""
+    found: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
+    for scheme in SCHEMES.values():
+        for field in dataclasses.fields(scheme.options):
+            if field.name not in SHARED:
+                found.setdefault(field.name, (field, []))[1].append(scheme.name)
+    for name, (field, schemes) in found.items():
+        yield name, field, schemes
+
+
+def _type(kind: Kind) -> click.ParamType[Any]:
+    if kind.names:
+        return Named(kind.names)
+    return COUNT_FROM_ONE if kind.unit is None else Quantity(kind.unit)
+
+
+class Aim(NamedTuple):
+    """A goal as the command line gives it, in place of the one in the file.
+
+    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
+    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    """
+
+    target: Angles | None = None
+    spin: float | str | None = None
+    sun: Angles | None = None
+
+    def applied(self, spacecraft: Spacecraft, remark: Callable[[str], None]) -> Spacecraft:
+        """The spacecraft with this goal; a usage error where it cannot be one, a remark where it is hardly meant."""
+        goal = spacecraft.goal
+        if self.target is not None:
+            goal = dataclasses.replace(goal, axis=_direction(spacecraft, self.target, "--target"))
+        if self.sun is not None:
+            goal = dataclasses.replace(goal, sun=_direction(spacecraft, self.sun, "--sun"))
+        if self.spin is not None:
+            spin = spacecraft.spin if isinstance(self.spin, str) else self.spin
+            if spin * spacecraft.spin <= 0.0:
+                raise click.BadParameter(
+                    f"expected a rate with the sign of the spin ({spacecraft.spin:.4g} rad/s)", param_hint="--spin"
+                )
+            goal = dataclasses.replace(goal, spin=spin)
+        if isinstance(self.spin, Bare) and (self.spin.is_integer() or abs(self.spin) > FASTEST):
+            remark(f"--spin: warning: {reading_of(self.spin, 'rate', 'rpm')}")
+        for option, angles in (("--target", self.target), ("--sun", self.sun)):
+            for reading in () if angles is None else angles.readings:
+                remark(f"{option}: warning: {reading}")
+        return dataclasses.replace(spacecraft, goal=goal)
+
+
+def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
+    """The unit vector (3,) that two angles name, inertial; a usage error where they name none."""
+    from nutdamp.physics.attitude import on_sphere
+
+    if spacecraft.attitude is not None:
+        if abs(angles.second) > 0.5 * math.pi:
+            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
+        return on_sphere(angles.first, angles.second)
+    if not 0.0 <= angles.first < math.pi:
+        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
+    return spacecraft.direction_in_n(angles.first, angles.second)
+
+
+def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
+    return click.BadParameter("; ".join((f"expected {expected}", *angles.readings)), param_hint=option)
+
+
+def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
+    """Say which options none of the schemes ``names`` reads; a usage error where that is the goal itself."""
+    planned = [SCHEMES[name] for name in names]
+    for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
+        readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
+        remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
+    if body.goal.sun is not None:
+        without = [scheme.name for scheme in planned if not scheme.reads_sun]
+        if len(without) == len(planned):
+            raise click.UsageError(NO_SUN)
+        if without:
+            remark(f"--sun is read by {' and '.join(SUNLIT)} alone: {', '.join(without)} plan without it")
+    if planned and body.goal.axis is None and all(scheme.only_points for scheme in planned):
+        turns, needs = ("turns", "needs") if len(names) == 1 else ("turn", "need")
+        problem = f"{turns} the spin axis to a target and {needs} one: --target, or goal in the file"
+        raise click.UsageError(f"{' and '.join(names)} {problem}")

@@ -1,0 +1,487 @@
+"""The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+
+The coast of a closed loop: what the law sees of it sample by sample, and when it decides to fire.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from enum import Enum
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Firing, Glimpse, Law, Stop
+from nutdamp.control_loop.sensor import Estimator, Signal
+from nutdamp.errors import Infeasible, Unsuitable
+from nutdamp.flight.propagation import Dynamics, Path, shed
+from nutdamp.flight.propellant import Supply, weakened
+from nutdamp.physics import taylor
+from nutdamp.spacecraft.constraints import commandable
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop
+from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
+
+GRID = 64
+"""Moments in a nutation period at which a continuous signal is looked at, to find between which two it fires."""
+
+LONGEST = 4096
+"""Moments looked at together, at most."""
+
+MOST = 20_000_000
+"""Moments looked at in a flight, at most: two days of 100 Hz."""
+
+SAMPLED = 1e-6
+"""Part of the time between two samples by which one at the end of a pulse may come before it: rounding."""
+
+REFINED = 60
+"""Steps, at most, in which the moment of a firing is found between two of the `GRID`."""
+
+
+class Seen(NamedTuple):
+    """Some of the moments of a coast: ``times`` (n,) s of the samples, and when they are decided on, ``now`` (n,) s.
+
+    ``z`` is what the law takes for the transverse rate then, ``best`` what is known of it at ``times``; ``spin`` ω3.
+    ``shown`` (n,) rad is the nutation by ``z``; ``fires`` (channels, n): whether each comes to fire. ``size`` rad/s is
+    |z| in truth at the last of the samples.
+    """
+
+    times: Vector
+    now: Vector
+    z: ComplexArray
+    best: ComplexArray
+    spin: Vector
+    shown: Vector
+    fires: NDArray[np.bool_]
+    size: float
+
+
+class Found(NamedTuple):
+    """A firing that the law decides on ``now`` s, row ``row`` of what was seen: it starts at ``start`` s."""
+
+    row: int
+    now: float
+    start: float
+    actuator: Actuator
+    firing: Firing
+
+
+class Watch:
+    """What the law makes of the samples of coasts from ``since`` s on, which is (cases, 1) where there are many.
+
+    ``reach``: samples that are looked at together next.
+    """
+
+    def __init__(self, law: Law, since: Any) -> None:
+        self.law, self.sensor = law, law.loop.sensor
+        self.estimator = Estimator(law, self.sensor, since)
+        step = self.estimator.step or law.period / GRID
+        self.reach = min(max(round(0.5 * law.period / step), 2), LONGEST)
+        self._waits: Vector | None = None
+
+    @property
+    def ahead(self) -> float:
+        """How long before its start a firing is decided on, s: until the next sample, where the law predicts."""
+        return self.estimator.step if self.law.loop.predict else 0.0
+
+    @property
+    def doubled(self) -> int:
+        """Samples of the look after the next, at most."""
+        return min(2 * self.reach, LONGEST)
+
+    def first(self, since: Any) -> Any:
+        """Number of the first sample of a coast from ``since`` s on."""
+        assert self.sensor.rate is not None
+        return np.ceil(since * self.sensor.rate - SAMPLED).astype(int)
+
+    def judged(
+        self, times: Vector, values: Vector, spin: Vector, active: NDArray[np.bool_]
+    ) -> tuple[ComplexArray, ComplexArray, Vector, NDArray[np.bool_]]:
+        """z on board, what is known of z, the nutation by it, and whether channels come to fire, (channels, ..., n).
+
+        The latter only where the loop is ``active``, or where it may become so: it matters nowhere else.
+        """
+        raw = self.estimator.feed(times, values, spin)
+        z, best = self.estimator.on_board(raw, spin), self.estimator.best(raw, spin)
+        shown = self.law.nutation(np.abs(z), spin)
+        fires = np.zeros((len(self.law.actuators), *times.shape), dtype=bool)
+        awake = active | np.any(shown >= self.law.loop.start, axis=-1)
+        before = np.full((*fires.shape[:-1], 1), math.nan) if self._waits is None else self._waits
+        if np.all(awake):
+            waits = self.waits(z, spin)
+            fires = self.triggered(np.concatenate([before, waits], axis=-1))
+            self._waits = waits[..., -1:]
+        else:
+            self._waits = self.waits(z[..., -1:], spin[..., -1:])
+            if np.any(awake):
+                waits = np.concatenate([before[:, awake], self.waits(z[awake], spin[awake])], axis=-1)
+                fires[:, awake] = self.triggered(waits)
+        return z, best, shown, fires
+
+    def some(self, cases: NDArray[Any]) -> Watch:
+        """That of some of the cases."""
+        found = copy.copy(self)
+        found.estimator = self.estimator.some(cases)
+        found._waits = None if self._waits is None else self._waits[:, cases]
+        return found
+
+    def found(self, seen: Seen, row: int, channels: list[int]) -> Found | None:
+        """The firing of those of the ``channels`` that comes first, decided on at ``row``."""
+        fired = [self._firing(seen, row, self.law.actuators[index]) for index in channels]
+        made = [one for one in fired if one is not None]
+        return min(made, key=lambda one: one.start) if made else None
+
+    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Found | None:
+        now = float(seen.now[row])
+        firing = self.law.firing(actuator, complex(seen.z[row]), float(seen.spin[row]))
+        if firing is None:
+            return None
+        return Found(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
+
+    def waits(self, z: ComplexArray, spin: Vector) -> Vector:
+        """`Law.waits` of all channels, (channels, ..., n)."""
+        return np.array([self.law.waits(one, z, spin) for one in self.law.actuators])
+
+    def triggered(self, waits: Vector, ahead: float | None = None) -> NDArray[np.bool_]:
+        """Whether each channel comes to fire at each moment but the first: its wait falls below `ahead`."""
+        before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead if ahead is None else ahead
+        falls = (now < ahead) & (before >= ahead) & (before - now < 0.5 * self.law.period)
+        slack = 1e-12 * self.law.period
+        begins = np.isnan(before) & (now >= -slack) & (now < max(ahead, slack))
+        return np.asarray(falls | begins)
+
+
+class Coast(Watch):
+    """The motion of one body from ``state`` at ``since`` s on without firing, and what is seen of it."""
+
+    def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
+        super().__init__(law, since)
+        self.signal, self.dynamics = signal, dynamics
+        self.path: Path | None = None
+        self.state, self.since = state, since
+        self._from = self._until = since
+        self._number = 0 if self.sensor.rate is None else int(self.first(np.float64(since)))
+
+    def look(self, until: float, *, active: bool) -> Seen | None:
+        """The next moments of the coast; None where all have been looked at, up to a decision at ``until`` s."""
+        begins, end = self._until, until - self.signal.sensor.delay
+        numbers: NDArray[np.int64] | None = None
+        if self.sensor.rate is None:
+            end = min(begins + self.reach * self.law.period / GRID, end)
+            if end <= begins:
+                return None
+            count = max(math.ceil((end - begins) / self.law.period * GRID), 2)
+            times: Vector = np.asarray(np.linspace(begins, end, count + 1)[self.path is not None :], dtype=np.float64)
+        else:
+            last = min(self._number + self.reach - 1, math.floor(end * self.sensor.rate + SAMPLED))
+            if last < self._number:
+                return None
+            numbers = np.arange(self._number, last + 1)
+            times = np.asarray(numbers * self.estimator.step, dtype=np.float64)
+            self._number, end = last + 1, max(float(times[-1]), begins)
+        self._go_to(end)
+        self.reach = self.doubled
+        assert self.path is not None
+        rates, _ = self.path.motion(times)
+        values = self.signal.shown(rates)
+        if numbers is not None:
+            values = self.signal.sampled(numbers, values)
+        spin = rates[:, 2]
+        z, best, shown, fires = self.judged(times, values, spin, np.array(active))
+        size = abs(complex(self.law.seen(complex(*rates[-1, :2]))))
+        return Seen(times, times + self.signal.sensor.delay, z, best, spin, shown, fires, size)
+
+    def _go_to(self, end: float) -> None:
+        """Has a path that reaches from the last moment looked at to ``end`` s."""
+        if self.path is None or not self.dynamics.free:
+            state = self.state if self.path is None else self.at(self._until)
+            self._from = self._until
+            self.path, _ = self.dynamics.path(state, self._from, end, most=taylor.MOST_STEPS)
+        self._until = end
+
+    def at(self, time: float) -> SpinState:
+        """The motion at ``time`` s, which has been looked at or lies within a nutation period behind that."""
+        if time == self.since or self.path is None:
+            return self.state
+        if time > self._until and not self.dynamics.free:
+            self._go_to(time)
+        rates, quaternion = self.path.motion(np.array([time]))
+        first, second, third = rates[0].tolist()
+        return SpinState(complex(first, second), third, quaternion[0])
+
+    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Found | None:
+        if self.sensor.rate is not None:
+            return super()._firing(seen, row, actuator)
+        now, step = float(seen.now[row]), self.law.period / GRID
+        return self._refined(row, now - 2.0 * step, now + step, now, actuator)
+
+    def _refined(self, row: int, low: float, high: float, now: float, actuator: Actuator) -> Found | None:
+        """The moment at which the wait of a continuous signal is over, by Newton's steps: it falls by 1 s a second."""
+        low = max(low, self.estimator.since + self.signal.sensor.delay)
+        firing = None
+        for _ in range(REFINED):
+            firing = self._wait_at(now, actuator)
+            if firing is None:
+                return None
+            if firing.wait > 0.0:
+                low = now
+            else:
+                high = now
+            following = now + firing.wait
+            following = following if low <= following <= high else 0.5 * (low + high)
+            if abs(following - now) <= 2.0 * math.ulp(now):
+                break
+            now = following
+        assert firing is not None
+        return Found(row, now, now, actuator, firing)
+
+    def _wait_at(self, now: float, actuator: Actuator) -> Firing | None:
+        time = now - self.signal.sensor.delay
+        assert self.path is not None
+        rates, _ = self.path.motion(np.array([time]))
+        z = self.estimator.feed(np.array([time]), self.signal.shown(rates), rates[:, 2])
+        return self.law.firing(actuator, complex(self.estimator.on_board(z, rates[:, 2])[0]), float(rates[0, 2]))
+
+
+MOST_FIRINGS = 10_000
+"""Firings of one flight, at most."""
+
+NO_NOISE = 8.0
+"""Sigmas that noise does not reach: a chance of 1e-15 a sample."""
+
+WAVES = 40.0
+"""Time constants of the low-pass filter after which it has forgotten how it began."""
+
+
+class Fired(NamedTuple):
+    """A firing: the ``pulse`` as it acts, when it was ``decided`` on (s), and the nutation (rad) that was seen then.
+
+    ``true_nutation`` rad is what it was in truth as the pulse began.
+    """
+
+    pulse: Pulse
+    decided: float
+    seen: float
+    true_nutation: float
+
+
+class Scatter(Protocol):
+    """By what single firings are off: the factor on the thrust of each, and by how many s it comes late."""
+
+    def of(self, number: int) -> tuple[float, float]:
+        """Of the firing of a ``number`` from 0."""
+        ...
+
+
+class Course(Enum):
+    """What a loop does next where it neither fires nor waits: looks on, or is over."""
+
+    ON = "on"
+    OVER = "over"
+
+
+class Pilot:
+    """The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+
+    The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
+    ``free``: coasts are those of a symmetric body without torque from outside.
+    """
+
+    def __init__(
+        self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
+    ) -> None:
+        if shed(truth) is not None:
+            problem = "a loop flies with constant moments of inertia; leave this out"
+            raise Unsuitable(("tank", "inertia_per_kg"), problem)
+        self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
+        self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
+        self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
+        self.channels = {channel.name: channel for channel in truth.channels}
+        self.supply = Supply(truth)
+        self.fired: list[Fired] = []
+        self.quiet: list[float] = []
+        self.active, self.looked_at = False, 0
+        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
+        self._found: Found | None = None
+        self._pending: tuple[Pulse, Firing, Glimpse] | None = None
+        self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
+
+    def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
+        """What comes after a stretch of a coast: a pulse; nothing to be seen until a time, s; or `Course`."""
+        self.looked_at += len(seen.times)
+        if self.looked_at > MOST:
+            raise Infeasible(
+                f"more than {MOST:.2g} samples by {seen.times[0]:.6g} s; an earlier end, or a lower rate, helps"
+            )
+        self._seen.append((seen.times, seen.best, seen.spin))
+        self._latest, self._shown = len(seen.times), seen.shown
+        self._found = self._decide(coast, seen)
+        if self.ending[0].fault:
+            return Course.OVER
+        if self._found is not None:
+            return self._pulse(self._found) or Course.OVER
+        self._forget()
+        later = None if self.active or self._pending is not None else self._idle_until(seen)
+        if later is None:
+            return Course.ON
+        self._seen = []
+        return later
+
+    @property
+    def lost(self) -> bool:
+        """Whether the loop does not comply, whatever it leaves: stopped, or fires and was never down to stop."""
+        return self.ending[0] is not Stop.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
+
+    def _pulse(self, found: Found) -> Pulse | None:
+        """What the channel does in truth when it is commanded; None where it may not, or not before the end."""
+        known, channel = found.actuator.channel, self.channels[found.actuator.channel.name]
+        made = channel_pulse(known, found.start + found.firing.lead, found.firing.on_time)
+        if known.valve is not None:
+            made = commandable(self.law.spacecraft, made)
+        factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
+        if channel is not known or late != 0.0:
+            begins, lasts = made.loaded
+            made = on_command(channel, max(begins + late, found.now), lasts)
+        if made.over > self.until:
+            return None
+        if len(self.fired) == self.most:
+            self.ending = Stop.FULL, ""
+            if self.most == MOST_FIRINGS:
+                raise Infeasible(f"more than {MOST_FIRINGS} firings by {made.start:.6g} s; an earlier end helps")
+            return None
+        made = self.supply.fire(made, channel)
+        if self.supply.shortage is not None:
+            self.ending = Stop.EMPTY, ""
+        sense = -factor if channel.name in self.loop.reversed else factor
+        return made if sense == 1.0 else weakened(made, sense)
+
+    def take(self, pulse: Pulse, size: float, spin: float) -> None:
+        """Notes a firing, with |z| and ω3 (rad/s) in truth as it begins, and what was seen before it."""
+        found = self._found
+        assert found is not None
+        true = float(self.law.nutation(size, spin))
+        self.fired.append(Fired(pulse, found.now, float(self._shown[found.row]), true))
+        glimpse = self._glimpse(pulse.t, found.row, last=True)
+        self._pending = None if glimpse is None else (pulse, found.firing, glimpse)
+        self._seen = []
+        self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+
+    def _forget(self) -> None:
+        """Keeps of what was seen the last period, or all since a firing that is not judged yet."""
+        if self._pending is None:
+            last = self._seen[-1][0]
+            edge = last[-1] - self.law.period
+            if last[0] <= edge:
+                row = int(np.searchsorted(last, edge))
+                times, best, spin = self._seen[-1]
+                self._seen = [(times[row:].copy(), best[row:].copy(), spin[row:].copy())]
+            else:
+                self._seen = self._seen[-3:]
+
+    def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
+        """What was seen on this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
+        times, best, spin = (
+            self._seen[0] if len(self._seen) == 1 else map(np.concatenate, zip(*self._seen, strict=True))
+        )
+        count = len(times) - self._latest + row + 1
+        times, best, spin = times[:count], best[:count], spin[:count]
+        known = ~np.isnan(best)
+        if not known.any():
+            return None
+        times, best, spin = times[known], best[known], spin[known]
+        edge = times[-1] - self.law.period if last else times[0] + self.law.period
+        near = times >= edge if last else times <= edge
+        rate = complex(self.law.rate(float(spin[-1])), self.law.growth)
+        return Glimpse.of(times[near], best[near], rate, centre)
+
+    def _decide(self, coast: Watch, seen: Seen) -> Found | None:
+        """The first firing among the moments of a stretch; thresholds and firings are judged in their order."""
+        shown, fires, count, row = seen.shown, seen.fires, len(seen.times), 0
+        while row < count:
+            if not self.active:
+                begins = _first(np.asarray(shown >= self.law.loop.start), row)
+                if begins is None:
+                    break
+                self.active, row = True, begins
+            downs = _first(np.asarray(shown <= self.law.loop.stop), row)
+            fire = _first(np.asarray(fires.any(axis=0)), row)
+            if downs is not None and (fire is None or downs <= fire):
+                self.active, row = False, downs + 1
+                self.diagnosis.rest()
+                self.quiet.append(float(seen.now[downs]))
+                continue
+            if fire is None:
+                break
+            if self._faulty(coast, seen, fire):
+                return None
+            found = self._allowed(coast, seen, fire, np.flatnonzero(fires[:, fire]).tolist())
+            if found is not None:
+                return found
+            row = fire + 1
+        if count and (self._pending is None or seen.times[-1] >= self._known(coast)):
+            self._faulty(coast, seen, count - 1)
+        return None
+
+    def _known(self, coast: Watch) -> float:
+        """The sample, s, by which enough has been seen of the coast after a firing to judge it."""
+        last = self.until - self.loop.sensor.delay - coast.estimator.step
+        return min(float(coast.estimator.first) + self.law.period, last)
+
+    def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
+        """Judges the last firing by what was seen since, up to a ``row``; whether the loop has to stop."""
+        if self._pending is not None:
+            pulse, firing, before = self._pending
+            after = self._glimpse(pulse.t, row, last=False)
+            if after is not None:
+                self._pending = None
+                now = max(float(seen.now[row]), self.ready)
+                verdict = self.diagnosis.judge(pulse.channel, now, before, after, firing.acts, coast.estimator.doubts)
+                if verdict is not None:
+                    self.ending = verdict
+        if self._pending is None and not self.ending[0].fault:
+            overdue = self.diagnosis.overdue(float(seen.now[row]))
+            if overdue is not None:
+                self.ending = overdue
+        return self.ending[0].fault
+
+    def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Found | None:
+        """The firing at a row, on a tick, if the limits allow it."""
+        usable = [index for index in channels if self.law.actuators[index].channel.name != self.diagnosis.suspect]
+        found = coast.found(seen, row, usable)
+        if found is None:
+            return None
+        windows = self.law.windows
+        start = windows.nearest_tick(found.start)
+        start = windows.tick_after(found.start) if start < found.now else start
+        return found._replace(start=start) if windows.allows(start, found.firing.lasts, self.ready) else None
+
+    def _idle_until(self, seen: Seen) -> float | None:
+        """When the sensor can first show the start threshold, less what it takes to be looking; None where soon."""
+        law, sensor = self.law, self.loop.sensor
+        if not self.free:
+            return None
+        now, spin = float(seen.times[-1]), float(seen.spin[-1])
+        share = 0.5 if sensor.kind == ACCELEROMETER else 1.0
+        reach = (share * law.size(law.loop.start, spin) - self._margin) / max(map(abs, sensor.scales))
+        if reach <= seen.size:
+            return None
+        growth = self.truth.growth
+        # tan θ grows by e^{κt}, and |ω| by no more.
+        waits = math.log(reach / seen.size) / growth if growth > 0.0 < seen.size else math.inf
+        later = min(now + waits, self.until) - max(law.period, WAVES * sensor.low_pass) - law.period / GRID
+        return later if later > now + law.period else None
+
+    @cached_property
+    def _margin(self) -> float:
+        """By how much the sensor may show too much of |z|, rad/s."""
+        estimator = Estimator(self.law, self.loop.sensor, 0.0)
+        return estimator.offset + NO_NOISE * estimator.doubt
+
+
+def _first(mask: NDArray[np.bool_], row: int) -> int | None:
+    """Number of the first true one from ``row`` on."""
+    found = int(np.argmax(mask[row:]))
+    return row + found if mask[row + found] else None

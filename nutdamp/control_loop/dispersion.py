@@ -1,0 +1,561 @@
+"""Loops of many dispersed cases: how many settle, when, where they end, what they use, and which are the worst.
+
+The dispersed cases of a loop: the body, the thrusters, the valves and the sensor as they are in truth.
+
+The law on board knows the spacecraft file alone. What a case differs in is drawn as for a schedule, by the same names
+from the same streams, and for the sensor: bias and scale of each gyro, noise and delay.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.control_loop.batch import Case, Flown, expects_alone, fly_alone, fly_together
+from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.simulation import until_default
+from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
+from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.montecarlo.cases import Model, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.closed_form import carried
+from nutdamp.montecarlo.inputs import (
+    BLOCK,
+    BY_VALVE,
+    SCHEDULE_IDLE,
+    Draws,
+    Group,
+    Input,
+    Inputs,
+    Source,
+    independent,
+    list_inputs,
+    of_sensor,
+)
+from nutdamp.montecarlo.statistics import Exact, Worst, angle
+from nutdamp.montecarlo.study import KEPT_WORST, Counted
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor, Thruster
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Left
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Tolerance
+
+OF_FIRINGS = ("thrust_per_pulse", "timing")
+"""Tolerances that each firing draws anew."""
+
+TAG = 1
+"""Ends the key of the random numbers of a firing: those of the noise are keyed by block alone."""
+
+
+@dataclass(frozen=True)
+class Off:
+    """By what single firings of a case are off, drawn by the ``key`` of the case; ``late`` s is that of all of them."""
+
+    key: tuple[int, ...]
+    thrust: Tolerance | None
+    timing: Tolerance | None
+    late: float = 0.0
+
+    def of(self, number: int) -> tuple[float, float]:
+        """Factor on the thrust of the firing of a ``number`` from 0, and by how many s it is late."""
+        if self.thrust is None and self.timing is None:
+            return 1.0, self.late
+        random = np.random.default_rng((*self.key, number, TAG))
+        thrust, timing = (_drawn(random, one) for one in (self.thrust, self.timing))
+        return max(1.0 + thrust, 0.0), self.late + timing
+
+
+def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
+    """A deviation."""
+    if tolerance is None:
+        return 0.0
+    first, second = random.random(2)
+    normal = float(random.standard_normal())
+    unit = {"normal": normal, "uniform": 2.0 * first - 1.0, "triangular": first + second - 1.0, "bias": 1.0}
+    return tolerance.size * float(unit[tolerance.kind])
+
+
+@dataclass(frozen=True, eq=False)
+class LoopModel:
+    """A spacecraft as its ``law`` on board knows it, ready to be dispersed; ``of_firings``: what each firing draws."""
+
+    law: Law
+    inputs: Inputs = field(init=False)
+    of_firings: tuple[Input, ...] = field(init=False)
+    _body: Model = field(init=False)
+
+    def __post_init__(self) -> None:
+        body = self.law.spacecraft
+        fired = Schedule(tuple(channel_pulse(one.channel, 0.0, one.shortest or 1.0) for one in self.law.actuators))
+        object.__setattr__(self, "_body", Model(body, fired))
+        drawn, unused = list_inputs(body, fired)
+        sensor, idle = of_sensor(body)
+        kept = [one for one in drawn if one.tolerance not in OF_FIRINGS]
+        rest = [one for one in unused if not one.name.startswith("sensor ")]
+        idle = (
+            tuple(one._replace(reason=one.reason.replace(SCHEDULE_IDLE, "the loop does not fire")) for one in rest)
+            + idle
+        )
+        object.__setattr__(self, "inputs", Inputs((*kept, *sensor), idle))
+        each = {one.tolerance: one._replace(name=one.tolerance) for one in drawn if one.tolerance in OF_FIRINGS}
+        object.__setattr__(self, "of_firings", tuple(each.values()))
+
+    @property
+    def spacecraft(self) -> Spacecraft:
+        """The spacecraft as the law knows it."""
+        return self.law.spacecraft
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """Inputs that are correlated."""
+        return self._body.groups
+
+    @property
+    def target(self) -> Vector:
+        """Where H shall point, a unit vector (3,) in the body axes of t = 0 as they are known."""
+        return self._body.target
+
+    @property
+    def scattered(self) -> tuple[Tolerance | None, Tolerance | None]:
+        """What each firing draws anew: of its thrust, of its time."""
+        requested = self.law.spacecraft.dispersions
+        return (None, None) if requested is None else (requested.thrust_per_pulse, requested.timing)
+
+    def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
+        """Which cases can be: those of the body, with a sensor that shows something and no signal before its time."""
+        good: Any = self._body.physical(draws)
+        delay = self.law.loop.sensor.delay
+        for name, draw in draws.items():
+            if name == "sensor delay":
+                good = good & (delay + draw >= 0.0)
+            elif name.startswith(("sensor scale", "sensor noise")):
+                good = good & (draw > -1.0)
+        return good  # type: ignore[no-any-return]
+
+    def cases(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
+        """The cases of a study that have these ``numbers``, from 0, with their ``draws``, (n,) or one for all."""
+        count = len(numbers)
+        body = self.law.spacecraft
+        draws = _at_pressure(body, draws)
+        whole = {name: np.broadcast_to(draw, count) for name, draw in draws.items()}
+        model = self._body.cases(draws)
+        moments = np.array([np.broadcast_to(one, count) for one in model.moments]).T.tolist()
+        rates = np.array([np.broadcast_to(one, count) for one in model.omega0]).T
+        tilts = np.array([np.broadcast_to(one, count) for one in model.tilt]).T
+        attitudes = None if body.attitude is None else self._attitudes(tilts)
+        torques = {one.name: self._torques(one, draws, count) for channel in body.channels for one in channel.thrusters}
+        found = []
+        for row, number in enumerate(numbers.tolist()):
+            draw = {name: float(values[row]) for name, values in whole.items()}
+            key = (seed, number + 1)
+            truth = replace(
+                body,
+                inertia=Inertia((moments[row][0], moments[row][1], moments[row][2]), body.inertia.axes),
+                omega0=rates[row],
+                attitude=None if attitudes is None else Attitude(attitudes[row]),
+                channels=self._channels(draw, {name: torque[row] for name, torque in torques.items()}),
+                loop=replace(self.law.loop, sensor=_sensor(self.law.loop.sensor, draw)),
+            )
+            if "cold" in draw and body.cold is not None:
+                truth = replace(truth, cold=replace(body.cold, first=max(body.cold.first + draw["cold"], 0.0)))
+            if "cold_pulses" in draw and truth.cold is not None:
+                truth = replace(truth, cold=replace(truth.cold, pulses=truth.cold.pulses + draw["cold_pulses"]))
+            if any(name.startswith("tank ") for name in draw):
+                truth = replace(truth, tank=tank_of(body, draw))
+            off = Off(key, *self.scattered, draw.get("timing offset", 0.0))
+            scatter = None if off == Off(key, None, None) else off
+            found.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
+        return found
+
+    def _attitudes(self, tilts: Vector) -> Vector:
+        """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by ``tilts`` (n, 2) rad."""
+        body, angles = self.law.spacecraft, np.hypot(*tilts.T)
+        turns = np.zeros((len(tilts), 4))
+        turns[:, 0], turns[:, 1:3] = np.cos(0.5 * angles), (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts
+        turned = attitude.multiply(body.initial.quaternion, turns)
+        return attitude.multiply(turned, attitude.from_matrix(body.inertia.axes.T))
+
+    def _torques(self, thruster: Thruster, draws: Draws, count: int) -> Vector:
+        """Torques (n, 3) N m at the thrust of each case."""
+        torque = np.array([np.broadcast_to(one, count) for one in self._body.thruster_torque(thruster, draws)]).T
+        return np.asarray(torque * (1.0 + np.broadcast_to(draws.get(f"thrust {thruster.name}", 0.0), count))[:, None])
+
+    def _channels(self, draw: dict[str, float], torques: dict[str, Vector]) -> tuple[Channel, ...]:
+        """The channels of a case; those in which nothing is off are those of the file."""
+        body = self.law.spacecraft
+        names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
+        found = []
+        for channel in body.channels:
+            if not names & {one.name for one in channel.thrusters}:
+                found.append(channel)
+                continue
+            valve = _valve(channel, draw)
+            thrusters = tuple(
+                replace(one, torque=torques[one.name], valve=valve, **_thrust(one, draw)) for one in channel.thrusters
+            )
+            found.append(replace(channel, thrusters=thrusters))
+        return tuple(found)
+
+
+OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)
+"""First words of the inputs that make a thruster another."""
+
+
+def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
+    """The draws with the thrust of another tank, as the file gives it at its own pressure, in that of the thrusters."""
+    tank = tank_of(body, draws)
+    if body.tank is None or tank is None or not {"tank pressure", "tank exponent"} & set(draws):
+        return draws
+    higher = (tank.pressure / body.tank.pressure) ** tank.exponent
+    names = {f"thrust {one.name}" for channel in body.channels for one in channel.thrusters}
+    return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
+
+
+def _thrust(thruster: Thruster, draw: dict[str, float]) -> dict[str, Any]:
+    factor = 1.0 + draw.get(f"thrust {thruster.name}", 0.0)
+    force, thrust = thruster.force, thruster.thrust
+    return {"force": None if force is None else factor * force, "thrust": None if thrust is None else factor * thrust}
+
+
+def _valve(channel: Channel, draw: dict[str, float]) -> Any:
+    """The valve of a channel: all of its thrusters open with the mean of their delays, none of them below zero."""
+    valve = channel.valve
+    if valve is None:
+        return None
+
+    def off(key: str) -> float:
+        return float(np.mean([draw.get(f"{key} {one.name}", 0.0) for one in channel.thrusters]))
+
+    from nutdamp.physics.thruster import Measured  # few spacecraft have any
+
+    if isinstance(valve, Measured):
+        factor = 1.0 + off("impulse_bit")
+        return Measured(tuple((command, factor * given, centroid) for command, given, centroid in valve.rows))
+    return replace(valve, **{key: max(getattr(valve, key) + off(key), 0.0) for key in BY_VALVE[:-1]})
+
+
+def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
+    """The sensor of a case."""
+    axes = [""] if sensor.kind == ACCELEROMETER else [" 1", " 2"]
+    scales = [sensor.scale * (1.0 + draw.get(f"sensor scale{axis}", 0.0)) for axis in axes]
+    biases = [sensor.bias + draw.get(f"sensor bias{axis}", 0.0) for axis in axes]
+    return replace(
+        sensor,
+        scale=scales[0],
+        bias=biases[0],
+        noise=sensor.noise * (1.0 + draw.get("sensor noise", 0.0)),
+        delay=sensor.delay + draw.get("sensor delay", 0.0),
+        second=(scales[1], biases[1]) if len(axes) == 2 else None,
+    )
+
+
+Array = NDArray[np.float64]
+
+OUTPUTS = (
+    "settled",
+    "quiet",
+    "nutation",
+    "momentum_shift",
+    "axis_error",
+    "spin_change",
+    "propellant",
+    "firings",
+)
+"""Of each case: when it first falls quiet (s), the nutation then and the largest since (rad), how far H has turned and
+is off its target at the end (rad), by how much the spin has changed (rad/s), propellant (kg), firings.
+
+What is not known is not a number: the first two of a loop that never falls quiet, or that never sees its start."""
+
+PORTION = 512
+"""Cases that are flown together."""
+
+MOST_SAMPLES = 20_000_000_000
+"""Samples that a study may look at, by what its nominal case looks at."""
+
+ALONE = 20
+"""Times as much that a sample costs where cases fly one by one."""
+
+FEW = 100
+"""Cases that fall quiet, at least, of which it is said what they depend on."""
+
+
+CollectLoops = Callable[[int, Array, list[Stop], Array], None]
+"""Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
+least and largest angle (m, 2, n) rad to the direction of each cone."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopStudy:
+    """The loop of a ``spacecraft`` flown to ``until`` s in cases drawn from ``seed``; they count from 0 here."""
+
+    spacecraft: Spacecraft
+    until: float
+    seed: int
+
+    @cached_property
+    def law(self) -> Law:
+        """The law on board, which knows the file."""
+        assert self.spacecraft.loop is not None
+        return Law(self.spacecraft, self.spacecraft.loop)
+
+    @cached_property
+    def model(self) -> LoopModel:
+        """What is dispersed."""
+        return LoopModel(self.law)
+
+    @cached_property
+    def alone(self) -> str:
+        """Why the cases fly one by one, which takes longer; empty where they fly together."""
+        return expects_alone(self.law, self.spacecraft)
+
+    @cached_property
+    def band(self) -> Band:
+        """The nutation that the loop is to leave, as it was built."""
+        return dead_band(self.spacecraft, self.law.loop)
+
+    def source(self) -> Source:
+        """The draws."""
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+
+    def draws_of(self, case: int) -> dict[str, float]:
+        """Deviations of one case, by input."""
+        return {name: float(draw[0]) for name, draw in self.draws_from(case, 1).items()}
+
+    def draws_from(self, first: int, count: int) -> dict[str, Array]:
+        """Deviations (count,) of cases from ``first`` on, by input."""
+        found: dict[str, list[Array]] = {entry.name: [] for entry in self.model.inputs.drawn}
+        source = self.source()
+        for block in range(first // BLOCK, math.ceil((first + count) / BLOCK)):
+            draws, _ = source.block(block)
+            rows = slice(max(first - block * BLOCK, 0), min(first + count - block * BLOCK, BLOCK))
+            for name, parts in found.items():
+                parts.append(np.array(np.broadcast_to(draws[name], BLOCK)[rows]))
+        return {name: np.concatenate(parts) for name, parts in found.items()}
+
+    def case(self, number: int) -> Case:
+        """One case."""
+        return self.model.cases(self.draws_of(number), np.array([number]), self.seed)[0]
+
+    @cached_property
+    def nominal(self) -> Array:
+        """The outputs (8,) of the file itself, with the noise of the seed."""
+        return self.measured(self._nominal_flown)[0][:, 0]
+
+    @property
+    def nominal_aspects(self) -> Array:
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone, of that flight."""
+        return self._nominal_flown.aspects[:, :, 0]
+
+    @cached_property
+    def _nominal_flown(self) -> Flown:
+        return self.fly(self.nominal_case)
+
+    @property
+    def nominal_case(self) -> list[Case]:
+        """The file itself, with the noise of the seed, as a case."""
+        return [Case(self.spacecraft, (self.seed,))]
+
+    def expect_affordable(self, samples: int) -> int:
+        """Samples that so many cases look at, by the nominal one; raises BadRequest where they are too many."""
+        looked = self._nominal_flown.pilots[0].looked_at
+        price = looked * samples * (ALONE if self.alone else 1)
+        if price > MOST_SAMPLES:
+            most = max(MOST_SAMPLES // (looked * (ALONE if self.alone else 1)), 1)
+            raise BadRequest(
+                f"{samples} cases look at about {looked * samples:.2g} samples: too many; "
+                f"at most {most} --samples, or an earlier --until"
+            )
+        return looked * samples
+
+    def price_alone(self, samples: int) -> str:
+        """How long so many cases take one by one, in words, by the time that the nominal one takes here."""
+        begin = time.perf_counter()
+        self.fly(self.nominal_case)
+        seconds = samples * (time.perf_counter() - begin)
+        return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
+
+    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> Flown:
+        """The loops of ``cases``."""
+        return (fly_alone if self.alone else fly_together)(self.law, cases, self.until, watch)
+
+    def measured(self, flown: Flown) -> tuple[Array, Array]:
+        """Outputs (8, n) of loops, and how bad each is (n,): infinitely where it does not end quiet, or was stopped."""
+        cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
+        moments = np.array([case.truth.inertia.moments for case in cases]).T
+        before = np.array([case.truth.omega0 for case in cases]).T
+        momentum = tuple(carried(tuple(flown.quaternion), triple(moments * flown.rates)))
+        tilts = np.array([case.tilt for case in cases]).T
+        out = np.empty((len(OUTPUTS), len(cases)))
+        out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
+        out[1], out[2] = flown.quiet, flown.largest
+        out[3] = angle(triple(moments * before), triple(np.array(momentum)))
+        out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
+        out[5] = flown.rates[2] - before[2]
+        used = [[math.nan if one.pulse.propellant is None else one.pulse.propellant for one in p.fired] for p in pilots]
+        out[6] = [math.fsum(one) for one in used]
+        out[7] = [len(pilot.fired) for pilot in pilots]
+        aim = out[3] if body.goal.axis is None else out[4]
+        shares = list(cones_used(body.keep, flown.aspects))
+        severity = np.asarray(requirements.severity(body, Left(out[2], aim, flown.rates[2]), shares))
+        lost = np.array([pilot.lost for pilot in pilots])
+        return out, np.where(lost, math.inf, severity)
+
+
+def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
+    """The study of the loop of a spacecraft with dispersions; raises BadRequest for one without either of them.
+
+    Raises Infeasible as `plan.loop_of` does.
+    """
+    if spacecraft.loop is None:
+        raise BadRequest("the spacecraft has no loop")
+    if spacecraft.dispersions is None:
+        raise BadRequest("the spacecraft has no dispersions")
+    late = feeding(spacecraft, spacecraft.loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
+    return LoopStudy(spacecraft, until_default(spacecraft, spacecraft.loop) if until is None else until, seed)
+
+
+@dataclass(eq=False)
+class LoopResults(Counted):
+    """What has been found of a study so far: the cases from 0 to ``done``.
+
+    Those that comply settle too. ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end,
+    or were stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and
+    the largest from the spin axis to the direction of each cone.
+    """
+
+    study: LoopStudy
+    requested: int
+    done: int = 0
+    redrawn: int = 0
+    met: int = 0
+    stops: Counter[Stop] = field(default_factory=Counter)
+    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    values: Array = field(init=False)
+    angles: Array = field(init=False)
+    lost: NDArray[np.bool_] = field(init=False, default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        self.values = np.empty((len(OUTPUTS), self.requested))
+        self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
+
+    @property
+    def broken(self) -> NDArray[np.int64]:
+        """By cone (m,): how many cases break it."""
+        used = cones_used(self.study.spacecraft.keep, self.angles[:, :, : self.done])
+        return np.asarray(np.count_nonzero(used > 1.0, axis=1))
+
+    @property
+    def aspects(self) -> Array:
+        """By cone the least and the largest angle (m, 2) rad in all cases."""
+        seen = self.angles[:, :, : self.done]
+        return np.stack([seen[:, 0].min(axis=1), seen[:, 1].max(axis=1)], axis=1)
+
+    def of(self, output: str) -> Array:
+        """The known values of an output, (m,)."""
+        values = self.values[OUTPUTS.index(output), : self.done]
+        return values[~np.isnan(values)]
+
+    def distribution(self, output: str) -> Exact | None:
+        """Of those values; None where there are none."""
+        found = self.of(output)
+        return Exact(found) if len(found) else None
+
+    @property
+    def settled(self) -> int:
+        """Cases that fall quiet, or never have to fire, and are not stopped."""
+        return self.done - int(np.count_nonzero(self.lost))
+
+    @property
+    def idle(self) -> int:
+        """Cases of them that never see the start threshold."""
+        return int(np.count_nonzero(~self.lost & np.isnan(self.values[0, : self.done])))
+
+    @property
+    def within(self) -> int:
+        """Cases that fall quiet with no more nutation than the dead band of the file."""
+        return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
+
+    def take(self, values: Array, severity: Array, angles: Array, stops: list[Stop]) -> None:
+        """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
+        first, last = self.done, self.done + values.shape[1]
+        self.values[:, first:last], self.angles[:, :, first:last] = values, angles
+        self.met += int(np.count_nonzero(severity <= 1.0))
+        self.stops.update(stops)
+        self.lost = np.concatenate([self.lost, np.isinf(severity)])
+        self.worst.add(first, severity)
+        self.done = last
+
+    def shares(self, output: str) -> dict[str, float]:
+        """Share of each input in the variance of an output over the cases that settle: its squared correlation.
+
+        What chance adds to that over few cases is taken off; empty where they are too few, or nothing varies. Of
+        inputs that are correlated each has what it adds to those before it.
+        """
+        rows = np.flatnonzero(~self.lost & ~np.isnan(self.values[OUTPUTS.index(output), : self.done]))
+        inputs = [entry for entry in self.study.model.inputs.drawn if entry.sigma > 0.0]
+        values = self.values[OUTPUTS.index(output)][rows]
+        if len(rows) < FEW or np.ptp(values) <= 1e-12 * np.abs(values).max():
+            return {}
+        drawn = independent(self.study.draws_from(0, self.done), inputs, self.study.model.groups)
+        chance = 1.0 / (len(rows) - 1)
+        squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
+        return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}
+
+
+def run(
+    results: LoopResults,
+    *,
+    watch: Callable[[int], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+    collect: CollectLoops | None = None,
+) -> LoopResults:
+    """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
+
+    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order. When ``stopped``
+    says so, the portions done so far are kept.
+    """
+    study = results.study
+    source, block = study.source(), -1
+    draws: Draws = {}
+    while results.done < results.requested and not stopped():
+        first = results.done
+        if first // BLOCK != block:
+            block = first // BLOCK
+            draws, again = source.block(block)
+            results.redrawn += int(np.count_nonzero(again < results.requested - block * BLOCK))
+        last = min(results.requested, first + PORTION, (block + 1) * BLOCK)
+        rows = slice(first - block * BLOCK, last - block * BLOCK)
+        part = {name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()}
+        cases = study.model.cases(part, np.arange(first, last), study.seed)
+        try:
+            flown = study.fly(cases, lambda over, first=first: _seen(watch, stopped, first + over))  # type: ignore[misc]
+        except _Interrupted:
+            break
+        values, severity = study.measured(flown)
+        stops = [pilot.ending[0] for pilot in flown.pilots]
+        results.take(values, severity, flown.aspects, stops)
+        if collect is not None:
+            collect(first, values, stops, flown.aspects)
+        watch(results.done)
+    return results
+
+
+class _Interrupted(Exception):
+    """A portion is left unfinished."""
+
+
+def _seen(watch: Callable[[int], None], stopped: Callable[[], bool], done: int) -> None:
+    watch(done)
+    if stopped():
+        raise _Interrupted

@@ -1,0 +1,208 @@
+"""The same loop flown by DOP853, its events found on the interpolants of that: firing by firing, do they agree?
+
+A closed loop as a plan: what it fired, judged by the motion from when it was first down to its stop threshold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from nutdamp.control_loop.simulation import SEED, Run, fly, largest_since
+from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
+from nutdamp.errors import Infeasible
+from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
+from nutdamp.flight.propagation import Dynamics, Flight, Path, Push
+from nutdamp.flight.verification import Equations
+from nutdamp.physics.taylor import NOTHING
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.requirements import Left
+
+AGREE = 1e-6
+"""s; firings that begin and last alike to this are the same."""
+
+
+EVALUATIONS = 1_000_000
+"""Evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """A stretch that was integrated, by its interpolant."""
+
+    equations: Equations
+    solution: Any
+    steps: int
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        return self.equations.motion(np.atleast_2d(self.solution(np.asarray(times, dtype=float)).T))
+
+
+@dataclass(frozen=True, slots=True)
+class _Independent(Dynamics):
+    """Moves a body by DOP853 on Euler's equations with the full tensor; evaluations of these are counted, not steps."""
+
+    equations: Equations = field(kw_only=True)
+
+    @property
+    def free(self) -> bool:
+        """Whether coasts are known in closed form: none is."""
+        return False
+
+    def _path(
+        self,
+        state: SpinState,
+        start: float,
+        end: float,
+        push: Push,
+        most: int,  # noqa: ARG002 - of steps
+    ) -> tuple[Path, SpinState]:
+        first = self.equations.state(state)  # no loop is flown with moments that fall
+        if end <= start:
+            return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
+        torque = (np.asarray(sum(push.torques, np.zeros(3))), push.slope)
+        found = self.equations.solved(first, start, end, [torque], dense=True)
+        rates, quaternion = self.equations.motion(found.y[:, -1:].T)
+        one, two, three = rates[0].tolist()
+        return _Solved(self.equations, found.sol, len(found.t)), SpinState(complex(one, two), three, quaternion[0])
+
+
+@dataclass(frozen=True, eq=False)
+class LoopVerification:
+    """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
+
+    run: Run
+    other: Run | None
+    missing: str = ""
+    evaluations: int = 0
+    pairs: tuple[tuple[float, float, float], ...] = field(default=())
+    """Of each firing the differences of start and on-time, s, and of the nutation before it, rad."""
+
+    @property
+    def same(self) -> bool:
+        """Whether the same channels fire, in the same order."""
+        names = [[one.pulse.channel for one in run.fired] for run in (self.run, self.other) if run is not None]
+        return len(names) == 2 and names[0] == names[1]
+
+    @property
+    def worst(self) -> float:
+        """Largest difference of a start or an on-time, s."""
+        return max((max(abs(start), abs(lasts)) for start, lasts, _ in self.pairs), default=0.0)
+
+    @property
+    def agree(self) -> bool:
+        """Whether DOP853 confirms every firing to `AGREE`, and why the loop ended."""
+        return self.same and self.worst <= AGREE and self.other is not None and self.other.stop is self.run.stop
+
+
+def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED) -> LoopVerification:
+    """Fly the loop of the file in closed form and by DOP853; raises Infeasible where it cannot be flown at all."""
+    loop = spacecraft.loop
+    assert loop is not None
+    run = fly(spacecraft, loop, until, seed=seed)
+    equations, inertia = Equations(spacecraft, EVALUATIONS), spacecraft.inertia
+    mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
+    try:
+        other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
+    except Infeasible as reason:
+        return LoopVerification(run, None, str(reason), equations.evaluations)
+    pairs = tuple(
+        (
+            one.pulse.loaded[0] - two.pulse.loaded[0],
+            one.pulse.loaded[1] - two.pulse.loaded[1],
+            one.true_nutation - two.true_nutation,
+        )
+        for one, two in zip(run.fired, other.fired, strict=False)
+    )
+    return LoopVerification(run, other, "", equations.evaluations, pairs)
+
+
+LOOP = "loop"
+"""Name in place of a scheme."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopPlan(Plan):
+    """The pulses that a loop fired in a ``run``; its flight is the one in which it fired them, to the end of the run.
+
+    ``known`` is the spacecraft as the law knows it, where that is not the truth.
+    With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
+    """
+
+    run: Run | None = None
+    known: Spacecraft | None = None
+
+    @property
+    def flown_run(self) -> Run:
+        """The run."""
+        assert self.run is not None
+        return self.run
+
+    @cached_property
+    def flight(self) -> Flight:
+        """The motion to the end of the run."""
+        return replace(seen_at(self.flown_run.flight, self.flown_run.until), scheme=LOOP)
+
+    @cached_property
+    def largest(self) -> tuple[float, float]:
+        """The largest nutation from when the loop was first quiet, rad, and when, s; of the end where it never was."""
+        return largest_since(self.flown_run)
+
+    @property
+    def left(self) -> Left:
+        """The largest nutation since it was first quiet; direction of H and spin at the end."""
+        return left_by(self.flight)._replace(nutation=self.largest[0])
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """As of any plan; not where the loop was stopped or never quiet."""
+        found = super().meets_requirement
+        return False if found is not None and self.flown_run.lost else found
+
+    @cached_property
+    def aspects(self) -> tuple[Aspect, ...]:
+        """How near the spin axis comes to each direction that is watched, to the end of the run."""
+        return aspects(self.flight, self.flown_run.until)
+
+    @cached_property
+    def margins(self) -> tuple[Margin, ...]:
+        """How far each channel is from feeding the nutation, at the start threshold."""
+        return margins(self._known, self._known.loop or self.flown_run.loop)
+
+    @cached_property
+    def band(self) -> Band:
+        """How much nutation the loop leaves by what it was built for."""
+        return dead_band(self._known, self._known.loop or self.flown_run.loop)
+
+    @property
+    def _known(self) -> Spacecraft:
+        return self.known or self.spacecraft
+
+
+def loop_of(
+    spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED, case: int | None = None
+) -> LoopPlan:
+    """The loop of the file flown to ``until`` s with the noise of ``seed``; as dispersed in a ``case`` of it, from 0.
+
+    Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
+    """
+    loop = spacecraft.loop
+    assert loop is not None
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
+    if case is None:
+        run = fly(spacecraft, loop, until, seed=seed)
+        return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, run=run)
+    from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
+
+    study = loop_study(spacecraft, until, seed=seed)
+    one = study.case(case)
+    assert one.truth.loop is not None
+    run = fly(one.truth, one.truth.loop, study.until, seed=one.key, law=study.law, scatter=one.scatter)
+    return LoopPlan(one.truth, LOOP, run.schedule, from_file=True, run=run, known=spacecraft)

@@ -1,0 +1,428 @@
+"""Whether firings do what they shall: what each added to the rate that is seen, against what it was to add.
+
+When to fire, and for how long: a channel of torque direction d while arg ω = arg d + π (Magnus 1970, section 4).
+
+The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 + iω2. With
+I1 ≠ I2 a small ω runs on an ellipse; what turns evenly there is z = g1 ω1 + i g2 ω2 with gj in proportion to
+sqrt(Ij |Ij - I3|), at `Inertia.body_rate` times the spin: the law works on z, which is ω itself where I1 = I2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics import response
+from nutdamp.schemes.four_pulse import DEFAULT_SHARE
+from nutdamp.schemes.sequential import at_hand
+from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
+from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
+from nutdamp.spacecraft.model import Spacecraft, Vector
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Valve
+
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+LEADS = 100
+"""On-times of a channel for which it is worked out what its valve does."""
+
+
+class Firing(NamedTuple):
+    """A firing that the law decides on: ``wait`` s until its command (negative: it should have begun).
+
+    ``on_time`` s is that of full thrust, about its centre ``lead`` s after the beginning of the command, which with its
+    thrust ``lasts`` so many s; without a valve half and all of the on-time. ``acts`` rad/s is what it adds to z there.
+    """
+
+    wait: float
+    on_time: float
+    lead: float
+    lasts: float
+    acts: complex
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """A channel as the law sees it: ``kick`` rad/s² is what a second of it adds to z, ``spin_rate`` rad/s² to ω3.
+
+    Its pulses last from ``shortest`` to ``longest`` s; ``leads`` are those of its valve: see `_leads`.
+    """
+
+    channel: Channel
+    kick: complex
+    spin_rate: float
+    shortest: float
+    longest: float
+    leads: tuple[Array, Array] | None = None
+
+
+class Law:
+    """The law of a ``spacecraft`` as it is known on board, and of its `Loop`; raises Infeasible where none can work."""
+
+    def __init__(self, spacecraft: Spacecraft, loop: Loop) -> None:
+        inertia = spacecraft.inertia
+        if inertia.body_rate == 0.0:
+            raise Infeasible("in a sphere ω does not rotate in the body: there is no phase to fire by")
+        self.spacecraft, self.loop, self.inertia = spacecraft, loop, inertia
+        self.windows = Windows(spacecraft, endless=True)
+        self.gauge = _gauge(inertia.moments)
+        self.period, self.growth = spacecraft.body_period, spacecraft.growth
+        self.actuators = tuple(map(self._actuator, at_hand(spacecraft, usable(spacecraft))))
+
+    def _actuator(self, channel: Channel) -> Actuator:
+        first, second, third = self.inertia.moments
+        kick = complex(channel.transverse.real / first, channel.transverse.imag / second)
+        shortest, longest = effective_on_times(channel)
+        if self.loop.law == ONE_PULSE:
+            longest = max(longest_useful(longest, self.period), shortest)
+        elif self.loop.on_time is None:
+            longest = max(min(longest, DEFAULT_SHARE * self.period), shortest)
+        else:
+            longest = effective_on_time(channel, self.loop.on_time)
+        if self.loop.law == BANG:
+            shortest = longest
+        leads = _leads(channel.valve, shortest, longest)
+        return Actuator(channel, complex(self.seen(kick)), channel.axial / third, shortest, longest, leads)
+
+    def seen(self, omega: Any) -> Any:
+        """z of ω, numbers or arrays."""
+        first, second = self.gauge
+        return omega if first == second == 1.0 else first * omega.real + 1j * second * omega.imag
+
+    def rate(self, spin: Any) -> Any:
+        """How fast z turns back in the body, rad/s, signed; numbers or arrays."""
+        return self.inertia.body_rate * spin
+
+    def nutation(self, size: Any, spin: Any) -> Array:
+        """Nutation angle θ, rad, by |z| and ω3: tan θ = A|ω|/(C|ω3|), Magnus 1970 (19)."""
+        return np.asarray(np.arctan2(self.inertia.A * np.asarray(size), self.inertia.C * np.abs(spin)))
+
+    def size(self, nutation: float, spin: float) -> float:
+        """|z|, rad/s, of a nutation angle (rad)."""
+        return self.inertia.C * abs(spin) / self.inertia.A * math.tan(nutation)
+
+    def firing(self, actuator: Actuator, z: complex, spin: float) -> Firing | None:
+        """The next firing of a channel against ``z`` at this moment; None where it would not help."""
+        rate = self.inertia.body_rate
+        needed = response.on_time_for(abs(z), abs(actuator.kick), rate, spin, actuator.spin_rate, actuator.longest)
+        on_time = actuator.longest if needed is None else max(needed, actuator.shortest)
+        lead, lasts = 0.5 * on_time, on_time
+        if actuator.channel.valve is None:
+            on_time = lasts = self.windows.on_time(on_time, actuator.shortest, actuator.longest)
+            lead = 0.5 * on_time
+        else:
+            loaded = actuator.channel.valve.on_time_for(on_time)
+            thrust = actuator.channel.valve.thrust(loaded)
+            lead, lasts = thrust.centroid, max(loaded, thrust.ramps[-1].end)
+        factor = response.width_factor(rate, spin, actuator.spin_rate, on_time)
+        acts = actuator.kick * on_time * factor
+        if not 0.0 < abs(acts) < 2.0 * abs(z):
+            return None
+        wait = rigid_body.phase_to_oppose(z, acts) / (rate * spin)
+        return Firing(wait - lead if self.loop.predict else wait, on_time, lead, lasts, acts)
+
+    def waits(self, actuator: Actuator, z: ComplexArray, spin: Array) -> Array:
+        """`Firing.wait` of one channel for many moments (n,); not a number where a firing would not help.
+
+        To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks: it tells between which
+        moments a channel comes to fire, `firing` then when and for how long.
+        """
+        rate, size, push = self.inertia.body_rate * spin, np.abs(z), abs(actuator.kick)
+        half = np.abs(0.5 * rate)
+        sine = half * size / push
+        needed = np.where(sine > 1.0, math.inf, np.arcsin(np.minimum(sine, 1.0)) / half)
+        on_time = np.clip(needed, actuator.shortest, actuator.longest)
+        acts = push * np.abs(np.sin(half * on_time)) / half
+        direction = actuator.kick * np.where(np.sin(half * on_time) < 0.0, -1.0, 1.0)
+        if actuator.spin_rate != 0.0:
+            direction = direction * np.exp(1j * self.inertia.body_rate * actuator.spin_rate * on_time * on_time / 6.0)
+        wait = np.angle(-z * np.conj(direction)) / rate
+        if self.loop.predict:
+            wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
+        return np.where((acts > 0.0) & (acts < 2.0 * size), wait, math.nan)
+
+
+def _leads(valve: Valve | None, shortest: float, longest: float) -> tuple[Array, Array] | None:
+    """Effective on-times (n,) s from ``shortest`` to ``longest``, and how long before their centres commands begin."""
+    if valve is None:
+        return None
+    on_times = np.linspace(shortest, longest, LEADS)
+    return on_times, np.array([valve.thrust(valve.on_time_for(one)).centroid for one in on_times.tolist()])
+
+
+def _gauge(moments: tuple[float, float, float]) -> tuple[float, float]:
+    """(g1, g2), such that |z| is that of a symmetric body with A and C at the widest point of the small ellipse."""
+    first, second, third = moments
+    if first == second:
+        return 1.0, 1.0
+    weights = [math.sqrt(moment * abs(moment - third)) for moment in (first, second)]
+    most = max(first / weights[0], second / weights[1]) / (0.5 * (first + second))
+    return weights[0] * most, weights[1] * most
+
+
+WORKS = 0.25
+"""Share of what it was to add above which a firing works, and below whose negative it works backwards."""
+
+SIGMAS = 5.0
+"""A firing is judged by what so many sigma of the noise leave open."""
+
+WHICH = 3.0
+"""The same, where it is known that something works backwards, to tell a channel from the sensor."""
+
+FED = 0.5
+"""Share of its first size by which the nutation may grow while it is fired at: then firings feed it."""
+
+PHASED = 1e-3
+"""Doubt of the phase of z (rad) from which on sizes tell more of what a firing did."""
+
+LOST = 1.0
+"""Doubt of the phase of a firing (rad) from which on nothing can be said of what it was to do."""
+
+LARGE = 100.0
+"""Exponent of growth beyond which it does not matter by how much more it grows."""
+
+STEPPED = math.sqrt(3.0)
+"""The most by which a value in steps is off over its root mean square."""
+
+ALIKE = 1e-9
+"""Share of the samples below which what they tell of the bias is rounding."""
+
+
+class Stop(Enum):
+    """Why the loop was flown no further, or that it was flown to the end."""
+
+    END = "the end of the time"
+    FULL = "limits.max_pulses"
+    EMPTY = "the tank is empty"
+    SENSOR = "the sensor is reversed"
+    CHANNEL = "a channel is wired backwards"
+    UNCLEAR = "a channel is wired backwards, or the sensor is reversed"
+    IDLE = "a channel does nothing"
+    FEEDS = "the firings come at the wrong time"
+    FED = "the firings feed the nutation"
+
+    @property
+    def fault(self) -> bool:
+        """Whether the loop was stopped before it could feed the nutation, or has nothing left to fire."""
+        return self not in (Stop.END, Stop.FULL)
+
+
+class Doubt(NamedTuple):
+    """What may be off in estimates of z: ``noise`` rad/s (one sigma) of a sample, ``white`` its part at the rate of z.
+
+    Both fall with the root of the number of samples, but to ``least``: of fits that share theirs. At rest the noise
+    counts ``lift`` times. ``bias`` is a constant of the coasts, ``steps`` of the quantisation are at most off by that.
+    ``turn`` is the share by which the rate at which z turns may be off, ``scale`` that of the sensor.
+    """
+
+    noise: float
+    white: float
+    least: float
+    lift: float
+    bias: float
+    steps: float
+    turn: float = 0.0
+    scale: float = 0.0
+
+    def of(self, seen: Glimpse) -> float:
+        """One sigma of what was ``seen`` on a coast, for a bias that is known."""
+        mixed = self.white * math.sqrt((1.0 + abs(seen.leak) ** 2 * (self.lift**2 - 1.0)) / seen.samples)
+        return math.hypot(max(min(mixed, self.noise), self.least), self.steps / STEPPED)
+
+
+@dataclass(slots=True)
+class Glimpse:
+    """The rates z seen on one coast, carried to the centre of a firing by the nutation ``rate`` (1/s), with a bias b.
+
+    z = ``z`` - b ``leak``, the least squares fit; b by what is left of it: ``rest`` = b ``told``. ``apart``: time from
+    the samples to the firing, s.
+    """
+
+    z: complex
+    samples: int
+    leak: complex
+    rest: complex
+    told: float
+    apart: float
+
+    @classmethod
+    def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
+        """Of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
+        course = np.exp(-1j * rate * (times - centre))  # of z = 1 at the centre
+        power, total, count = float((abs(course) ** 2).sum()), complex(course.sum()), len(times)
+        z = complex(np.vdot(course, best)) / power
+        rest, told = complex(best.sum()) - z * total, count - abs(total) ** 2 / power
+        return cls(z, count, total.conjugate() / power, rest, told, abs(float(times.mean()) - centre))
+
+
+class Change(NamedTuple):
+    """z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
+
+    ``bound``: by how much it may be off beside that, in every firing alike.
+    """
+
+    before: complex
+    after: complex
+    sigma: float
+    bound: float
+
+    @classmethod
+    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> Change:
+        """By two coasts of the same bias, which is estimated with them where that tells more than how large it can be.
+
+        What of it stays open counts by how unlike the coasts are.
+        """
+        sigma, unlike = math.hypot(doubt.of(before), doubt.of(after)), abs(after.leak - before.leak)
+        told, bias, open_ = before.told + after.told, 0j, doubt.bias
+        if doubt.bias > 0.0 and told > ALIKE * (before.samples + after.samples):
+            noise = doubt.white * doubt.lift / math.sqrt(told)
+            bends = math.pi * doubt.turn * max(abs(before.z), abs(after.z))  # by turning from the middle to the ends
+            if max(noise, bends) < doubt.bias:
+                bias, open_, sigma = (before.rest + after.rest) / told, bends, math.hypot(sigma, unlike * noise)
+        return cls(before.z - bias * before.leak, after.z - bias * after.leak, sigma, unlike * open_)
+
+
+@dataclass(slots=True)
+class Effect:
+    """What the firings of one channel have added, as a factor on what they were to add: least squares over them."""
+
+    did: complex = 0.0
+    wanted: float = 0.0
+    noise: float = 0.0
+    bound: float = 0.0
+
+    def add(self, change: Change, expected: complex, phase: float) -> None:
+        """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a ``phase`` (rad).
+
+        Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies between |z + e| of
+        a firing that works and |z - e| of one that works backwards.
+        """
+        wanted, did = abs(expected), (change.after - change.before) * expected.conjugate()
+        bound = change.bound + phase * abs(change.before)
+        if phase > PHASED and abs(change.before) >= 0.5 * wanted:
+            works, feeds = abs(change.before + expected), abs(change.before - expected)
+            wanted, bound = 0.5 * (feeds - works), change.bound + phase * wanted
+            did = complex((0.5 * (feeds + works) - abs(change.after)) * wanted)
+        self.did += did
+        self.wanted += wanted * wanted
+        self.noise += 0.5 * (wanted * change.sigma) ** 2
+        self.bound += abs(wanted) * bound
+
+    @property
+    def factor(self) -> complex:
+        """1 for what works, -1 for what works backwards, 0 for what does nothing."""
+        return self.did / self.wanted if self.wanted > 0.0 else 1.0
+
+    def open(self, sigmas: float = SIGMAS) -> float:
+        """By how much noise, and what is off in every firing, may change the factor."""
+        return (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted if self.wanted > 0.0 else math.inf
+
+    def works(self, sigmas: float = SIGMAS) -> bool:
+        """Whether the firings surely do what they shall, not the contrary."""
+        return self.factor.real >= WORKS and self.factor.real - self.open(sigmas) > -WORKS
+
+    def backwards(self, sigmas: float = SIGMAS) -> bool:
+        """Whether they surely do the contrary."""
+        return self.factor.real <= -WORKS and self.factor.real + self.open(sigmas) < WORKS
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """Judges firing after firing. One that works backwards makes its channel ``suspect``, until ``deadline`` s.
+
+    Another channel that works backwards too shows that it is the sensor, one that works that it is the channel.
+    z grows by ``growth`` 1/s, and with tan θ = ``slope`` |z| the spin falls; ``first``: |z| (rad/s) of the nutation
+    that is fired at, and the time (s), since the loop was last quiet.
+    """
+
+    period: float
+    growth: float = 0.0
+    slope: float = 0.0
+    effects: dict[str, Effect] = field(default_factory=dict)
+    suspect: str | None = None
+    deadline: float = math.inf
+    first: tuple[float, float] | None = None
+
+    def judge(
+        self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
+    ) -> tuple[Stop, str] | None:
+        """Why to stop after a firing of ``channel`` that was to add ``expected``, and the channel to name; else None.
+
+        Another may be fired from ``now`` s on.
+        """
+        change, effect = Change.of(before, after, doubt), self.effects.setdefault(channel, Effect())
+        size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
+        falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
+        half = math.pi * doubt.turn  # by which z may have turned from the middle of a period to its ends
+        share = falls + doubt.scale + 0.5 * half * half
+        if doubt.turn * before.apart * turns < LOST:
+            unsure = change._replace(bound=change.bound + share * size)
+            effect.add(unsure, expected, turns * (before.apart + after.apart) * (0.5 * falls + doubt.turn))
+        cause = self._cause(channel, now, change, expected, doubt)
+        return cause or self._fed(channel, now, change, doubt)
+
+    def _cause(
+        self, channel: str, now: float, change: Change, expected: complex, doubt: Doubt
+    ) -> tuple[Stop, str] | None:
+        """What the effects of firings show to be wrong, with the channel to name; None where nothing or not yet."""
+        effect = self.effects[channel]
+        if self.suspect is None and effect.backwards():
+            self.suspect, self.deadline = channel, now + self.period
+        if self.suspect is not None:
+            others = [one for name, one in self.effects.items() if name != self.suspect]
+            if any(one.backwards(WHICH) for one in others):
+                return Stop.SENSOR, channel
+            return (Stop.CHANNEL, self.suspect) if any(one.works(WHICH) for one in others) else None
+        if effect.open() >= WORKS:
+            return None
+        if abs(effect.factor) < WORKS:
+            return Stop.IDLE, channel
+        size = abs(change.before)
+        lowers = size - abs(size - abs(expected)) > 0.5 * abs(expected)  # by a firing that comes at its moment
+        grown = abs(change.after) - size
+        seen_wrong = SIGMAS * doubt.noise + doubt.steps + doubt.bias  # the law fired at what it saw, not at what was
+        if lowers and grown > SIGMAS * change.sigma + change.bound + 2.0 * seen_wrong + 1e-9 * size:
+            return Stop.FEEDS, channel
+        return None
+
+    def _fed(self, channel: str, now: float, change: Change, doubt: Doubt) -> tuple[Stop, str] | None:
+        """That the nutation has grown while it was fired at, by more than what hides it can make a firing add."""
+        if self.first is None:
+            self.first = abs(change.before), now
+            return None
+        if self.suspect is not None:
+            return None
+        size, since = self.first
+        most = (1.0 + FED) * size * math.exp(min(self.growth * (now - since), LARGE))
+        most += SIGMAS * (change.sigma + doubt.noise) + 2.0 * (doubt.steps + doubt.bias)
+        return (Stop.FED, channel) if abs(change.after) > most else None
+
+    def rest(self) -> None:
+        """The loop has fallen quiet: from what size the nutation grows is noted anew."""
+        self.first = None
+
+    def overdue(self, now: float) -> tuple[Stop, str] | None:
+        """That no other channel has fired in time to tell which of the two it is."""
+        return None if self.suspect is None or now <= self.deadline else (Stop.UNCLEAR, self.suspect)
+
+
+def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
+    """By what shares the nutation rate and the scale of the sensor may be off, two sigma of the dispersions."""
+    given, inertia = spacecraft.dispersions, spacecraft.inertia
+    if given is None:
+        return 0.0, 0.0
+    pairs = ((given.A, inertia.A), (given.C, inertia.C))
+    moments = [0.0 if one is None else one.size / (1.0 if one.relative else nominal) for one, nominal in pairs]
+    scale = 0.0 if given.sensor_scale is None else given.sensor_scale.size
+    return 2.0 * math.hypot(*moments) * inertia.C / (inertia.A * abs(inertia.a)), 2.0 * abs(scale)

@@ -1,0 +1,824 @@
+"""The limit cycle of a closed loop from event to event: coasts in closed form, the firings by the law itself.
+
+Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ. Noise decides in
+which sample a threshold is first reached: see `Odds`. Only the few samples in which a channel may come to fire are
+worked out one by one. Many cycles are followed side by side, from random phases, until their mean is known.
+
+What it takes to hold the nutation against energy dissipation: pulses a day, propellant a year, how long it lasts.
+
+tan θ = tan θ0 e^{κt} says when damping must begin; the limit cycle of a closed loop (`cycles.Map`) what follows then.
+
+What a `Law` takes for z, as a filter over the samples of its sensor: of the nutation a factor, of noise weights.
+
+On a coast z runs as e^{(κ - iω)t}, ω the rate at which it turns back in the body. An estimate is Σ h_j s_{k-j} of the
+samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant offset, and of white noise w the sum Σ h_j w_{k-j}.
+
+When a sensor first shows more, or less, than a threshold, by its noise: chances of samples along a coast.
+
+Many cycles of a closed loop that are followed side by side: where each is, and what it has added up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.control_loop.controller import GRID, SAMPLED, Watch
+from nutdamp.control_loop.law import Actuator, ComplexArray, Law
+from nutdamp.control_loop.sensor import HARMONIC, Estimator
+from nutdamp.control_loop.stability import Band, dead_band, feeding, margins, too_late
+from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.flight.propellant import Supply
+from nutdamp.physics.thruster import Ramp, shape_factor
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import commandable
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, channel_pulse
+
+FORGOTTEN = 12.0
+"""Time constants of the low-pass filter after which a sample counts no more."""
+
+ENOUGH = 64
+"""Samples of a nutation period that an accelerometer is followed by, at most about twice as many."""
+
+LONGEST_RESPONSE = 4096
+"""Samples that count, at most."""
+
+
+class Transfer(NamedTuple):
+    """An estimate of z by samples ``step`` s apart: ``weights`` h (n,), the newest sample first.
+
+    It shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and noise of ``sigma`` rad/s in each direction, of which
+    in the frame that turns with z the share ``fresh`` is new in each sample. ``scatter``: sigma of a sample by parts
+    (real, imaginary), the imaginary zero for an accelerometer. ``first`` s after a pulse is the first estimate.
+    """
+
+    step: float
+    weights: ComplexArray
+    direct: complex
+    mirrored: complex
+    offset: complex
+    sigma: float
+    fresh: float
+    scatter: tuple[float, float]
+    grain: tuple[float, float]
+    first: float
+
+    def mean(self, z: Any) -> Any:
+        """What is seen of z without noise, numbers or arrays."""
+        return self.direct * z + self.mirrored * np.conj(z) + self.offset
+
+    def noise(self, white: ComplexArray) -> ComplexArray:
+        """Noise of the estimates (m, k) by that of the samples (m, n + k), of which the oldest is older than needed."""
+        count = len(self.weights)
+        if count == 1:
+            return np.asarray(self.weights[0] * white[:, :-1])
+        parts = np.lib.stride_tricks.sliding_window_view(white[:, :-1], count, axis=1)
+        return np.asarray(parts @ self.weights[::-1])
+
+    def drawn(self, rng: np.random.Generator, rows: int, count: int) -> ComplexArray:
+        """White noise of samples, (rows, count)."""
+        real, other = self.scatter
+        if real == other == 0.0:
+            return np.zeros((rows, count), dtype=complex)
+        found = (real * rng.standard_normal((rows, count))).astype(complex)
+        return found + 1j * other * rng.standard_normal((rows, count)) if other > 0.0 else found
+
+    def stepped(self, seen: ComplexArray) -> ComplexArray:
+        """What is seen, in steps of a gyro."""
+        if not any(self.grain):
+            return seen
+        raw, (first, second) = seen / self.weights[0], self.grain
+        return np.asarray(
+            self.weights[0] * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
+        )
+
+    def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
+        """What makes the noise of the newest estimate ``level`` rad/s in a direction, as likely as it can be."""
+        newest = self.weights[::-1]
+        pull = newest.conj() * towards
+        real, other = (one * one for one in self.scatter)
+        missing = level - (complex(newest @ white) * towards.conjugate()).real
+        along = real * pull.real + 1j * other * pull.imag
+        return np.asarray(missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along)
+
+
+def transfer(law: Law, spin: float) -> Transfer:
+    """The estimates of a law at a spin of ``spin`` rad/s."""
+    sensor, rate = law.loop.sensor, float(law.rate(spin))
+    estimator, accelerometer = Estimator(law, sensor, 0.0), sensor.kind == ACCELEROMETER
+    every = 1
+    if accelerometer and law.loop.predict and sensor.low_pass == 0.0:
+        every = max(estimator.window // ENOUGH, 1)  # as good as all, each with so much less noise
+    step = every * estimator.step or law.period / GRID
+    smooth, weights = _smoothing(sensor, step), np.ones(1, dtype=complex)
+    if accelerometer:
+        weights = _fitted(law, spin, step, round(estimator.window / every))
+    first = estimator.since + (len(weights) - 1) * step
+    weights = np.convolve(weights, smooth)[:LONGEST_RESPONSE]
+    if law.loop.predict:
+        behind = complex(smooth @ np.exp(1j * rate * step * np.arange(len(smooth))))
+        weights = weights * np.exp(-1j * rate * sensor.delay) / behind
+    gain = complex(weights @ np.exp(-complex(law.growth, -rate) * step * np.arange(len(weights))))
+    direct, mirrored, parts = gain * sensor.scale, 0j, law.gauge
+    if accelerometer:
+        shown = 0.5 * sensor.scale * spin * estimator.seen_gain
+        image = complex(weights @ np.exp(-complex(law.growth, rate) * step * np.arange(len(weights))))
+        direct, mirrored, parts = gain * shown.conjugate(), image * shown, (1.0, 0.0)
+    noise, grain = (0.0, 0.0) if sensor.rate is None else (sensor.noise / math.sqrt(every), sensor.quantisation)
+    size = math.hypot(noise, grain / math.sqrt(12.0 * every))
+    if accelerometer or len(weights) > 1:
+        noise, grain = size, 0.0
+    power = float((abs(weights) ** 2).sum())
+    lasting = complex(np.vdot(weights[:-1], weights[1:]) * np.exp(1j * rate * step)).real / power
+    return Transfer(
+        step=step,
+        weights=weights,
+        direct=direct,
+        mirrored=mirrored,
+        offset=complex(weights.sum()) * sensor.bias * complex(*parts),
+        sigma=size * math.hypot(*parts) * math.sqrt(0.5 * power),
+        fresh=min(max(1.0 - lasting, 1e-6), 1.0),
+        scatter=(noise * parts[0], noise * parts[1]),
+        grain=(grain * parts[0], grain * parts[1]),
+        first=first,
+    )
+
+
+def _smoothing(sensor: Sensor, step: float) -> ComplexArray:
+    """Weights of the low-pass filter, newest sample first."""
+    if sensor.low_pass == 0.0:
+        return np.ones(1, dtype=complex)
+    count = min(math.ceil(FORGOTTEN * sensor.low_pass / step), LONGEST_RESPONSE)
+    memory = math.exp(-step / sensor.low_pass)
+    return np.asarray((1.0 - memory) * memory ** np.arange(count), dtype=complex)
+
+
+def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
+    """Weights of the sine that is fitted to ``size`` samples of an accelerometer, over what it shows of z."""
+    angle = -float(law.rate(spin)) * step * np.arange(size)
+    orders = (1, 2) if size >= HARMONIC else (1,)
+    waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
+    rows = np.linalg.pinv(np.column_stack([np.ones(size), *waves]))
+    return np.asarray((rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin))
+
+
+FINE = 1500
+"""Sizes of z for which it is worked out how likely an event is, far off and again near the threshold."""
+
+FARTHEST = 1e-12
+"""Share of a threshold below which a nutation is none."""
+
+REACH = 12.0
+"""Sigmas of noise within which sizes lie closer together."""
+
+PHASES = 16
+"""Directions of z against the bias over which a chance is averaged."""
+
+CURVED = 12.0
+"""Sigmas within which a size is so small that noise across it counts."""
+
+
+class Odds:
+    """The chance that an estimate shows at least ``limit`` rad/s, or at most that (``below``), while z grows.
+
+    ``growth`` (1/s) is that of z. The chances of the samples add up along a coast: an event is there where the sum has
+    come to an exponential number.
+    """
+
+    def __init__(self, seen: Transfer, limit: float, growth: float, *, below: bool) -> None:
+        gain, offset = abs(seen.direct), abs(seen.offset)
+        reach = offset + REACH * seen.sigma + 1e-6 * limit
+        wide = np.geomspace(FARTHEST * (limit + reach), 100.0 * (limit + reach), FINE)
+        near = limit + reach * np.linspace(-1.0, 1.0, FINE)
+        shown = np.union1d(wide, near[near > wide[0]])
+        sigma = max(seen.sigma, 1e-9 * limit, 1e-300)
+        turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+        sizes = np.abs(shown[:, None] * turns + seen.offset)
+        chance = _exceeds(limit / sigma, sizes / sigma)
+        chance = 1.0 - chance if below else chance
+        chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
+        expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
+        self.sizes = np.log(shown / gain)
+        pieces = 0.5 * (expected[1:] + expected[:-1]) * np.diff(self.sizes)
+        self.sum = np.concatenate([[0.0], np.cumsum(pieces)])
+
+    def size(self, now: Any, drawn: Any) -> Any:
+        """|z| (rad/s) at which the event comes, from ``now`` on, by exponential numbers; infinite where it does not."""
+        reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
+        found = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
+        return np.where(reached > self.sum[-1], math.inf, found)
+
+
+def _clustered(fresh: float, apart: Vector) -> Any:
+    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a cluster of such.
+
+    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
+    walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
+    """
+    from scipy.special import ndtr
+
+    if fresh > 0.5:
+        return 1.0
+    half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
+    below = ndtr(half)
+    return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
+
+
+def _exceeds(limit: float, shown: Vector) -> Vector:
+    """Chance that |``shown`` + n| >= ``limit`` with n normal, of one sigma in each direction (Rice's distribution)."""
+    from scipy.special import chndtr, ndtr
+
+    found, near = np.asarray(ndtr(shown - limit)), shown < CURVED
+    if limit < 3.0 * CURVED and near.any():
+        found[near] = 1.0 - chndtr(limit * limit, 2.0, shown[near] ** 2)
+    return np.clip(found, 0.0, 1.0)
+
+
+Rows = NDArray[np.int64]
+
+
+class Cycle(NamedTuple):
+    """What goes on in the limit cycle; rates are 1/s.
+
+    ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
+    kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
+    ``high`` as firings begin (mean), ``low`` as they have ended (geometric mean), of each cycle, and the ``largest``.
+    """
+
+    pulses: float
+    cycles: float
+    impulse: float
+    propellant: float | None
+    spin_rate: float
+    doubt: float
+    high: float
+    low: float
+    largest: float
+
+
+class Sums(NamedTuple):
+    """What a chain has added up by a moment: time (s) of the last pulse, and its largest and last |z|, rad/s."""
+
+    time: float = 0.0
+    pulses: float = 0.0
+    impulse: float = 0.0
+    propellant: float = 0.0
+    spin: float = 0.0
+    cycles: float = 0.0
+    largest: float = 0.0
+    last: float = 0.0
+
+
+ADDED = 6
+"""Columns of `Sums` of which differences count."""
+
+
+@dataclass(eq=False)
+class Chains:
+    """Where each chain is: z at the sample ``number``, what its channels waited before, the noise of its samples.
+
+    ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
+    """
+
+    z: ComplexArray
+    number: Rows
+    active: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    ready: Vector
+    carried: Vector
+    white: ComplexArray
+    sums: list[Sums]
+    firings: list[list[Sums]]
+    cycles: list[list[Sums]]
+
+    def some(self, rows: list[int]) -> Chains:
+        """What some of them have added up."""
+        return replace(self, firings=[self.firings[row] for row in rows], cycles=[self.cycles[row] for row in rows])
+
+
+CHAINS, CYCLES, SETTLING = 64, 16, 2
+"""Cycles that are followed side by side, how many of each count, and how many come before those."""
+
+FIRINGS = 200
+"""Firings of each, at most."""
+
+FEW = 4
+"""Cycles in so many firings, below which firings are counted instead."""
+
+MOST_STEPS = 100_000
+"""Stretches in all, at most."""
+
+ROWS = 128
+"""Samples worked out one by one at a time, at most."""
+
+EARLY, LATE = 0.003, 3.0
+"""Chances of the start threshold between which it is awaited sample by sample, where these depend on each other."""
+
+LONGEST_LOOKED = 10_000
+"""Samples looked at one by one for that, at most."""
+
+SIGMAS = 5.0
+"""Reach of noise, sigmas, in which a channel may come to fire."""
+
+OUTGROWN = 4.0
+"""Times all that a loop should leave, at which it does not hold the nutation."""
+
+OVERSHOOT = 0.82
+"""Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times."""
+
+RISING = 1.1
+"""Factor by which nutation grows from the first of many firings to the middle, and on, where they do not hold it."""
+
+TOO_FAST = "the nutation grows faster than the firings damp it"
+
+REFINED = 4
+"""Steps in which the moment of a firing is found on a continuous signal."""
+
+
+class Map:
+    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant gone.
+
+    Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first, are left out.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1) -> None:
+        limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
+        tank = spacecraft.tank and spacecraft.tank.doubled  # so that none runs empty amid a cycle
+        self.truth, self.used = replace(spacecraft, cold=None, tank=tank, limits=limits), used
+        self.law, self.spin = Law(self.truth, loop), spacecraft.spin
+        self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
+        self.seen = transfer(self.law, self.spin)
+        self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
+        self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
+        self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.up = Odds(self.seen, self.start, self.law.growth, below=False)
+        self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
+        self.near = self._near()
+        reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
+        acts = [abs(one.kick) * abs(math.sin(half * one.shortest)) / half for one in self.law.actuators]
+        self.smallest = min(acts)
+        self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
+        self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
+        self.memory = len(self.seen.weights) if len(self.seen.weights) > 1 else 0
+        self.shapes: dict[tuple[str, float], complex] = {}
+
+    def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
+        """The limit cycle; raises Infeasible where the loop does not hold the nutation."""
+        at = self._begin(chains)
+        self._follow(at, SETTLING + cycles, FIRINGS)
+        return self._summed(at)
+
+    def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
+        """The limit cycles that chains come to, by how many do: with pauses, and without.
+
+        They begin as for `cycle`, or fire already at ``z`` rad/s. Raises Infeasible as that does.
+        """
+        at = self._begin(chains)
+        if z is not None:
+            self.bound = max(self.bound, 1.1 * abs(z))
+            at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
+        # Until each has paused or fires on at the same size.
+        self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
+        at.sums = [one._replace(pulses=0.0, cycles=0.0) for one in at.sums]
+        at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
+        self._follow(at, SETTLING + CYCLES, FIRINGS)
+        parts = [[row for row, one in enumerate(at.cycles) if bool(one) is pauses] for pauses in (True, False)]
+        return tuple(self._summed(at.some(part)) for part in sorted(parts, key=len, reverse=True) if part)
+
+    def _follow(self, at: Chains, cycles: int, firings: int) -> None:
+        """Every chain until it has paused more than so many times, or fired so often."""
+        going = np.ones(len(at.z), dtype=bool)
+        for _ in range(MOST_STEPS):
+            self._wake(at, np.flatnonzero(going & ~at.active))
+            self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
+            self._look(at, np.flatnonzero(going))
+            going = np.array([one.cycles <= cycles and one.pulses < firings for one in at.sums])
+            if not going.any():
+                return
+        raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
+
+    def _near(self) -> float | None:
+        """Size of z from which on every sample is looked at until one shows the start threshold.
+
+        None where the chances of the samples add up: where the noise of each is new, or z grows little while it lasts.
+        """
+        seen = self.seen
+        if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
+            return None
+        # No more likely than if each sample had a chance of its own.
+        bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth, below=False)
+        first, last = (
+            float(odds.size(1e-3 * self.start, chance)) for odds, chance in ((bound, EARLY), (self.up, LATE))
+        )
+        return first if math.log(last / first) / (self.turn.real * seen.step) < LONGEST_LOOKED else None
+
+    def _begin(self, count: int) -> Chains:
+        """Coasts at half the start threshold, in random phases."""
+        z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
+        number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
+        quiet, waits = np.zeros(count, dtype=bool), np.full((len(self.law.actuators), count), math.nan)
+        firings: list[list[Sums]] = [[] for _ in range(count)]
+        cycles: list[list[Sums]] = [[] for _ in range(count)]
+        sums, white = [Sums() for _ in range(count)], self._drawn(count)
+        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
+
+    def _drawn(self, rows: int) -> ComplexArray:
+        return self.seen.drawn(self.rng, rows, len(self.seen.weights))
+
+    def _waits(self, seen: ComplexArray) -> Vector:
+        """`Law.waits` of all channels, (channels, ...)."""
+        return self.watch.waits(seen, np.full(seen.shape, self.spin))
+
+    def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
+        """Coasts go on by so many samples, and the noise of those before is forgotten."""
+        at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
+        at.number[rows] += samples
+        at.white[rows] = self._drawn(len(rows))
+        at.carried[:, rows] = self._waits(self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step)))
+
+    def _until(self, size: Vector | float, now: Vector) -> Rows:
+        """Samples until |z| has grown from ``now`` to ``size``."""
+        found = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
+        return np.asarray(np.ceil(found - SAMPLED), dtype=np.int64)
+
+    def _wake(self, at: Chains, rows: Rows) -> None:
+        """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
+        now = np.abs(at.z[rows])
+        if (now <= FARTHEST * self.start).any():
+            raise Infeasible("a firing leaves nothing that could grow: sensor and valves have no errors")
+        if self.near is not None:
+            far = now < self.near
+            self._goes(at, rows[far], self._until(self.near, now[far]))
+            return
+        self._goes(at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now))
+        at.active[rows] = True
+        if not any(self.seen.scatter):
+            return
+        for row in rows.tolist():
+            mean = complex(self.seen.mean(at.z[row]))
+            short = (self.start - abs(mean)) / self.seen.sigma
+            if short > 0.0:  # the noise of this sample is what was missing, and a little more
+                more = short + self.rng.exponential() * min(
+                    1.0 / max(short, 1.0), OVERSHOOT * math.sqrt(self.seen.fresh)
+                )
+                at.white[row] += self.seen.change(at.white[row], mean / abs(mean), more * self.seen.sigma)
+
+    def _skip(self, at: Chains, rows: Rows) -> None:
+        """Over the samples in which no channel can come to fire: to the first that may, or to a pause."""
+        size, mean = np.abs(at.z[rows]), self.seen.mean(at.z[rows])
+        waits = self._waits(mean)
+        share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
+        slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
+        ahead = self._ahead
+        due = np.where(waits < ahead - slack, waits + self.law.period, waits) - ahead - slack
+        idle = np.isnan(due).all(axis=0)
+        soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
+        samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
+        samples[samples < self.memory] = 0
+        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
+        samples[useless] = self._until(self.helps, size[useless])
+        for row in rows[useless].tolist():
+            self._rest(at, row)
+        if self.down is not None:
+            event = self.down.size(size, self.rng.exponential(size=len(rows)))
+            quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
+            samples[quiet] = self._until(event[quiet], size[quiet])
+            at.active[rows[quiet]] = False
+            for row in rows[quiet & ~useless].tolist():
+                self._rest(at, row)
+        moved = samples > 0
+        self._goes(at, rows[moved], samples[moved])
+
+    @property
+    def _ahead(self) -> float:
+        """How long before its start a firing is decided on, s."""
+        return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
+
+    def _look(self, at: Chains, rows: Rows) -> None:
+        """The next samples one by one, up to the first event of each."""
+        step = self.seen.step
+        count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
+        white = np.concatenate([at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1)
+        course = np.exp(self.turn * step * np.arange(count))
+        seen = self.seen.stepped(self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white))
+        awake = np.logical_or.accumulate((np.abs(seen) >= self.start) | at.active[rows, None], axis=1)
+        waits = np.full((len(at.carried), *seen.shape), math.nan)
+        some = awake[:, -1]
+        waits[:, some] = self._waits(seen[some])
+        waits[:, ~some, -1] = self._waits(seen[~some, -1])
+        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2), self._ahead)
+        downs = awake & (np.abs(seen) <= self.stop)
+        firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
+        at.active[rows] = awake[:, -1]
+        for index, row in enumerate(rows.tolist()):
+            last = int(firsts[index])
+            if self._fires(at, row, seen[index], (fires & awake)[:, index, :last]):
+                continue
+            if last < count:
+                at.active[row] = False
+                self._rest(at, row)
+            passed = min(last + 1, count)
+            at.z[row] *= np.exp(self.turn * step * passed)
+            at.number[row] += passed
+            at.white[row] = white[index, passed : passed + white.shape[1] - count]
+            at.carried[:, row], at.fresh[row] = waits[:, index, passed - 1], False
+
+    def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
+        """Whether one of the moments at which a channel comes to fire leads to a firing, and that firing."""
+        for moment in np.flatnonzero(fires.any(axis=0)).tolist():
+            time = (int(at.number[row]) + moment) * self.seen.step
+            actuators = (self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist())
+            found = [made for one in actuators if (made := self._firing(one, complex(seen[moment]), time)) is not None]
+            if not found:
+                continue
+            start, lasts, pulse, actuator = min(found, key=lambda one: one[0])
+            if self.law.windows.allows(start, lasts, float(at.ready[row])):
+                self._fire(at, row, pulse, actuator)
+                return True
+        return False
+
+    def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
+        """When a firing that is decided on by what is ``seen`` at ``time`` s begins, how long it lasts, what it is."""
+        now, law = time + self.law.loop.sensor.delay, self.law
+        firing = law.firing(actuator, seen, self.spin)
+        for _ in range(REFINED if law.loop.sensor.rate is None else 0):  # a continuous signal shows the moment itself
+            if firing is None:
+                return None
+            now, seen = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait))
+            firing = law.firing(actuator, seen, self.spin)
+        if firing is None:
+            return None
+        begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
+        start = law.windows.nearest_tick(begins)
+        start = law.windows.tick_after(begins) if start < now else start
+        made = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
+        return start, firing.lasts, made if made.command is None else commandable(self.truth, made), actuator
+
+    def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
+        """The motion through a pulse, and on to the first estimate after it."""
+        made = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
+        level = made.magnitude / pulse.magnitude
+        (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
+        before, sums = complex(at.z[row]), at.sums[row]
+        size = abs(before) * math.exp(self.turn.real * (begins - time))
+        if size > self.bound:
+            raise Infeasible(TOO_FAST)
+        acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
+        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
+        spin = actuator.spin_rate * level * pulse.on_time - self._slowed(sums.last, size)
+        spent = math.nan if made.propellant is None else made.propellant
+        at.sums[row] = Sums(
+            pulse.t,
+            sums.pulses + 1.0,
+            sums.impulse + made.magnitude,
+            sums.propellant + spent,
+            sums.spin + spin,
+            sums.cycles,
+            max(sums.largest, size),
+            abs(after),
+        )
+        at.firings[row].append(at.sums[row]._replace(largest=size))
+        at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+        number = math.ceil((ends + self.seen.first) / self.seen.step - SAMPLED)
+        at.z[row], at.number[row] = after * np.exp(self.turn * (number * self.seen.step - ends)), number
+        at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
+        at.fresh[row] = at.active[row] = True
+
+    def _slowed(self, last: float, size: float) -> float:
+        """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
+        before, after = (math.cos(float(self.law.nutation(one, self.spin))) for one in (last, size))
+        return self.spin * (1.0 - after / before)
+
+    def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
+        """What a pulse loses on z by its width, with the growth in it."""
+        key = (pulse.channel, round(pulse.on_time, 9))
+        if key not in self.shapes:
+            ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
+            moved = [ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps]
+            rate = self.law.inertia.body_rate
+            self.shapes[key] = shape_factor(rate, self.spin, actuator.spin_rate, moved, 0.0, self.law.growth)
+        return self.shapes[key]
+
+    def _rest(self, at: Chains, row: int) -> None:
+        """A cycle is over, if anything was fired in it: what it has added up is noted."""
+        sums = at.sums[row]
+        if sums.largest > 0.0:
+            sums = sums._replace(cycles=sums.cycles + 1.0)
+            at.cycles[row].append(sums)
+            at.sums[row] = sums._replace(largest=0.0)
+
+    def _summed(self, at: Chains) -> Cycle:
+        """Of all chains, between the first and the last cycle, or firing, that counts."""
+        if all(len(one) >= SETTLING + FEW for one in at.cycles):
+            counted = [one[SETTLING:] for one in at.cycles]
+        else:
+            counted = [one[len(one) // 4 :] for one in at.firings]
+            sizes = np.array([[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]).mean(
+                axis=0
+            )
+            if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
+                raise Infeasible(TOO_FAST)
+        spans = np.array([np.subtract(one[-1], one[0])[:ADDED] for one in counted])
+        total = spans.sum(axis=0)
+        rates = (total / total[0]).tolist()
+        apart = spans[:, 1] - rates[1] * spans[:, 0]
+        angles = self.law.nutation(np.concatenate([np.array(one[1:])[:, ADDED:] for one in counted]), self.spin)
+        return Cycle(
+            pulses=rates[1],
+            cycles=rates[5],
+            impulse=rates[2],
+            propellant=None if math.isnan(rates[3]) else rates[3],
+            spin_rate=rates[4],
+            doubt=math.sqrt(float((apart**2).sum())) / float(total[1]),
+            high=float(angles[:, 0].mean()),
+            low=float(np.exp(np.log(np.maximum(angles[:, 1], 1e-300)).mean())),
+            largest=float(angles[:, 0].max()),
+        )
+
+
+DAY = 86400.0
+YEAR = 365.25 * DAY
+"""s."""
+
+NOISY, WIDENED = 0.1, 0.2
+"""Noise of what is seen (one sigma), over the start threshold, above which firings are more than the map has, and the
+share by which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start."""
+
+DIFFERENT = 0.3
+"""Share of the pulses by which one limit cycle differs from another."""
+
+STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
+"""Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.
+
+So many, as the rate is uneven: how well the last pulse of a cycle fits differs with the thrust."""
+
+
+class Thresholds(NamedTuple):
+    """Nutation, rad, from which a loop fires, and down to which."""
+
+    start: float
+    stop: float
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """The nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
+
+    It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
+    ``noisy``: its noise is above `NOISY` of start.
+
+    ``begins`` s is when the loop first fires, ``band`` what the sensor and the smallest pulse allow, ``lasts`` s how
+    long the propellant in the tank is enough for the limit cycle, None where that is not known.
+    """
+
+    spacecraft: Spacecraft
+    thresholds: Thresholds
+    begins: float
+    band: Band | None = None
+    cycle: Cycle | None = None
+    other: Cycle | None = None
+    lasts: float | None = None
+    noisy: bool = False
+    why: str = ""
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether the nutation stays within what is required; None where nothing is, False without a limit cycle."""
+        required = self.spacecraft.requirement
+        if required is None or required.nutation is None:
+            return None
+        return self.cycle is not None and self.cycle.largest <= required.nutation
+
+    @property
+    def slows(self) -> float | None:
+        """Share of its spin by which a year of this changes it, at the present rate; signed."""
+        return None if self.cycle is None else self.cycle.spin_rate * YEAR / self.spacecraft.spin
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """How nutation grows in a ``spacecraft``, and what it takes to hold it, for each pair of thresholds in ``held``.
+
+    ``largest``: θ_max, rad, of which `until_largest` tells when it is reached; None where none is named.
+    """
+
+    spacecraft: Spacecraft
+    largest: float | None
+    held: tuple[Held, ...]
+
+    @property
+    def until_largest(self) -> float | None:
+        """Time, s, after which damping must have begun; see `compliance.reached`."""
+        return None if self.largest is None else requirements.reached(self.spacecraft, self.largest)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether some pair of thresholds has a limit cycle, or none is needed."""
+        return not self.held or any(one.cycle is not None for one in self.held)
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether some pair of thresholds meets it; None where nothing is required of a loop."""
+        found = [one.meets_requirement for one in self.held]
+        return None if not found or None in found else any(found)
+
+
+def expect_dissipation(spacecraft: Spacecraft) -> None:
+    """Raises BadRequest, which shows what to write, for a spacecraft whose nutation neither grows nor decays."""
+    if spacecraft.dissipation is None:
+        raise BadRequest(
+            "the spacecraft file has no dissipation: it does not say how fast the nutation grows. For example:\n\n"
+            "dissipation: {time_constant: 600 s}"
+        )
+
+
+def budget(
+    spacecraft: Spacecraft,
+    pairs: Sequence[Thresholds] = (),
+    largest: float | None = None,
+    *,
+    seed: int = 1,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Budget:
+    """The budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
+
+    ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
+    has no loop. ``progress`` is called with the number of pairs done.
+    """
+    expect_dissipation(spacecraft)
+    required = spacecraft.requirement
+    if largest is None and required is not None:
+        largest = required.nutation
+    loop = spacecraft.loop
+    if loop is None or spacecraft.growth <= 0.0:
+        return Budget(spacecraft, largest, ())
+    held = []
+    for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
+        held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
+        progress(done)
+    return Budget(spacecraft, largest, tuple(held))
+
+
+def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
+    body = replace(spacecraft, loop=loop)
+    pair = Thresholds(loop.start, loop.stop)
+    found = Held(body, pair, requirements.reached(body, loop.start))
+    try:
+        found = replace(found, band=dead_band(body, loop))
+        _expect_damping(body, loop)
+        made = Map(body, loop, seed=seed)
+        cycle, *others = _attractors(body, loop, made)
+        if made.seen.sigma > NOISY * made.start:
+            found, cycle = replace(found, noisy=True), cycle._replace(doubt=max(cycle.doubt, WIDENED))
+        found = replace(found, cycle=cycle, other=others[0] if others else None)
+        return replace(found, lasts=_lasts(body, loop, seed))
+    except Infeasible as reason:
+        return replace(found, why=str(reason))
+
+
+def _attractors(body: Spacecraft, loop: Loop, made: Map) -> list[Cycle]:
+    """The limit cycle that the loop falls into from the nutation of the file, and others that differ from it.
+
+    There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
+    """
+    band, law = dead_band(body, loop), made.law
+    if not 0.5 * band.step > loop.stop > 0.0:
+        return [made.cycle()]
+    now = complex(law.seen(body.initial.omega))
+    starts = [now] * (body.nutation >= loop.start) + [None, complex(law.size(0.5 * band.step, body.spin))]
+    found: list[Cycle] = []
+    for z in starts:
+        for one in made.attractors(z=z):
+            if all(abs(one.pulses - each.pulses) > DIFFERENT * each.pulses for each in found):
+                found.append(one)
+    return found
+
+
+def _expect_damping(body: Spacecraft, loop: Loop) -> None:
+    """Raises Infeasible where firings feed the nutation: by faults in the file, or by how late they come."""
+    turned = [one.channel for one in margins(body, loop) if one.cause.turned]
+    if turned:
+        raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
+    late = feeding(body, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
+
+
+def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
+    """How long the limit cycle can go on, s: ∫ dm over what it uses a second, as the pressure in the tank falls."""
+    if body.tank is None:
+        return None
+    mass, total = body.tank.propellant, 0.0
+    for share, weight in STAGES:
+        rate = _attractors(body, loop, Map(body, loop, used=share * mass, seed=seed))[0].propellant
+        if rate is None:
+            return None
+        total += weight / rate
+    return float(mass * total)

@@ -1,0 +1,344 @@
+"""What a gyro or an accelerometer shows of the motion, and what the law on board makes of it.
+
+A rate gyro shows ω1 and ω2. An accelerometer at r from the centre of mass, along the unit vector u, shows
+
+    s = u·(dω/dt × r + ω × (ω × r)) + u·F/m,
+
+which in free motion is ω3-fold: for r = (x, y, z) the part that is linear in ω is K1 ω1 + K2 ω2 with
+
+    K1 = ω3 [u3 x (1 + (I1 - I3)/I2) + u1 z (1 - (I1 - I3)/I2)],
+    K2 = ω3 [u3 y (1 + (I2 - I3)/I1) + u2 z (1 - (I2 - I3)/I1)],
+
+so that along axis 3 at radius x it is x ω1 ω3 (1 + a): nothing where C = 2A. The rest of s is even (centripetal) or
+square in ω, of twice the nutation rate: offset, sine and a sine of twice the rate are fitted over the last nutation
+period, and the first of the sines gives ω.
+"""
+
+from __future__ import annotations
+
+import cmath
+import copy
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.control_loop.law import ComplexArray, Doubt, Law, known_to
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Sensor
+from nutdamp.spacecraft.model import Spacecraft, Vector
+
+BLOCK = 4096
+"""Samples whose noise is drawn at a time."""
+
+FILTERED = 600.0
+"""Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
+
+HARMONIC = 7
+"""Samples a nutation period from which on the sine of twice its rate can be distinguished from the others."""
+
+SETTLED = 5.0
+"""Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
+
+BLIND = 1e-6
+"""Share of |ω3| times the distance from the centre of mass below which an accelerometer shows nothing of ω."""
+
+
+def gain(moments: Sequence[float], position: Vector, axis: Vector) -> tuple[float, float]:
+    """(K1, K2)/ω3 of an accelerometer, m: what it shows of ω1 and ω2 in free motion."""
+    first, second, third = moments
+    (x, y, z), (u1, u2, u3) = position.tolist(), axis.tolist()
+    p, q = (first - third) / second, (second - third) / first
+    return u3 * x * (1.0 + p) + u1 * z * (1.0 - p), u3 * y * (1.0 + q) + u2 * z * (1.0 - q)
+
+
+def is_blind(moments: Sequence[float], position: Vector, axis: Vector) -> bool:
+    """Whether an accelerometer shows nothing of a small nutation."""
+    return math.hypot(*gain(moments, position, axis)) <= BLIND * math.hypot(*position.tolist())
+
+
+class Noise:
+    """Normal numbers for samples, the same for the same sample however it is come by; ``key`` is seed and case."""
+
+    def __init__(self, key: tuple[int, ...], columns: int) -> None:
+        self.key, self.columns = key, columns
+        self._blocks: dict[int, Vector] = {}
+
+    def of(self, first: int, count: int) -> Vector:
+        """Those of ``count`` samples from number ``first`` on, (count, columns)."""
+        begin, end = first // BLOCK, max(first + count - 1, first) // BLOCK
+        for block in range(begin, end + 1):
+            if block not in self._blocks:
+                self._blocks[block] = np.random.default_rng((*self.key, block)).normal(size=(BLOCK, self.columns))
+        for block in [one for one in self._blocks if one < begin]:
+            del self._blocks[block]
+        drawn = self._blocks[begin]
+        if end > begin:
+            drawn = np.concatenate([self._blocks[block] for block in range(begin, end + 1)])
+        return drawn[first - begin * BLOCK : first - begin * BLOCK + count]
+
+
+def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[Any, ...]:
+    """What there is to be shown, by columns: rad/s of two gyros, or m/s² of an accelerometer in free motion.
+
+    Of principal ``moments`` and body ``rates``, three numbers or arrays each; a ``torque`` N m changes the rates.
+    """
+    x, y, z = rates
+    if sensor.kind != ACCELEROMETER:
+        return x, y
+    first, second, third = moments
+    m1, m2, m3 = (0.0, 0.0, 0.0) if torque is None else torque
+    turned = ((second - third) * y * z + m1, (third - first) * z * x + m2, (first - second) * x * y + m3)
+    changes = (turned[0] / first, turned[1] / second, turned[2] / third)
+    at, axis = sensor.position.tolist(), sensor.axis.tolist()
+    # u·(dω/dt × r) = dω/dt·(r × u), and u·(ω × (ω × r)) = (ω·u)(ω·r) - (u·r)ω².
+    arm = np.cross(sensor.position, sensor.axis).tolist()
+    value = sum(change * part for change, part in zip(changes, arm, strict=True))
+    along, out = (sum(rate * part for rate, part in zip(rates, one, strict=True)) for one in (axis, at))
+    return (value + along * out - float(sensor.position @ sensor.axis) * (x * x + y * y + z * z),)
+
+
+class Signal:
+    """The samples of a sensor on a ``spacecraft``, as it is in truth, with the noise of a ``seed`` (and a case)."""
+
+    def __init__(self, spacecraft: Spacecraft, sensor: Sensor, seed: int | tuple[int, ...]) -> None:
+        self.sensor = sensor
+        self.moments, self.mass = spacecraft.inertia.moments, spacecraft.mass
+        columns = 1 if sensor.kind == ACCELEROMETER else 2
+        self.noise = Noise(seed if isinstance(seed, tuple) else (seed,), columns)
+
+    def shown(self, rates: Vector, torque: Vector | None = None, force: Vector | None = None) -> Vector:
+        """The signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3)."""
+        sensor = self.sensor
+        values = np.column_stack(felt(sensor, self.moments, rates.T, torque))
+        if force is not None and self.mass is not None and sensor.kind == ACCELEROMETER:
+            values = values + force @ sensor.axis / self.mass
+        return np.asarray(sensor.scales * values + sensor.biases)
+
+    def sampled(self, numbers: NDArray[np.int64], shown: Vector) -> Vector:
+        """Samples by their ``numbers`` (n,), one after the other from 0 at t = 0: ``shown`` with noise and steps."""
+        sensor = self.sensor
+        values = shown + sensor.noise * self.noise.of(int(numbers[0]), len(numbers)) if sensor.noise > 0.0 else shown
+        return stepped(sensor, values)
+
+
+def stepped(sensor: Sensor, values: Vector) -> Vector:
+    """Values in steps of the quantisation."""
+    return values if sensor.quantisation == 0.0 else np.rint(values / sensor.quantisation) * sensor.quantisation
+
+
+class Estimator:
+    """From samples to z, the rate that the `Law` works on, along a coast that begins at ``since`` s.
+
+    Samples are the last axis of times, spins and estimates, the last but one of values (n, columns). Before it there
+    may be cases, which began at ``since`` (cases, 1).
+    """
+
+    def __init__(self, law: Law, sensor: Sensor, since: Any) -> None:
+        self.law, self.sensor = law, sensor
+        self.since = since + max(law.loop.settle, SETTLED * sensor.low_pass)
+        self.step = 0.0 if sensor.rate is None else 1.0 / sensor.rate
+        self._filtered: Vector | None = None
+        self._kept: _Kept | None = None
+        self._fit: _Fit | None = None
+
+    def some(self, cases: NDArray[Any]) -> Estimator:
+        """That of some of the cases."""
+        found = copy.copy(self)
+        found.since = self.since[cases]
+        found._filtered = None if self._filtered is None else self._filtered[cases]
+        found._kept = None if self._kept is None else _Kept(*(part[cases] for part in self._kept))
+        found._fit = None if self._fit is None else _Fit(self._fit.rate[cases], self._fit.weights[cases])
+        return found
+
+    @property
+    def window(self) -> int:
+        """Samples of a nutation period, over which an accelerometer's sine is fitted."""
+        return max(round(self.law.period / self.step), 4)
+
+    @property
+    def first(self) -> Any:
+        """When the first estimate is there after the last firing, s."""
+        return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
+
+    def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
+        """z at the ``times`` (s) of samples, filter reckoned with; NaN where there is none yet.
+
+        ``values`` are the samples, ``spin`` is ω3; call by call they go on.
+        """
+        smooth = self._low_pass(values)
+        if self.sensor.kind == ACCELEROMETER:
+            # The law knows how far out the sensor is and the spin, which dissipation changes: by more than ω shows.
+            x, y, _ = (self.sensor.position * self.sensor.axis).tolist()
+            return self._fitted(times, smooth[..., 0] + (x + y) * spin * spin, spin)
+        seen = self.law.seen(smooth[..., 0] + 1j * smooth[..., 1])
+        return np.asarray(np.where(times >= self.since, seen, math.nan))
+
+    def on_board(self, z: ComplexArray, spin: Vector) -> ComplexArray:
+        """What the law takes for z as it decides, the delay after the sample: brought up to then where it predicts."""
+        if not self.law.loop.predict:
+            return z
+        best = self.best(z, spin)
+        if self.sensor.delay == 0.0:
+            return best
+        return np.asarray(best * np.exp(-1j * self.law.rate(spin) * self.sensor.delay))
+
+    def best(self, z: Any, spin: Any) -> ComplexArray:
+        """z without what the filter does to it in the steady state."""
+        if self.sensor.low_pass == 0.0:
+            return np.asarray(z)
+        fresh = 1.0 - self._memory
+        return np.asarray(z * (1.0 - self._memory * np.exp(1j * self.law.rate(spin) * self.step)) / fresh)
+
+    @property
+    def _memory(self) -> float:
+        """What the filter keeps of its value from sample to sample."""
+        return math.exp(-self.step / self.sensor.low_pass)
+
+    def _low_pass(self, values: Vector) -> Vector:
+        """y = βy' + (1 - β)x over the samples; it begins anew with the first one after a firing."""
+        count = values.shape[-2]
+        if self.sensor.low_pass == 0.0 or not count:
+            return values
+        memory = self._memory
+        before = values[..., :1, :] if self._filtered is None else self._filtered
+        found = np.empty_like(values)
+        size = max(int(FILTERED * self.sensor.low_pass / self.step), 1)
+        for begin in range(0, count, size):
+            part = values[..., begin : begin + size, :]
+            weights = memory ** -np.arange(1.0, part.shape[-2] + 1.0)[:, None]
+            sums = np.cumsum(part * (1.0 - memory) * weights, axis=-2)
+            found[..., begin : begin + size, :] = (before + sums) / weights
+            before = found[..., begin + part.shape[-2] - 1 : begin + part.shape[-2], :]
+        self._filtered = before
+        return found
+
+    def _fitted(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
+        """z by an offset and a sine of the nutation rate, fitted to the samples of the last period.
+
+        Samples come evenly, so that the fit is a fixed combination of their sum and of the sums of their products with
+        sines of the rate and of twice it, over as many samples as the window has.
+        """
+        if not times.shape[-1]:
+            return np.empty(times.shape, dtype=complex)
+        if self._fit is None:
+            self._fit = _fit(np.asarray(self.law.rate(spin[..., :1])), self.step, self.window)
+        fresh, size, rate = times.shape[-1], self.window, self._fit.rate
+        used = np.cumsum(times >= self.since, axis=-1)
+        if self._kept is not None:
+            used = used + self._kept.used
+            times, values = (
+                np.concatenate(both, axis=-1) for both in ((self._kept.times, times), (self._kept.values, values))
+            )
+        self._kept = _Kept(times[..., -size:], values[..., -size:], used[..., -1:])
+        turns = np.exp(-1j * rate * (times - times[..., :1]))
+        sums = [_windows(values, size, fresh)]
+        for power in (1, 2) if self._fit.weights.shape[-1] == 5 else (1,):
+            turned = turns if power == 1 else turns * turns
+            # The sum over the window of v e^{-iφ}, with φ from its last sample.
+            both = _windows(values * turned, size, fresh) * turned[..., -fresh:].conj()
+            sums += [both.real, -both.imag]
+        weights = self._fit.weights
+        sine = sum(one * weights[..., place, None] for place, one in enumerate(sums))
+        found = sine / (np.conj(self.seen_gain) * spin)
+        return np.asarray(np.where(used >= size, found, math.nan))
+
+    @property
+    def seen_gain(self) -> complex:
+        """What the accelerometer shows of z, over ω3."""
+        one, other = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
+        return complex(one / self.law.gauge[0], other / self.law.gauge[1])
+
+    @property
+    def doubt(self) -> float:
+        """One sigma of an estimate of |z|, rad/s, by the noise of the sensor."""
+        lasts = (1.0 - self._memory) / (1.0 + self._memory) if self.sensor.low_pass > 0.0 else 1.0
+        return self._white * (1.0 if self.sensor.kind == ACCELEROMETER else self._lift * math.sqrt(lasts))
+
+    @property
+    def _white(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return 2.0 * self.sensor.noise * self._lift / (math.sqrt(self.window) * self._least_gain)
+        return self.sensor.noise * math.sqrt(2.0) * max(self.law.gauge)
+
+    @property
+    def offset(self) -> float:
+        """By how much |z| may be off in every estimate, rad/s: by bias and steps of the sensor."""
+        return self._bias + self._steps
+
+    @property
+    def doubts(self) -> Doubt:
+        """All of that, for a `Diagnosis`."""
+        least = self.doubt if self.sensor.kind == ACCELEROMETER else 0.0
+        off = known_to(self.law.spacecraft)
+        return Doubt(self.doubt, self._white, least, self._lift, self._bias, self._steps, *off)
+
+    @property
+    def _lift(self) -> float:
+        """By how much `best` makes a constant larger, and noise at most: it undoes what the filter does to z."""
+        if self.sensor.low_pass == 0.0:
+            return 1.0
+        return max(abs(complex(self.best(1.0, self.law.spacecraft.spin))), 1.0)
+
+    @property
+    def _bias(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return 0.0
+        return math.hypot(*self.sensor.biases) * self._lift * max(self.law.gauge)
+
+    @property
+    def _steps(self) -> float:
+        if self.sensor.kind == ACCELEROMETER:
+            return self.sensor.quantisation * self._lift / self._least_gain
+        return self.sensor.quantisation / math.sqrt(2.0) * self._lift * max(self.law.gauge)
+
+    @property
+    def _least_gain(self) -> float:
+        return abs(self.seen_gain) * 2.0 * math.pi / (self.law.period * abs(self.law.inertia.body_rate))
+
+
+class _Kept(NamedTuple):
+    """The last samples of a coast, and how many there were that may be used."""
+
+    times: Vector
+    values: Vector
+    used: Vector
+
+
+class _Fit(NamedTuple):
+    """Nutation ``rate`` rad/s of a fit, and the ``weights`` of its sums: 1, cos φ, sin φ, cos 2φ, sin 2φ."""
+
+    rate: Vector
+    weights: ComplexArray
+
+
+def _fit(rate: Vector, step: float, size: int) -> _Fit:
+    """The least-squares fit of an offset and sines to so many even samples, as weights of their sums."""
+    angle = rate[..., None] * (step * np.arange(1.0 - size, 1.0))[:, None]
+    powers = np.arange(1.0, 3.0 if size >= HARMONIC else 2.0)
+    turns = np.stack([np.cos(angle * powers), np.sin(angle * powers)], axis=-1)
+    basis = np.concatenate([np.ones(angle.shape), turns.reshape(*angle.shape[:-1], -1)], axis=-1)
+    inverse = np.linalg.inv(np.swapaxes(basis, -1, -2) @ basis)
+    return _Fit(rate, inverse[..., 1, :] + 1j * inverse[..., 2, :])
+
+
+def _windows(values: Any, size: int, fresh: int) -> Any:
+    """Sums of the last ``size`` values at each of the last ``fresh``; of fewer, where there are no more."""
+    sums = np.cumsum(values, axis=-1)
+    count = sums.shape[-1]
+    found = sums[..., count - fresh :].copy()
+    later = max(count - fresh, size)
+    if later < count:
+        found[..., later - count :] -= sums[..., later - size : count - size]
+    return found
+
+
+def lag(law: Law, sensor: Sensor, spin: float) -> float:
+    """Angle, rad, by which z has turned on while filter and delay bring a sample to the law; signed."""
+    rate = float(law.rate(spin))
+    behind = rate * sensor.delay
+    if sensor.low_pass > 0.0 and sensor.rate is not None:
+        memory = math.exp(-1.0 / (sensor.rate * sensor.low_pass))
+        behind += cmath.phase((1.0 - memory) / (1.0 - memory * cmath.exp(1j * rate / sensor.rate)))
+    return behind

@@ -1,0 +1,208 @@
+"""Fly the closed loop event by event: coast in closed form, decide by samples, fire through the real width, judge."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Pilot, Scatter
+from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.sensor import Signal
+from nutdamp.control_loop.stability import dead_band
+from nutdamp.flight.propagation import Dynamics, Flight, Leg, Path, make_dynamics
+from nutdamp.flight.track import widest
+from nutdamp.physics import taylor
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft.equipment import Loop
+from nutdamp.spacecraft.model import Spacecraft, SpinState
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+SEED = 1
+"""Of the noise, where none is named."""
+
+LEFT = 0.1
+"""Share of the stop threshold that a last firing leaves, about."""
+
+SMALLEST = 1e-3
+"""Share of the start threshold from which a cycle of growing nutation is counted at least."""
+
+REGROWN = 2_000_000
+"""Samples for which it is waited that the nutation grows again."""
+
+ROWS = 2000
+"""Even moments at which the largest nutation of a run is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A loop flown to ``until`` s: its firings, why it ended, and the channel to blame.
+
+    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
+    ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start; ``lost``: see
+    `Pilot`.
+    """
+
+    spacecraft: Spacecraft
+    loop: Loop
+    until: float
+    key: tuple[int, ...]
+    fired: tuple[Fired, ...]
+    stop: Stop
+    channel: str | None
+    quiet: tuple[float, ...]
+    lost: bool
+    looked_at: int
+    flight: Flight
+
+    @property
+    def schedule(self) -> Schedule:
+        """The pulses that were fired."""
+        return self.flight.schedule
+
+    @property
+    def seed(self) -> int:
+        """Seed of the noise."""
+        return self.key[0]
+
+    @property
+    def case(self) -> int | None:
+        """Number of the dispersed case, from 1; None for the file itself."""
+        return self.key[1] if len(self.key) > 1 else None
+
+    @property
+    def settled(self) -> float | None:
+        """When it was first down to the stop threshold, s; None where it never was."""
+        return self.quiet[0] if self.quiet else None
+
+
+def until_default(spacecraft: Spacecraft, loop: Loop) -> float:
+    """End of a flight where none is named, s: the horizon, and before it the time until the nutation starts it.
+
+    Where the nutation grows again from what is left, a cycle longer, in which at most `REGROWN` samples are looked at.
+    """
+    growth, now = spacecraft.growth, math.tan(spacecraft.nutation)
+    if growth <= 0.0:
+        return spacecraft.horizon
+    first = math.tan(loop.start)
+    waits = math.log(first / now) / growth if 0.0 < now < first else 0.0
+    low = max(LEFT * math.tan(max(loop.stop, 0.5 * dead_band(spacecraft, loop).step)), SMALLEST * first)
+    step = spacecraft.body_period / GRID if loop.sensor.rate is None else 1.0 / loop.sensor.rate
+    return waits + spacecraft.horizon + min(max(math.log(first / low), 0.0) / growth, REGROWN * step)
+
+
+def fly(
+    spacecraft: Spacecraft,
+    loop: Loop,
+    until: float | None = None,
+    *,
+    seed: int | tuple[int, ...] = SEED,
+    law: Law | None = None,
+    scatter: Scatter | None = None,
+    dynamics: Dynamics | None = None,
+) -> Run:
+    """The loop of a ``spacecraft`` flown to ``until`` s; ``dynamics`` flies it by another integrator.
+
+    ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and ``scatter`` what
+    its firings are off by. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
+    """
+    end = until_default(spacecraft, loop) if until is None else until
+    key = seed if isinstance(seed, tuple) else (seed,)
+    return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
+
+
+def largest_since(run: Run) -> tuple[float, float]:
+    """The largest nutation from when a loop was first quiet, rad, and when, s; of the end where it never was."""
+    made = run.flight
+    if run.settled is None:
+        rates = made.motion(np.array([run.until]))[0][0]
+        return arc_cones(made.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
+    track = widest(made.sampled(ROWS, run.until), np.asarray(made.moments), run.spacecraft.spin)
+    later = track.t >= run.settled
+    most = float(track.nutation[later].max())
+    row = int(np.argmax(later & (track.nutation >= most * (1.0 - 1e-9))))  # not where rounding has its largest
+    return float(track.nutation[row]), float(track.t[row])
+
+
+class Alone:
+    """One flight in the making, each stretch by itself."""
+
+    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, key: tuple[int, ...]) -> None:
+        self.pilot, self.signal, self.dynamics, self.key = pilot, signal, dynamics, key
+        self.legs: list[Leg] = []
+
+    @classmethod
+    def of(
+        cls,
+        spacecraft: Spacecraft,
+        loop: Loop,
+        until: float,
+        key: tuple[int, ...],
+        law: Law,
+        scatter: Scatter | None = None,
+        dynamics: Dynamics | None = None,
+    ) -> Alone:
+        """That of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
+        moves = dynamics or make_dynamics(spacecraft)
+        free = make_dynamics(spacecraft).free  # the body's, so that any integrator flies the same decisions
+        pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
+        return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
+
+    def fly(self) -> Run:
+        """Coast and fire until the end, or until something is wrong."""
+        pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
+        coast = self._coast(state, now)
+        while (seen := coast.look(pilot.until, active=pilot.active)) is not None:
+            step = pilot.step(coast, seen)
+            if step is Course.OVER:
+                break
+            if isinstance(step, float):
+                coast = self._coast(coast.at(step), step)
+            elif isinstance(step, Pulse):
+                path, begin = self.dynamics.path(state, now, step.thrust[0], most=taylor.MOST_STEPS)
+                self._leg(now, step.thrust[0], path)
+                pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
+                state, now = self._fire(step, begin), step.thrust[1]
+                coast = self._coast(state, now)
+        last = max(pilot.until, now)
+        self._leg(now, last, self.dynamics.path(state, now, last, most=taylor.MOST_STEPS)[0])
+        return self._run(state)
+
+    def _coast(self, state: SpinState, since: float) -> Coast:
+        return Coast(self.pilot.law, self.signal, self.dynamics, state, since)
+
+    def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
+        """The motion through the thrust of a pulse, from its beginning to its end."""
+        for start, end in itertools.pairwise(sorted(set(pulse.edges))):
+            push = pulse.push(start, end)
+            torque, slope = ([], None) if push is None else ([push[0]], push[1])
+            path, state = self.dynamics.path(state, start, end, torque, slope, most=taylor.MOST_STEPS)
+            self._leg(start, end, path, firing=True, last=end == pulse.thrust[1])
+        return state
+
+    def _leg(self, start: float, end: float, path: Path, *, firing: bool = False, last: bool = False) -> None:
+        done = len(self.pilot.fired) - firing
+        self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
+
+    def _run(self, settled: SpinState) -> Run:
+        """The run, which ends its firings with the motion ``settled``."""
+        pilot = self.pilot
+        schedule = Schedule(tuple(one.pulse for one in pilot.fired))
+        spans = tuple(pulse.thrust for pulse in schedule)
+        moments = self.dynamics.moments
+        made = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
+        return Run(
+            pilot.truth,
+            pilot.loop,
+            pilot.until,
+            self.key,
+            tuple(pilot.fired),
+            pilot.ending[0],
+            pilot.ending[1] or None,
+            tuple(pilot.quiet),
+            pilot.lost,
+            pilot.looked_at,
+            made,
+        )

@@ -1,0 +1,187 @@
+"""Whether knowing more would pay: what a plan leaves with other lengths of the coast, or after a probe pulse.
+
+How well a longer record tells the spacecraft follows from the Cramér-Rao bound, before it is flown: the derivatives of
+the same signals, as noisy and as often sampled, over a coast of that length. A plan from the estimate is then flown in
+cases dispersed by that covariance and by what else the file disperses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.estimation.fit import Fit, estimated
+from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import AXIS, SUN_PULSE, Record
+from nutdamp.estimation.results import Carried, carried, posterior, replaced
+from nutdamp.montecarlo import study as dispersion
+from nutdamp.montecarlo.study import Results, run
+from nutdamp.physics import attitude
+from nutdamp.planning import decision
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+
+LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Coasts that are looked at, over the one there is."""
+
+CASES = 4000
+"""Dispersed cases flown for each."""
+
+PAYS = 0.9
+"""Share of that nutation, and less, down to which it must fall for another coast or a probe pulse to pay."""
+
+MOST_SAMPLES = 20_000
+"""Of a record that is looked at; longer ones are taken to be sampled less often, with less noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What knowing as much as after ``length`` s of coast would leave: ``nutation`` rad, which most cases stay below.
+
+    How many is said by `Outlook.probability`. ``ratio``: sigma of C/A; ``met``: share that meets the requirement, None
+    without one; ``probe``: the channel that fires a pulse of ``on_time`` s meanwhile, and ``thrust``, sigma of its
+    thrust factor; empty for none. ``propellant``: kg of that pulse, None where it is not known.
+    """
+
+    length: float
+    ratio: float
+    nutation: float
+    met: float | None
+    probe: str = ""
+    on_time: float = 0.0
+    thrust: float = math.nan
+    propellant: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """The prospects of coasts, from the shortest on, and of one probe pulse of each channel in the plan.
+
+    ``propellant``: kg of the plan, None where it is not known.
+    """
+
+    scheme: str
+    coasts: tuple[Prospect, ...]
+    probes: tuple[Prospect, ...]
+    probability: float
+    """Share of cases that must meet the requirement, and that stay below the nutation shown."""
+    propellant: float | None
+
+    @property
+    def now(self) -> Prospect:
+        """With a coast as long as the record."""
+        return self.coasts[LENGTHS.index(1.0)]
+
+    @property
+    def enough(self) -> bool:
+        """Whether as many cases as must meet the requirement already: then nothing pays."""
+        return self.now.met is not None and self.now.met >= self.probability
+
+    @property
+    def longer(self) -> Prospect | None:
+        """The shortest longer coast that pays; None where none does."""
+        return next((one for one in self.coasts if self._pays(one) and one.length > self.now.length), None)
+
+    @property
+    def probe(self) -> Prospect | None:
+        """The probe pulse that leaves least, where it pays."""
+        best = min(self.probes, key=lambda one: one.nutation, default=None)
+        return best if best is not None and self._pays(best) else None
+
+    def _pays(self, one: Prospect) -> bool:
+        return not self.enough and one.nutation < PAYS * self.now.nutation
+
+
+def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _: None) -> Outlook:
+    """What other records would leave of a plan that begins at ``time`` s; raises Infeasible where there is no plan.
+
+    ``progress`` is called with the number of prospects that are done.
+    """
+    spacecraft = found.model.spacecraft
+    now = carried(found, time)
+    body = replaced(spacecraft, now)
+    known = replace(body, dispersions=posterior(spacecraft.dispersions, now))
+    plan = decision.compare(known).recommended
+    if plan is None or not len(plan.pulses):
+        raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
+    probability = required_share(spacecraft.requirement)
+    length, done, made = found.model.record.length, 0, []
+    for share in LENGTHS:
+        made.append(_prospect(plan, found, time, probability, share * length))
+        progress(done := done + 1)
+    probes = []
+    for name, on_time in _probes(plan, body):
+        probes.append(_prospect(plan, found, time, probability, length, name, on_time))
+        progress(done := done + 1)
+    return Outlook(plan.scheme, tuple(made), tuple(probes), probability, plan.propellant)
+
+
+def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
+    """The channels that the plan fires, and their mean on-time."""
+    known = {channel.name for channel in body.channels}
+    for name in dict.fromkeys(pulse.channel for pulse in plan.pulses):
+        lengths = [pulse.on_time for pulse in plan.pulses if pulse.channel == name]
+        if name in known and min(lengths) > 0.0:
+            yield name, math.fsum(lengths) / len(lengths)
+
+
+def _prospect(
+    plan: Plan, found: Fit, time: float, level: float, length: float, probe: str = "", on_time: float = 0.0
+) -> Prospect:
+    imagined = _imagined(found, length, probe, on_time)
+    known = carried(imagined, time - (found.model.record.end - length))
+    body = plan.spacecraft
+    dispersed = replace(body, dispersions=posterior(found.model.spacecraft.dispersions, known))
+    results = run(Results(dispersion.study_of(dispersed, plan.pulses), CASES))
+    nutation = results.distribution("nutation")
+    assert nutation is not None
+    at = imagined.index("C/A")
+    assert at is not None
+    return Prospect(
+        length,
+        float(imagined.sigmas[at]),
+        float(nutation.quantiles(np.array([level]))[0]),
+        results.met_fraction,
+        probe,
+        on_time,
+        float(imagined.sigmas[imagined.index(f"thrust {probe}") or 0]) if probe else math.nan,
+        imagined.model.record.schedule.propellant if probe else None,
+    )
+
+
+def _imagined(found: Fit, length: float, probe: str, on_time: float) -> Fit:
+    """The fit of a record of ``length`` s that ends when the record does, with t = 0 at its start; of noise alone."""
+    model = found.model
+    start = model.record.end - length
+    then: Carried = carried(found, start)
+    body = replace(replaced(model.spacecraft, then), dispersions=model.spacecraft.dispersions)
+    fired = Schedule()
+    if probe:
+        channel = next(one for one in body.channels if one.name == probe)
+        fired = Schedule((channel_pulse(channel, 0.5 * length, on_time),))
+    interval = max(model.record.interval, length / MOST_SAMPLES)
+    times = np.asarray(interval * np.arange(max(math.floor(length / interval), 8) + 1), dtype=np.float64)
+    samples = {name: np.zeros(len(times)) for name in model.record.signals}
+    if model.record.has(*AXIS):
+        axis = attitude.rotate(body.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
+        samples |= {name: np.full(len(times), part) for name, part in zip(AXIS, axis, strict=True)}
+    sun = np.empty(0)
+    if SUN_PULSE in model.signals:
+        sun = np.arange(0.0, length, 2.0 * math.pi / abs(body.spin))
+    if not model.record.signals:
+        times, samples = np.empty(0), {}
+    record = Record(times, samples, sun, model.record.sun_step, fired)
+    growing = found.index("growth") is not None
+    imagined = Model(body, record, unequal=model.unequal, growing=growing)
+    values = {one.name: one.file for one in imagined.parameters}
+    values |= {
+        name: value for name, value in found.named.items() if name in values and not name.startswith(("omega", "att"))
+    }
+    thinned = math.sqrt(model.record.interval / interval)
+    noise = np.array([found.noise[model.signals.index(name)] * thinned for name in imagined.signals])
+    return estimated(imagined, np.array([values[one.name] for one in imagined.parameters]), noise)

@@ -1,0 +1,313 @@
+"""Where a fit begins: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
+
+A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
+spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
+
+Nutation rates that samples at equal intervals cannot tell apart.
+
+Seen every T s, a rate looks like any other that differs by a multiple of 2π/T: C/A is known but for multiples of
+2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.estimation.model import Model, Values, Vector
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, Record
+from nutdamp.physics import attitude
+
+if TYPE_CHECKING:
+    from nutdamp.estimation.fit import Fit
+
+
+FINER = 8
+"""The spectrum is taken at so many times as many frequencies as there are samples."""
+
+LONGEST_SPECTRUM = 1 << 16
+"""Samples of a spectrum at most; of longer records the first."""
+
+SMALL = 1e-3
+"""Share of the spin that trial transverse rates have: the motion is linear there."""
+
+OTHER = 0.05
+"""Part by which a spin by Sun pulses may differ from that of the file before both are tried."""
+
+TURNS = 8
+"""Starting values of the angle by which the body is turned about its axis."""
+
+
+def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
+    """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
+    spin = _spin(model)
+    yield from _starts(model, share, spin)
+    # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
+    if not model.record.has(GYROS[2]) and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
+        yield from _starts(model, share, model.spacecraft.spin)
+
+
+def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float]]:
+    values = {one.name: one.file for one in model.parameters}
+    if "omega_3" in values:
+        values["omega_3"] = spin
+    rate = _peak(model, spin, share)
+    if rate is not None:
+        values |= _moments(model, rate, spin)
+    values |= _towards(model, values)
+    if "attitude_3" not in values:
+        yield _linear(model, values)
+        return
+    for turn in range(TURNS):
+        yield _linear(model, values | {"attitude_3": values["attitude_3"] + 2.0 * math.pi * turn / TURNS})
+
+
+def _spin(model: Model) -> float:
+    """ω3 from the signal that shows it, rad/s; else as the file has it."""
+    record, spin = model.record, model.spacecraft.spin
+    if record.has(GYROS[2]) and np.isfinite(record.signals[GYROS[2]]).any():
+        return float(np.nanmedian(record.signals[GYROS[2]]))
+    if len(record.sun_pulses) > 1:
+        return math.copysign(spin_of(record.sun_pulses)[0], spin)
+    return spin
+
+
+def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
+    """Mean rate of the turns between two Sun pulses or more, at rising times (k,) s, and its sigma, rad/s.
+
+    The sigma is that of a straight line through the times, by what they are off it, a nutation included, or by the
+    ``step`` (s, full width) to within which they are known.
+    """
+    gaps = np.diff(pulses)
+    turns = np.concatenate([[0.0], np.cumsum(np.rint(gaps / gaps.min()))])
+    rate = 2.0 * math.pi * float(turns[-1]) / float(pulses[-1] - pulses[0])
+    if len(pulses) < 3:
+        return rate, math.inf
+    slope, left = np.polyfit(turns, pulses, 1, full=True)[:2]
+    variance = max(float(left.sum()) / (len(pulses) - 2), step * step / 12.0)
+    spread = math.sqrt(variance / float(np.sum((turns - turns.mean()) ** 2)))
+    return 2.0 * math.pi / float(slope[0]), 2.0 * math.pi * spread / float(slope[0]) ** 2
+
+
+def once_a_turn(record: Record) -> str:
+    """What Sun pulses tell by themselves, in words; nothing without them."""
+    if len(record.sun_pulses) < 3:
+        return ""
+    spin, sigma = np.degrees(spin_of(record.sun_pulses, record.sun_step))
+    return f": Sun pulses come once a spin turn and tell the spin, {spin:.7g} deg/s, with a sigma of {sigma:.2g} deg/s"
+
+
+def _peak(model: Model, spin: float, share: float) -> float | None:
+    """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
+    record, body = model.record, model.spacecraft
+    expected = body.inertia.body_rate * spin
+    count = max(int(share * len(record.times)), min(len(record.times), 16))
+    times = record.times[: min(count, LONGEST_SPECTRUM)]
+    signals = {name: values[: len(times)] for name, values in record.signals.items()}
+    if record.has(*GYROS[:2]):
+        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
+    for name in (*GYROS[:2], ACCELERATION):
+        if name in signals:
+            found = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            return None if found is None else math.copysign(found, expected)
+    if record.has(*AXIS):
+        axis = np.column_stack([signals[name] for name in AXIS])
+        mean = np.nanmean(axis, axis=0)
+        mean /= np.linalg.norm(mean)
+        first = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
+        first /= np.linalg.norm(first)
+        # Seen along H the axis goes round with |H|/A, in the sense of H.
+        x, y = axis @ first, axis @ np.cross(mean, first)
+        turned = _strongest(times, x, y, body.inertia.C / body.inertia.A * abs(spin), 2.1 * abs(spin), 1.0)
+        if turned is None:
+            return None
+        cosine = math.sqrt(max(1.0 - float(np.nanvar(x) + np.nanvar(y)), 0.1))
+        return spin * (1.0 - abs(turned) * cosine / abs(spin))
+    return None
+
+
+def _strongest(
+    times: Vector, real: Vector, imaginary: Vector | None, expected: float, most: float, sign: float
+) -> float | None:
+    """Rate (rad/s, times ``sign``) at the peak of a spectrum, nearest to ``expected`` of those that look alike."""
+    there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
+    if there.sum() < 4:
+        return None
+    at = times[there]
+    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    step = float(np.median(np.diff(at)))
+    count = min(math.ceil((at[-1] - at[0]) / step) + 1, LONGEST_SPECTRUM)
+    place = np.rint((at - at[0]) / step).astype(int)
+    inside = place < count
+    even = np.zeros(count, dtype=complex)
+    # Outliers are cut off at a few times the usual size.
+    centred = values - np.median(values.real) - 1j * np.median(values.imag)
+    limit = 3.0 * float(np.median(np.abs(centred))) or math.inf
+    centred /= np.maximum(np.abs(centred) / limit, 1.0)
+    even[place[inside]] = (centred - centred.mean())[inside]
+    length = 1 << math.ceil(math.log2(FINER * count))
+    power = np.abs(np.fft.fft(even, length)) ** 2
+    rates = 2.0 * math.pi * np.fft.fftfreq(length, step)
+    around = 2.0 * math.pi / step
+    if imaginary is None:
+        power = np.where(rates > 0.0, power, 0.0)
+        rates, expected = np.abs(rates), abs(expected)
+    else:
+        rates = rates + around * np.rint((expected - rates) / around) * (most > 0.5 * around)
+    power = np.where((np.abs(rates) <= 1.02 * most) & (np.abs(rates) > 0.25 * 2.0 * math.pi / (count * step)), power, 0)
+    if not power.any():
+        return None
+    return sign * float(rates[int(np.argmax(power))])
+
+
+def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
+    """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
+    inertia = model.spacecraft.inertia
+    wanted = inertia.C / inertia.A - (rate / spin - inertia.body_rate)
+    wanted = min(max(wanted, 0.01), 1.999)
+    A, ratio = model.parameter("A"), model.parameter(RATIO)
+    assert ratio is not None
+    if A is None:
+        return {RATIO: wanted}
+    # Moments that are known together would be moved by many times what the ratio is: a start need not be.
+    part = min((A.prior / A.file) ** 2 / (ratio.prior / ratio.file) ** 2, 1.0)
+    return {"A": A.file * (ratio.file / wanted) ** part, RATIO: wanted}
+
+
+def _towards(model: Model, values: Values) -> dict[str, float]:
+    """The attitude turned the shortest way so that the spin axis is along the mean of the axes measured."""
+    record = model.record
+    if not record.has(*AXIS):
+        return {}
+    mean = np.nanmean(np.column_stack([record.signals[name] for name in AXIS]), axis=0)
+    quaternion = model.reference.quaternion
+    sense = math.copysign(1.0, model.spacecraft.spin)
+    wanted = sense * attitude.rotate(attitude.conjugate(quaternion), mean / np.linalg.norm(mean))
+    across = np.cross([0.0, 0.0, 1.0], wanted)
+    size = float(np.linalg.norm(across))
+    angle = math.atan2(size, wanted[2])
+    turn = angle * across / size if size > 0.0 else np.array([angle, 0.0, 0.0])
+    return {"attitude_1": float(turn[0]), "attitude_2": float(turn[1])} | (
+        {"attitude_3": 0.0} if "attitude_3" in values else {}
+    )
+
+
+def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
+    """The transverse rates, offsets and tilts by linear least squares, everything else as it is."""
+    names = ["omega_1", "omega_2", *(name for name in values if name.startswith(("bias", "attitude_1", "attitude_2")))]
+    base = values | {"omega_1": 0.0, "omega_2": 0.0}
+    steps = {name: SMALL * abs(values.get("omega_3", model.spacecraft.spin)) for name in names[:2]}
+    steps |= dict.fromkeys(names[2:], SMALL)
+    at_rest = model.predicted(base)
+    columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
+    weights = np.ones(len(at_rest))
+    for index in range(len(model.signals)):
+        rows = model.signal == index
+        weights[rows] = 1.0 / (float(np.ptp(model.measured[rows])) or 1.0)
+    matrix = np.column_stack(columns) * weights[:, None]
+    solved = np.linalg.lstsq(matrix, (model.measured - at_rest) * weights, rcond=1e-10)[0]
+    return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}
+
+
+WITHIN = 3.0
+"""Sigmas of the file within which another C/A is considered."""
+
+ALIKE = 25.0
+"""Difference of -2 ln(likelihood) below which two fits count as equally good."""
+
+MOST_ALIASES = 6
+"""Other values of C/A that are fitted at most, the nearest to the file first."""
+
+POSSIBLE = (0.01, 1.999)
+"""Range of C/A of a symmetric body."""
+
+
+def neighbours(model: Model, values: Vector) -> list[Vector]:
+    """Values of the parameters with the other C/A that equal sampling allows within the tolerances of the file.
+
+    Where the file gives no tolerance, all that are possible, if the nutation found is itself sampled too slowly.
+    """
+    at, low, high = _range(model)
+    if math.isinf(model.parameters[at].prior) and not too_slow(model, values):
+        return []
+    step = 2.0 * math.pi / (abs(_spin_of(model, values)) * interval(model))
+    # a -> a + k step; of one transverse signal also a -> -a + k step.
+    one_sided = len(_transverse(model)) == 1 and "axis" not in model.signals
+    ratios = []
+    for begin, itself in ((values[at], True), *[(2.0 - values[at], False)] * one_sided):
+        nearest = round((model.parameters[at].file - begin) / step)
+        ratios += [
+            begin + k * step for k in range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1) if k != 0 or not itself
+        ]
+    ratios = sorted((one for one in ratios if low < one < high), key=lambda one: abs(one - model.parameters[at].file))
+    made = []
+    for ratio in ratios[:MOST_ALIASES]:
+        made.append(values.copy())
+        made[-1][at] = ratio
+    return made
+
+
+def likeliest(fits: Sequence[Fit]) -> Fit:
+    """The one of some fits of one record that the data and the tolerances of the file leave.
+
+    Raises Infeasible where these leave several.
+    """
+    model = fits[0].model
+    at, low, high = _range(model)
+    counts = np.bincount(model.signal)
+    costs = [2.0 * float(counts @ np.log(one.noise)) for one in fits]
+    alike = [one for one, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
+    left = [one for one in alike if low < one.values[at] < high]
+    if not left and too_slow(model, alike[0].values):
+        raise Infeasible(
+            f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, and none of their "
+            "C/A is as near to the file as its tolerances allow; check A and C in the file (are the times in seconds?)"
+        )
+    left = left or alike[:1]
+    if len(left) == 1:
+        return left[0]
+    ratios = sorted(float(one.values[at]) for one in left)
+    fastest = max(abs(nutation_rate(model, one.values)) for one in left)
+    raise Infeasible(
+        f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: C/A may be "
+        f"{', '.join(f'{one:.4f}' for one in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at uneven "
+        "intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
+    )
+
+
+def too_slow(model: Model, values: Vector) -> bool:
+    """Whether fewer than two samples fall in a nutation period."""
+    return abs(nutation_rate(model, values)) * interval(model) > math.pi
+
+
+def nutation_rate(model: Model, values: Vector) -> float:
+    """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
+    ratio = float(values[_range(model)[0]])
+    return (1.0 - ratio if _transverse(model) else ratio) * _spin_of(model, values)
+
+
+def interval(model: Model) -> float:
+    """Usual time between the samples of the signal that is sampled fastest of those that show the nutation, s."""
+    shown = [name in _transverse(model) or name == "axis" for name in model.signals]
+    steps = [np.diff(model.times[model.signal == index]) for index in np.flatnonzero(shown)]
+    return min((float(np.median(one)) for one in steps if len(one)), default=model.record.interval)
+
+
+def _transverse(model: Model) -> list[str]:
+    return [name for name in model.signals if name in (*GYROS[:2], ACCELERATION)]
+
+
+def _spin_of(model: Model, values: Vector) -> float:
+    names = [one.name for one in model.parameters]
+    return float(values[names.index("omega_3")]) if "omega_3" in names else model.spacecraft.spin
+
+
+def _range(model: Model) -> tuple[int, float, float]:
+    """Position of C/A among the parameters, and the range that the file leaves it."""
+    at = next(index for index, one in enumerate(model.parameters) if one.name == RATIO)
+    one = model.parameters[at]
+    return at, max(one.file - WITHIN * one.prior, POSSIBLE[0]), min(one.file + WITHIN * one.prior, POSSIBLE[1])

@@ -1,0 +1,290 @@
+"""The motion as a film: the body cone rolls on the space cone, through the pulses."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import struct
+import subprocess
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import BadRequest, CannotWrite
+from nutdamp.figures import geometry, history, sphere, style
+from nutdamp.figures.legends import legend, short_name
+from nutdamp.figures.style import INK, MOTION
+from nutdamp.flight.propagation import Flight
+from nutdamp.spacecraft.model import Spacecraft, Vector
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+
+
+FORMATS = ("gif", "mp4")
+
+INCHES = 8.0
+"""Width of the sheet that fills a frame: pixels only make it finer."""
+
+LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
+"""Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
+
+SMOOTH = 12.0
+"""Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see it backwards."""
+
+SHORTEST, LONGEST = 6.0, 30.0
+"""Seconds of a film whose length is not given."""
+
+MARKED = math.radians(60.0)
+"""Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
+
+TRANSPARENT = 255
+"""Entry of the palette of a GIF that leaves what was there before."""
+
+FRAMED = 300
+"""Frames by whose cones the scales are laid out, evenly over the film."""
+
+HELD = 0.4
+"""Seconds of film that a firing stays announced, however short it is."""
+
+
+def film_format(path: str) -> str:
+    """The format of a film by the ending of its file, gif for standard output.
+
+    Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
+    """
+    found = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if found not in FORMATS:
+        raise BadRequest(f"--output {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    style.require()
+    if found == "mp4" and shutil.which("ffmpeg") is None:
+        raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
+    return found
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How ``until`` s of motion become ``frames`` pictures at ``fps`` a second."""
+
+    until: float
+    frames: int
+    fps: int
+    turns: float
+
+    @property
+    def times(self) -> Vector:
+        """Moment of each frame, s."""
+        return np.linspace(0.0, self.until, self.frames)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the eye can follow the nutation."""
+        return self.frames >= 0.5 * SMOOTH * self.turns
+
+    @property
+    def pace(self) -> float:
+        """Seconds of motion in a second of film."""
+        return self.until * self.fps / self.frames
+
+
+def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None) -> Timing:
+    """Frames for ``until`` s of motion; without ``seconds`` as many as the nutation needs to be followed."""
+    turns = float(until / spacecraft.inertial_period)
+    if seconds is None:
+        seconds = min(max(turns * SMOOTH / fps, SHORTEST), LONGEST)
+    return Timing(float(until), max(round(seconds * fps), 2), fps, turns)
+
+
+@style.styled
+def film(
+    stream: IO[bytes],
+    flight: Flight,
+    timed: Timing,
+    path: str,
+    width: int = 800,
+    progress: Callable[[int], object] = lambda _: None,
+) -> None:
+    """Write the film of ``width`` pixels to ``stream``, frame by frame; ``progress`` is called with how many are done.
+
+    The ending of ``path`` says the format. Raises as `film_format`.
+    """
+    kind = film_format(path)
+    scene = Scene(flight, timed, width)
+    (_gif if kind == "gif" else _mp4)(stream, scene, timed, progress)
+
+
+def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
+    """One palette for all frames: the colours are few, and what does not move stays the same to the pixel.
+
+    A frame is only what changed since the one before, by GIF89a: what did not is transparent in it.
+    """
+    from PIL import GifImagePlugin, Image
+
+    palette = Image.new("P", (1, 1))
+    shown: NDArray[np.uint8] | None = None
+    for number in range(timed.frames):
+        scene.show(number)
+        pixels = LEVELS[scene.pixels()]
+        if shown is None:
+            colours = _commonest(pixels).tobytes()
+            palette.putpalette(colours)
+            stream.write(_gif_head(pixels.shape[1], pixels.shape[0], colours))
+        image = Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+        indices = np.array(image)
+        indices[indices == TRANSPARENT] = 0  # the colour there is the first one again
+        changed, corner = _changed(shown, indices)
+        frame = Image.fromarray(changed, "P")
+        # Time in milliseconds; GIF counts in hundredths of a second.
+        options = {"duration": 10 * round(100 / timed.fps), "transparency": TRANSPARENT, "disposal": 1}
+        for part in GifImagePlugin.getdata(frame, corner, **options):
+            stream.write(part)
+        shown = indices
+        progress(number + 1)
+    stream.write(b";")
+
+
+def _gif_head(width: int, height: int, colours: bytes) -> bytes:
+    """Head of a GIF with one palette of 256 colours, which is shown for ever."""
+    screen = struct.pack("<HHBBB", width, height, 0xF7, 0, 0)
+    return b"GIF89a" + screen + colours + b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
+
+
+def _changed(before: NDArray[np.uint8] | None, now: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
+    """The part of a frame that differs from the one before, transparent where it does not; its corner (x, y)."""
+    if before is None:
+        return now, (0, 0)
+    differs = before != now
+    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        rows = columns = np.array([0])
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return np.where(differs[window], now[window], np.uint8(TRANSPARENT)), (int(columns[0]), int(rows[0]))
+
+
+def _commonest(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The colours (256, 3) that cover most of a picture; the last is the first again, so that none needs it."""
+    colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
+    most = colours[np.argsort(-counts, kind="stable")[:TRANSPARENT]]
+    return np.vstack([most, np.repeat(most[:1], TRANSPARENT + 1 - len(most), axis=0)])
+
+
+def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
+    """H.264 as browsers play it."""
+    from matplotlib.animation import FFMpegWriter
+
+    writer = FFMpegWriter(fps=timed.fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "film.mp4"
+        try:
+            with writer.saving(scene.figure, str(target), scene.figure.dpi):
+                for number in range(timed.frames):
+                    scene.show(number)
+                    writer.grab_frame()
+                    progress(number + 1)
+        except subprocess.CalledProcessError as reason:
+            raise CannotWrite("mp4", f"ffmpeg failed with status {reason.returncode}") from reason
+        with target.open("rb") as made:
+            shutil.copyfileobj(made, stream)
+
+
+class Scene:
+    """The figure of the film, and what changes from frame to frame."""
+
+    def __init__(self, flight: Flight, timed: Timing, width: int) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        self.flight, self.timed = flight, timed
+        track = flight.sampled(timed.frames, timed.until)
+        rows = np.searchsorted(track.t, timed.times, side="right") - 1
+        rows[0] = 0  # before what is fired at once
+        self.rates, self.quaternions = track.rates[rows], track.quaternion[rows]
+        # Even numbers of pixels: video is coded in blocks.
+        self.figure = style.sheet(INCHES, 0.6 * INCHES)
+        self.figure.set_dpi(width // 2 * 2 / INCHES)
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.path = geometry.drawn(flight, track)
+        self.plane = geometry.sky_plane(flight, track.momentum[0])
+        self.looked = sphere.view(flight, self.path)
+        self._changing: list[Artist] = []
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        """Everything that does not move, and room for what moves."""
+        figure, flight = self.figure, self.flight
+        grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
+        self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
+        self.strip = figure.add_subplot(grid[1, :])
+        some = np.unique(np.linspace(0, self.timed.frames - 1, min(self.timed.frames, FRAMED)).round().astype(int))
+        cones = (self.cones(number) for number in some.tolist())
+        rims = np.vstack([rim for one in cones for rim in (one.body, one.space, one.axis[None], one.rotation[None])])
+        sphere.draw_ground(self.space, self.looked, self.path)
+        sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
+        much = self.looked.magnified
+        self.space.set_title("Cones" + (f" (angles × {much:g})" if much != 1.0 else ""))
+        shown = geometry.on_sky(self.plane, np.vstack([rims, self.path.axis]))
+        style.square(self.sky, shown, margin=0.06)
+        sky = geometry.sky_names(flight)
+        self.sky.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H(0)\n{sky.view}")
+        history.cone_history(self.strip, flight, self.path)
+        self.strip.set(xlabel="time, s", ylabel="deg")
+        sphere.name_directions(self.sky)
+        legend(figure, [self.sky, self.strip], 5)
+        self.title = figure.suptitle(self.caption(0.0))
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # from now on nothing may move but the motion
+        self.title.set_text("")
+        self.canvas.draw()  # type: ignore[no-untyped-call]
+        self.still = self.canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
+
+    def cones(self, number: int) -> geometry.Cones:
+        """The cones of frame ``number``, from 0."""
+        return geometry.cones(self.flight, self.rates[number], self.quaternions[number])
+
+    def show(self, number: int) -> None:
+        """Frame ``number``, from 0."""
+        for artist in self._changing:
+            artist.remove()
+        now, found = float(self.timed.times[number]), self.cones(number)
+        kept = [set(axes.get_children()) for axes in self.figure.axes]
+        done = self.path.t <= now
+        sphere.draw_cones(self.space, self.looked, found)
+        sphere.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
+        sphere.draw_circles(self.sky, self.plane, found)
+        if self.timed.until * abs(self.flight.spacecraft.spin) < MARKED * self.timed.frames:
+            mark = geometry.body_mark(found, self.quaternions[number])[None]
+            self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)
+            self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
+        self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
+        self.strip.axvline(now, color=INK, linewidth=1.2)
+        self._changing = [
+            artist
+            for axes, before in zip(self.figure.axes, kept, strict=True)
+            for artist in axes.get_children()
+            if artist not in before
+        ]
+        self.title.set_text(self.caption(now))
+
+    def caption(self, now: float) -> str:
+        """What is written above the frame: name, time, and what fires or just did."""
+        firing = [
+            f"   {'firing' if now <= pulse.end else 'fired'} {number}: {pulse.channel}"
+            for number, pulse in enumerate(self.flight.schedule, start=1)
+            if pulse.start <= now <= pulse.end + HELD * self.timed.pace
+        ]
+        return f"{short_name(self.flight.spacecraft)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
+
+    @property
+    def _digits(self) -> int:
+        return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """The frame as it is, (height, width, 3): what changes is drawn over what does not move."""
+        self.canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
+        for artist in sorted([*self._changing, self.title], key=lambda one: one.get_zorder()):
+            artist.draw(self.canvas.get_renderer())  # type: ignore[no-untyped-call]
+        return np.array(self.canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]

@@ -1,0 +1,312 @@
+"""What pictures of a flight are made of: directions as angles, rolling cones, stretches of the track. No matplotlib."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.physics import attitude, triaxial
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+ROWS_A_TURN = 60
+"""Rows in a nutation period from which a polygon looks like the curve."""
+
+MOST_ROWS = 30_000
+"""Rows of a picture at most; a longer track is drawn as far as they reach."""
+
+RIM = 121
+"""Points around the rim of a cone."""
+
+LEAST = 1e-9
+"""Degrees or deg/s below which a motion is drawn as a point."""
+
+INSET_FROM, INSET_BELOW = 1e-4, 0.15
+"""Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
+
+CLOSE = 1.0 / 125.0
+"""Part of the time shown below which firings that follow each other cannot be distinguished: 4 points on a sheet."""
+
+MANY = 3
+"""Firings that are drawn as one, at least."""
+
+NO_CONE = 1e-10
+"""Half-angle in rad below which a cone is not distinguished from its axis."""
+
+
+def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
+    """End of the time axis of pictures and films, s: what comes after the last pulse is seen, and fills no sheet.
+
+    One inertial nutation period after the last pulse, but no more than a quarter of the time until then, or of a period
+    as seen in the body where that is more. Without pulses, the inertial period.
+    """
+    end = schedule.end
+    if not len(schedule):
+        return spacecraft.inertial_period
+    return end + min(spacecraft.inertial_period, 0.25 * max(end, spacecraft.body_period))
+
+
+def drawn(flight: Flight, track: Track) -> Track:
+    """``track``, or the same stretch of ``flight`` in as many rows as its curves need.
+
+    Where that would be more than `MOST_ROWS`, a shorter stretch from t = 0.
+    """
+    until = float(track.t[-1])
+    step = quickest(flight) / ROWS_A_TURN
+    if until / step <= len(track.t):
+        return track
+    reach = min(until, max(MOST_ROWS * step, flight.schedule.end))
+    return flight.sampled(min(math.ceil(reach / step) + 1, MOST_ROWS), reach)
+
+
+def quickest(flight: Flight) -> float:
+    """The shortest period of the nutation, seen in the body or in space, s."""
+    body = flight.spacecraft
+    momentum = np.linalg.norm(body.omega0 * np.asarray(flight.moments))
+    return float(min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum)))
+
+
+def channels_fired(flight: Flight) -> list[str]:
+    """Channels that fire, in the order of the file."""
+    used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
+    order = [channel.name for channel in flight.spacecraft.channels]
+    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
+
+
+class Stretch(NamedTuple):
+    """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that fires, from 0."""
+
+    first: int
+    last: int
+    pulse: int | None
+
+
+def stretches(flight: Flight, track: Track) -> Iterator[Stretch]:
+    """The track cut where pulses begin and end, in order; an impulse is a stretch of two rows."""
+    now, last = 0, len(track.t) - 1
+    for number, (begins, ends) in enumerate(flight.spans):
+        if begins > track.t[last]:
+            break
+        first = max(now, int(np.searchsorted(track.t, begins, side="left")))
+        until = max(first, min(last, int(np.searchsorted(track.t, ends, side="right")) - 1))
+        if first > now:
+            yield Stretch(now, first, None)
+        yield Stretch(first, until, number)
+        now = until
+    if now < last:
+        yield Stretch(now, last, None)
+
+
+class Block(NamedTuple):
+    """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it something fires."""
+
+    first: int
+    last: int
+    many: int
+    begins: float
+    ends: float
+    on: float
+
+    @property
+    def name(self) -> str:
+        """Its numbers."""
+        if self.many == 1:
+            return str(self.first)
+        return f"{self.first}{'–' if self.many == self.last - self.first + 1 else ' … '}{self.last}"
+
+
+def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Block]:
+    """The firings of a channel, or of all, up to ``until`` s; those that could not be distinguished are one.
+
+    These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
+    """
+    groups: list[list[tuple[int, Pulse]]] = []
+    for number, pulse in enumerate(flight.schedule, start=1):
+        if pulse.start > until or channel not in (None, pulse.channel):
+            continue
+        if groups and pulse.start - groups[-1][-1][1].start < CLOSE * until:
+            groups[-1].append((number, pulse))
+        else:
+            groups.append([(number, pulse)])
+    found = []
+    for group in groups:
+        for part in [group] if len(group) >= MANY else [[one] for one in group]:
+            ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
+            found.append(Block(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+    return found
+
+
+def sky_plane(flight: Flight, momentum: Vector) -> Vector:
+    """Rows: two directions square to ``momentum``, and its own. In a celestial frame east and north, in N its x, y."""
+    up = momentum / np.linalg.norm(momentum)
+    framed = flight.spacecraft.attitude is not None
+    first = np.cross([0.0, 0.0, 1.0], up) if framed else np.array([1.0, 0.0, 0.0])
+    if np.linalg.norm(first) < 1e-9:  # H at the pole: there is no east
+        first = np.array([1.0, 0.0, 0.0])
+    first = first - up * (first @ up)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first), up])
+
+
+class Sky(NamedTuple):
+    """What the two angles of `on_sky` are called, and how the view lies."""
+
+    x: str
+    y: str
+    view: str
+
+
+def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
+    """The names for a view of which ``centre`` is the middle."""
+    if flight.spacecraft.attitude is None:
+        return Sky("towards inertial x, deg", "towards inertial y, deg", "H towards you, inertial x to the right")
+    return Sky(f"east of {centre}, deg", f"north of {centre}, deg", "H towards you, east to the right")
+
+
+def on_sky(plane: Vector, directions: Vector) -> Vector:
+    """Directions (n, 3) as angles from H(0) in degrees, true to scale along every radius (azimuthal equidistant)."""
+    local = directions @ plane.T
+    across = np.hypot(local[:, 0], local[:, 1])
+    angle = np.degrees(np.arctan2(across, local[:, 2]))
+    scale = np.divide(angle, across, out=np.zeros_like(angle), where=across > 0)
+    return np.asarray(local[:, :2] * scale[:, None], dtype=np.float64)
+
+
+def pole_path(track: Track) -> Vector:
+    """(n, 2): ω1 and ω2 in deg/s, the pole curve (Magnus 1970 fig. 5)."""
+    return np.asarray(np.degrees(track.rates[:, :2]), dtype=np.float64)
+
+
+def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
+    """(n, 2) each: spin axis and H as angles from H(0) in degrees (Magnus 1970 fig. 6-8)."""
+    plane = sky_plane(flight, track.momentum[0])
+    return on_sky(plane, track.axis), on_sky(plane, track.momentum)
+
+
+def sky_target(flight: Flight, track: Track) -> Vector:
+    """(n, 2): the target axis in the same angles; empty where there is none."""
+    axis = flight.spacecraft.goal.axis
+    if axis is None:
+        return np.empty((0, 2))
+    return on_sky(sky_plane(flight, track.momentum[0]), axis[None])
+
+
+def momentum_inset(flight: Flight, track: Track) -> Vector | None:
+    """(n, 2): the path of H and the target as angles in degrees, where the axis track is too wide for it; else None."""
+    path, momentum = sky_paths(flight, track)
+    small = np.vstack([momentum, sky_target(flight, track)])
+    share = float(np.ptp(small, axis=0).max()) / max(float(np.ptp(np.vstack([path, small]), axis=0).max()), LEAST)
+    return small if len(flight.schedule) and INSET_FROM < share < INSET_BELOW else None
+
+
+def once(points: Vector) -> Vector:
+    """A path (n, 2), broken by NaN where it goes straight back: dashes drawn both ways would fill each other's gaps."""
+    grain = 1e-6 * max(float(np.ptp(points, axis=0).max()), 1e-9)
+    places = [tuple(place) for place in np.round(points / grain).astype(np.int64).tolist()]
+    drawn: set[tuple[tuple[int, ...], tuple[int, ...]]] = set()
+    kept = [points[0]]
+    for first, second, point in zip(places, places[1:], points[1:], strict=False):
+        back = first != second and (second, first) in drawn
+        kept += [np.full(2, math.nan), point] if back else [point]
+        drawn.add((first, second))
+    return np.array(kept)
+
+
+def room(points: Vector, margin: float, *, centre: bool = False) -> tuple[Vector, float]:
+    """Middle (2,) and half the side of a square with room for ``points`` (n, 2); ``centre``: zero in the middle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = np.zeros(2) if centre else 0.5 * (low + high)
+    half = (1.0 + margin) * float(np.abs(points - middle).max())
+    return middle, half if half > LEAST else 1.0
+
+
+def hull(points: Vector) -> Vector:
+    """Corners (m, 2) of the convex hull of ``points`` (n, 2), counterclockwise (Andrew's monotone chain)."""
+    ordered = sorted(set(map(tuple, points.tolist())))
+    if len(ordered) < 3:
+        return np.array(ordered).reshape(-1, 2)
+    sides = []
+    for run in (ordered, ordered[::-1]):
+        side: list[tuple[float, ...]] = []
+        for x, y in run:
+            while len(side) > 1:
+                (x0, y0), (x1, y1) = side[-2:]
+                if (x1 - x0) * (y - y0) > (y1 - y0) * (x - x0):
+                    break
+                side.pop()
+            side.append((x, y))
+        sides += side[:-1]
+    return np.array(sides)
+
+
+class Cones(NamedTuple):
+    """Body cone and space cone at one moment, as unit vectors in the inertial frame.
+
+    ``axis`` spin axis, ``momentum`` direction of H, ``rotation`` of ω, (3,); ``body`` and ``space`` (n, 3) are the
+    rims of the cones, which touch along ``rotation``. A rim is empty where there is no cone. ``swept`` (m, 3) is the
+    circle that the space cone fills: its rim, and where I1 ≠ I2 the one about a rim that never closes.
+    """
+
+    axis: Vector
+    momentum: Vector
+    rotation: Vector
+    body: Vector
+    space: Vector
+    swept: Vector
+
+
+def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
+    """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion (4,).
+
+    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4).
+    """
+    moments = np.asarray(flight.moments)
+    sense = math.copysign(1.0, flight.spacecraft.spin)
+    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, sense]))
+    turning = attitude.rotate(quaternion, rates)
+    momentum = attitude.rotate(quaternion, moments * rates)
+    rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
+    if moments[0] == moments[1]:
+        space = around(direction, rotation)
+        return Cones(axis, direction, rotation, around(axis, rotation), space, space)
+    period = triaxial.nutation_period(flight.moments, rates)
+    if not math.isfinite(period):
+        return Cones(axis, direction, rotation, *np.empty((3, 0, 3)))
+    times = np.linspace(0.0, period, 4 * RIM)
+    polhode = triaxial.free_rates(flight.moments, rates, times)
+    turns = triaxial.free_attitude(flight.moments, rates, quaternion, times)
+    size = np.linalg.norm(polhode, axis=1, keepdims=True)
+    body, space = attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
+    return Cones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
+
+
+def body_mark(found: Cones, quaternion: Vector) -> Vector:
+    """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
+    if not len(found.body):
+        return np.full(3, np.nan)
+    in_body = attitude.rotate(attitude.conjugate(quaternion), found.body)
+    azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
+    order = np.argsort(azimuth)
+    return np.array([np.interp(0.0, azimuth[order], found.body[order, part]) for part in range(3)])
+
+
+def around(axis: Vector, start: Vector) -> Vector:
+    """Unit vectors (RIM, 3) on the circle that ``start`` describes about ``axis``, both unit; none on the axis."""
+    square = start - axis * (axis @ start)
+    if np.linalg.norm(square) < NO_CONE:
+        return np.empty((0, 3))
+    turn = np.linspace(0.0, 2 * math.pi, RIM)[:, None]
+    return np.asarray(
+        axis * (axis @ start) + np.cos(turn) * square + np.sin(turn) * np.cross(axis, square), dtype=np.float64
+    )
+
+
+def closed(spacecraft: Spacecraft, until: float) -> list[tuple[float, float]]:
+    """Begin and end, s, of the times to ``until`` s in which no pulse may be on."""
+    windows = [(0.0, spacecraft.limits.earliest), *spacecraft.limits.blackout]
+    return [(begins, min(ends, until)) for begins, ends in windows if begins < until and ends > begins]

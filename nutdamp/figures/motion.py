@@ -1,0 +1,238 @@
+"""The two plane pictures of the motion: pole curve in the body, axis track in space."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nutdamp.figures import geometry, labels, style
+from nutdamp.figures.legends import legend, short_name
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN
+from nutdamp.flight.propagation import Flight, model_name
+from nutdamp.flight.track import Track
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Vector
+from nutdamp.views.end_tables import direction_text
+from nutdamp.views.text import degrees, moment
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+ALIKE = math.radians(2.0)
+"""Channels whose torques point within this angle share one arrow."""
+
+NUMBERED = 17
+"""Pulses of a path that are numbered, and have arrowheads, at most."""
+
+CROWD, NEAR = 3, 0.05
+"""Pulses in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
+
+MANY = 12
+"""Pulses from which on lines and arrowheads are small."""
+
+SPARSE = 40
+"""Pulses of which each has a dot."""
+
+
+def motion(flight: Flight, track: Track) -> Figure:
+    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8).
+
+    A third panel shows H alone where the track is too wide for it.
+    """
+    small = geometry.momentum_inset(flight, track)
+    figure = style.sheet(7.4 if small is None else 10.4, 4.5)
+    body, space, *inset = figure.subplots(1, 2 if small is None else 3)
+    pole_curve(body, flight, track)
+    axis_track(space, flight, track)
+    if small is not None:
+        momentum_inset(inset[0], space, flight, track, small)
+    legend(figure, [body, space])
+    return figure
+
+
+def title(flight: Flight) -> str:
+    """What every sheet is headed with: who is flown by which scheme and model, and with what result."""
+    left, count = flight.residual, len(flight.schedule)
+    how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
+    swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
+    goal = flight.spacecraft.goal.axis
+    aim = "shift of H" if goal is None else "H off the target"
+    pulses = "no pulse" if not count else f"{count} pulse{'s' * (count > 1)} until {moment(flight.schedule.end)}"
+    result = f"nutation {swings}{degrees(flight.spacecraft.nutation)} → {degrees(left.nutation)}"
+    turn = (
+        ""
+        if goal is None
+        else f"H turned {degrees(flight.spacecraft.to_turn)} to the target, {direction_text(flight.spacecraft, goal)}\n"
+    )
+    return f"{short_name(flight.spacecraft)}: {how}, {pulses}\n{turn}{result}, {aim} {degrees(left.axis_error)}"
+
+
+def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), pulses and channels marked."""
+    rates = geometry.pole_path(track)
+    size = float(np.hypot(*rates.T).max())
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.5)
+    _path(axes, flight, track, rates)
+    named = _directions(axes, flight, size)
+    style.square(axes, rates, margin=0.45 if named else 0.12, centre=True)
+    body = flight.spacecraft
+    note = "" if body.inertia.aligned else ", principal axes"
+    note += ", spin about −3" if body.spin < 0.0 else ""
+    axes.set(xlabel=f"ω1, deg/s{note}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
+
+
+def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
+    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8)."""
+    path, momentum = geometry.sky_paths(flight, track)
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.5)
+    _path(axes, flight, track, path)
+    _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
+    target = geometry.sky_target(flight, track)
+    if len(target):
+        axes.plot(*target.T, label="target", **style.TARGET)
+    sky = geometry.sky_names(flight)
+    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")
+
+
+def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small: Vector) -> None:
+    """Where H goes, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
+    stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
+    for number in style.thinned(len(stations) - 1, NUMBERED):
+        others = np.delete(stations, number + 1, axis=0)
+        labels.add(
+            axes, str(number + 1), stations[number + 1], FIRED, meant=labels.Meant(stations[[number + 1]], others)
+        )
+    labels.add(axes, "t = 0", stations[0], INK, role="vital")
+    target = geometry.sky_target(flight, track)
+    axes.plot(*target.T, **style.TARGET)
+    style.square(axes, small, margin=0.25)
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    space.plot([left, right, right, left, left], [low, low, high, high, low], color=INK, linewidth=THIN)
+    much = float(np.ptp(space.get_xlim())) / (right - left)
+    sky = geometry.sky_names(flight)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"The framed part (× {much:.2g}):\nH after each pulse")
+
+
+def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
+    """The path of H, (n, 2) degrees, with its places at first and after each pulse, which are returned."""
+    axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
+    stations = [momentum[:1]]
+    numbered = style.thinned(len(flight.schedule), NUMBERED)
+    for stretch in geometry.stretches(flight, track):
+        if stretch.pulse is not None:
+            moved = _refined(momentum[stretch.first : stretch.last + 1])
+            stations.append(moved[-1:])
+            if stretch.pulse in numbered and np.hypot(*(moved[-1] - moved[0])) > 0.08 * width:
+                style.heads(axes, moved, _halfway(moved), MOMENTUM)
+    places = np.vstack(stations)
+    marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
+    name = "H at t = 0 and after each pulse"
+    look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under pulses
+    axes.plot(*places[marked].T, "+", label=name, **look)
+    return places
+
+
+def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
+    """A path (n, 2) with its beginning, its sense, and its pulses: numbered where there is room."""
+    coasts: list[Vector] = []
+    firings: list[Vector] = []
+    width = float(np.ptp(points, axis=0).max())
+    numbered = style.thinned(len(flight.schedule), NUMBERED)
+    thin = min(style.thickness(points), THIN if len(flight.schedule) > MANY else style.LINE) / style.LINE
+    size = 9.0 if thin == 1.0 else 5.5
+    for stretch in geometry.stretches(flight, track):
+        rows = points[stretch.first : stretch.last + 1]
+        if stretch.pulse is None:
+            coasts.append(rows)
+            if len(firings) in numbered or len(firings) == len(flight.schedule):
+                style.heads(axes, rows, _halfway(rows), MOTION, size)
+            continue
+        firings.append(rows)
+        if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
+            fine = _refined(rows)
+            style.heads(axes, fine, [len(fine) - 1], PULSE, size)
+    _number(axes, [_refined(rows) for rows in firings], width)
+    axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
+    if firings:
+        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
+        begins = [rows[0] for number, rows in enumerate(firings) if len(firings) <= SPARSE or number in numbered]
+        axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
+    axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
+    axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
+    labels.add(axes, "t = 0", points[0], INK, role="vital")
+
+
+def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
+    """Numbers of pulses beside their stretches of a path, (n, 2) each; first and last of those in one place."""
+    some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
+    for group in _together([rows[len(rows) // 2] for rows in firings], width):
+        own, first, last = np.vstack([some[number] for number in group]), group[0] + 1, group[-1] + 1
+        others = [rows for other, rows in enumerate(some) if other not in group]
+        meant = labels.Meant(own, np.vstack([np.empty((0, 2)), *others]))
+        middle = firings[group[len(group) // 2]]
+        text = str(first) if first == last else f"{first}\N{EN DASH}{last}"
+        labels.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
+
+
+def _together(places: Sequence[Vector], width: float) -> list[list[int]]:
+    """The pulses to be numbered, from 0: `CROWD` or more in a row, each near the one before, have one label."""
+    numbered = style.thinned(len(places), NUMBERED)
+    if len(numbered) < len(places):
+        return [[number] for number in numbered]
+    groups: list[list[int]] = []
+    for number in numbered:
+        if groups and np.hypot(*(places[number] - places[groups[-1][-1]])) < NEAR * width:
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    return [part for group in groups for part in ([group] if len(group) >= CROWD else [[one] for one in group])]
+
+
+def _refined(rows: Vector) -> Vector:
+    """A path of some rows at least: an impulse has only its two ends."""
+    return rows if len(rows) > 2 else np.linspace(rows[0], rows[-1], 21)
+
+
+def _halfway(rows: Vector) -> list[int]:
+    """Where on a stretch an arrowhead goes: half a turn into it at most."""
+    steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rows, axis=0).T))])
+    width = float(np.ptp(rows, axis=0).max())
+    if steps[-1] <= 0.0:
+        return []
+    return [int(np.searchsorted(steps, min(0.5 * float(steps[-1]), 1.3 * width)))]
+
+
+def _directions(axes: Axes, flight: Flight, size: float) -> bool:
+    """Torque directions of the channels, as arrows outside the curve; whether there are any."""
+    used = {pulse.channel for pulse in flight.schedule}
+    channels = [one for one in flight.spacecraft.channels if one.damps and (one.name in used or not used)]
+    channels = channels or [one for one in flight.spacecraft.channels if one.name in used]
+    groups: list[list[Channel]] = []
+    for channel in channels:
+        group = next((one for one in groups if _apart(one[0], channel) < ALIKE), None)
+        if group is None:
+            groups.append([channel])
+        else:
+            group.append(channel)
+    for group in groups:
+        torque = group[0].transverse / abs(group[0].transverse)
+        way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
+        axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
+        style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
+        names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
+        labels.add(axes, names, 1.2 * way, INK, role="vital")
+    if groups:
+        axes.plot([], [], color=INK, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
+    return bool(groups)
+
+
+def _apart(one: Channel, other: Channel) -> float:
+    return abs(float(np.angle(one.transverse * other.transverse.conjugate())))

@@ -1,0 +1,257 @@
+"""The spherical view: body cone rolling on space cone, spin axis and angular momentum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from nutdamp.figures import geometry, labels, style
+from nutdamp.figures.geometry import Cones
+from nutdamp.figures.legends import legend
+from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.spacecraft.model import Vector
+from nutdamp.views.text import degrees
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+ELEVATION = math.radians(28.0)
+"""From where the sphere is seen: above the plane square to H(0)."""
+
+ASIDE = math.radians(65.0)
+"""The spin axis leans to the right at t = 0, this far round from the viewer."""
+
+WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
+"""Below the first angle from H(0) everything is magnified, to the second one at most."""
+
+SPACE, BODY = 0.28, 0.15
+"""How dense the cones are filled: distinguished in grey print too."""
+
+RIM = 0.7
+"""Points: the width of rims and edges of cones, thinner than the path of the spin axis, which shares their colour."""
+
+MARKS = "+os"
+"""Of H, ω and the spin axis in the plane picture."""
+
+HIDDEN = 0.04
+"""Share of the space cone below which the body cone lies under the marks of spin axis and ω."""
+
+STEPS = (1.0, 2.0, 3.0, 5.0)
+
+
+@dataclass(frozen=True)
+class View:
+    """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
+
+    ``magnified`` stretches what lies square to H(0): straight lines, tangents and coplanar lines stay what they are.
+    """
+
+    plane: Vector
+    azimuth: float
+    magnified: float
+
+    def seen(self, directions: Vector) -> tuple[Vector, Vector]:
+        """Places on paper (n, 2), and heights towards the viewer (n,)."""
+        local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
+        turn, rise = self.azimuth, ELEVATION
+        right = np.array([-math.sin(turn), math.cos(turn), 0.0])
+        near = np.array([math.cos(rise) * math.cos(turn), math.cos(rise) * math.sin(turn), math.sin(rise)])
+        up = np.cross(near, right)
+        return np.column_stack([local @ right, local @ up]), np.asarray(local @ near, dtype=np.float64)
+
+
+def view(flight: Flight, track: Track) -> View:
+    """The view in which everything that moves on ``track`` has its place."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    first = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    local = first.axis @ plane.T
+    shown = np.vstack([track.axis, track.momentum, first.body, first.space, *aimed(flight)])
+    angles = np.radians(np.hypot(*geometry.on_sky(plane, shown).T))
+    return View(plane, math.atan2(local[1], local[0]) - ASIDE, magnification(float(angles.max())))
+
+
+def magnification(widest: float) -> float:
+    """How much angles from H(0) are stretched where the ``widest`` is so many rad: 1, 2, 5, 10, …"""
+    if widest >= WIDE or widest < geometry.NO_CONE:
+        return 1.0
+    room = math.tan(DRAWN) / math.tan(widest)
+    decade = 10.0 ** math.floor(math.log10(room))
+    return decade * max(step for step in STEPS if step * decade <= room * (1.0 + 1e-12))
+
+
+def sphere(flight: Flight, track: Track) -> Figure:
+    """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
+    figure = style.sheet(7.4, 4.5)
+    space, plan = figure.subplots(1, 2)
+    cones_in_space(space, flight, track)
+    along_momentum(plan, flight, track)
+    legend(figure, [space, plan])
+    return figure
+
+
+def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 and the path of the spin axis, seen from outside."""
+    looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_ground(axes, looked, track)
+    pulses = draw_path(axes, looked, flight, track)
+    draw_cones(axes, looked, found)
+    target = flight.spacecraft.goal.axis
+    if target is not None:
+        axes.plot(*looked.seen(target)[0].T, label="target", **style.TARGET)
+    _name_tips(axes, found, lambda direction: looked.seen(direction)[0][0])
+    name_lines(axes, found, pulses=pulses)
+    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum, *aimed(flight)]))
+    much = looked.magnified
+    first = flight.schedule.pulses[:1]
+    before = ", before pulse 1" * any(pulse.thrust[0] <= 0.0 for pulse in first)
+    axes.set_title(f"Cones at t = 0{before}" + (f" (angles × {much:g})" if much != 1.0 else ""))
+
+
+def draw_ground(axes: Axes, looked: View, track: Track) -> None:
+    """The sphere, where nothing is magnified, and the path of H."""
+    if looked.magnified == 1.0:
+        turn = np.linspace(0.0, 2 * math.pi, 181)
+        axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.7)
+        for height in (0.0, 0.5, math.sqrt(0.75)):
+            radius = math.sqrt(1.0 - height * height)
+            ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
+            draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
+    momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
+    axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
+
+
+def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
+    """The path of the spin axis, with the firings in it; whether any of them moves it (an impulse does not)."""
+    pulses = False
+    thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
+    for stretch in geometry.stretches(flight, track):
+        rows = slice(stretch.first, stretch.last + 1)
+        if stretch.pulse is None:
+            draw_line(axes, looked, track.axis[rows], MOTION, thin)
+        elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):
+            draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
+            pulses = True
+    return pulses
+
+
+def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
+    """Space cone, body cone, and the three directions that lie in one plane."""
+    for rim, within, colour, alpha in _rims(found):
+        if len(rim):
+            _cone(axes, looked, rim, within, (colour, alpha))
+    for direction, colour, _ in _directions(found):
+        tip = looked.seen(direction)[0][0]
+        axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
+        style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
+
+
+def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
+    """The two cones, the path of the spin axis and that of H for the legend."""
+    if len(found.body):
+        axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
+        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(found)}")
+    axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
+    if pulses:
+        axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
+    axes.plot([], [], label="path of H", **style.PATH_OF_H)
+
+
+def _hidden(found: Cones) -> str:
+    """What the legend adds where the body cone is so small that the marks of the axes in it hide it."""
+    body, space = (float(np.arccos(np.clip(found.rotation @ one, -1.0, 1.0))) for one in (found.axis, found.momentum))
+    return f" ({degrees(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
+
+
+def name_directions(axes: Axes) -> None:
+    """The marks of `draw_circles` for the legend."""
+    named = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"), ("D", MOTION, "body axis 1"))
+    for mark, colour, name in named:
+        axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
+
+
+def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
+    return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
+
+
+def aimed(flight: Flight) -> Vector:
+    """(n, 3): the target axis, or none."""
+    return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
+
+
+def _name_tips(axes: Axes, found: Cones, place: Callable[[Vector], Vector]) -> None:
+    """The names of the three directions at the tips of their arrows, each in the colour of its own."""
+    named = _directions(found)
+    tips = np.array([place(direction) for direction, _, _ in named])
+    for number, (_, colour, name) in enumerate(named):
+        meant = labels.Meant(tips[[number]], np.delete(tips, number, axis=0))
+        labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
+
+
+def _rims(found: Cones) -> tuple[tuple[Vector, Vector, str, float], ...]:
+    """Rim, circle about it, colour and density of the cones."""
+    return (found.space, found.swept, MOMENTUM, SPACE), (found.body, found.body, MOTION, BODY)
+
+
+def _cone(axes: Axes, looked: View, rim: Vector, within: Vector, filled: tuple[str, float]) -> None:
+    """A cone from the centre to its rim: what it covers on paper filled and outlined, rim drawn."""
+    covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
+    axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=RIM)
+    axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=RIM)
+
+
+def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
+    """A line on the sphere: where it runs behind it, dotted, or not at all."""
+    points, height = looked.seen(directions)
+    front = height >= 0.0 if looked.magnified == 1.0 else np.ones(len(height), dtype=bool)
+    axes.plot(*np.where(front[:, None], points, np.nan).T, color=colour, linewidth=width)
+    if back and not front.all():
+        axes.plot(*np.where(front[:, None], np.nan, points).T, color=colour, linewidth=0.7 * width, linestyle=":")
+
+
+def frame(axes: Axes, looked: View, directions: Vector) -> None:
+    """Equal scales, and room for the centre and all ``directions`` (n, 3); no ticks: it has no scale to read."""
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    points = np.vstack([[[0.0, 0.0]], looked.seen(unit)[0]])
+    if looked.magnified == 1.0:
+        points = np.vstack([points, [[-1.0, -1.0], [1.0, 1.0]]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.56 * float((high - low).max())
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_axis_off()
+
+
+def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
+    """The cones at t = 0 seen along H(0), true to scale along every radius."""
+    plane = geometry.sky_plane(flight, track.momentum[0])
+    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_circles(axes, plane, found)
+    _name_tips(axes, found, lambda direction: geometry.on_sky(plane, direction[None])[0])
+    shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
+    style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
+    sky = geometry.sky_names(flight)
+    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H, true angles\n{sky.view}")
+
+
+def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
+    """Rims of the cones with their axes and where they touch, on the sky."""
+    for rim, within, colour, alpha in _rims(found):
+        if len(rim):
+            filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
+            axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
+            axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
+            if within is not rim:  # a rim that does not close: what it fills has an outline of its own
+                axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
+    places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
+    axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
+    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
+        axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

@@ -1,0 +1,184 @@
+"""The one style of all figures: colours, sizes, marks."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from functools import wraps
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from nutdamp.errors import MissingExtra
+from nutdamp.figures.geometry import room
+from nutdamp.spacecraft.model import Vector
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+# Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too, for grey print.
+MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
+"""Spin axis, body cone and what moves; firings; angular momentum and space cone."""
+
+FIRED = "#B34700"
+"""Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 requires 4.5:1)."""
+
+TURNED = "#007a58"
+"""Words about H: as `MOMENTUM`, dark enough to be read on white (5.3:1)."""
+
+INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
+"""Text and ω; marks; the circles of the sphere."""
+
+STAR = 13.0
+"""Points across of the stars of the target and of what is recommended."""
+
+TARGET: dict[str, Any] = {
+    "marker": "*", "color": INK, "markersize": STAR, "markerfacecolor": "none", "linestyle": "", "zorder": 4
+}  # fmt: skip
+"""Mark of the target axis: larger than the marks of what ends there, and over them."""
+
+PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
+"""Look of the path of H."""
+
+PAPER = "#fefefe"
+"""What lies under a hollow mark; in a page, its background."""
+
+LINE, THIN, LEADER = 1.3, 0.7, 0.5
+"""Line widths, points; the last is that from a label to what it is of."""
+
+CROSS: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
+"""Look of an x over the mark of what falls short of the requirement."""
+
+SMALL, TICK_SIZE = 7.5, 8
+"""Sizes of labels inside a panel and of those of its ticks, points."""
+
+ON_PAPER: dict[str, Any] = {"fontsize": SMALL, "bbox": {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8}}
+"""Look of words that a line may pass behind."""
+
+_SETTINGS: dict[str, Any] = {
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
+    "font.size": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 8.5,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.facecolor": "none",
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "figure.titlesize": 9.5,
+    "figure.titleweight": "bold",
+    "figure.facecolor": "white",
+    "grid.color": GREY,
+    "grid.alpha": 0.3,  # matplotlib overlooks the one in a colour
+    "grid.linewidth": 0.5,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "legend.labelspacing": 0.9,  # marks reach into no other line
+    "lines.linewidth": LINE,
+    "lines.solid_capstyle": "round",
+    "text.color": INK,
+    "text.parse_math": False,  # names may hold a dollar sign
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.labelsize": TICK_SIZE,
+    "ytick.labelsize": TICK_SIZE,
+    "svg.fonttype": "none",  # text stays text: it can be found, copied and read aloud
+    "svg.hashsalt": "nutdamp",  # the same flight gives the same file
+}
+
+
+def require() -> None:
+    """Raises MissingExtra where matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise MissingExtra("plot", "a picture")
+
+
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
+
+
+def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Draws in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+
+    @wraps(draw)
+    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        require()
+        from matplotlib import style
+
+        with style.context(["default", _SETTINGS]), warnings.catch_warnings():
+            # A name in another script is drawn as boxes, one that is too long leaves no room: no reader can mend that.
+            warnings.simplefilter("ignore", UserWarning)
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+PHONE = 3.7
+"""Width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it."""
+
+
+def sheet(width: float, height: float) -> Figure:
+    """An empty figure, inches."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=200, layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.07)  # type: ignore[union-attr, call-arg]
+    return figure
+
+
+def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str, size: float = 9.0) -> None:
+    """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
+    for row in places:
+        if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
+            (x0, y0), (x1, y1) = path[row - 1].tolist(), path[row].tolist()
+            axes.annotate("", (x1, y1), (x0, y0), annotation_clip=False, arrowprops=look)
+
+
+def words(axes: Axes, text: str) -> None:
+    """Words in a panel that has nothing to show; no ticks, since there is no scale to read."""
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center")
+    axes.set(xticks=[], yticks=[])
+
+
+def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
+    """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
+    middle, half = room(points, margin, centre=centre)
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(nbins=6)
+    axes.grid()
+
+
+def thickness(path: Vector, turns: float | None = None) -> float:
+    """Width of the line of a ``path`` (n, 2), points: thinner where many turns lie side by side.
+
+    ``turns``: how many; by default as many as a circle of the size of the path would make of its length.
+    """
+    if turns is None:
+        length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+        turns = length / max(math.pi * float(np.ptp(path, axis=0).max()), 1e-300)
+    return LINE if turns < 10 else THIN if turns < 50 else 0.4
+
+
+def joined(pieces: Sequence[Vector]) -> Vector:
+    """Paths (n, 2) as one, with a gap between them."""
+    gap = np.full((1, 2), np.nan)
+    parts = [part for piece in pieces for part in (piece, gap)]
+    return np.concatenate(parts[:-1]) if parts else np.empty((0, 2))
+
+
+def thinned(count: int, most: int = 24) -> list[int]:
+    """Which of ``count`` things to number, from 0: the first, the last, and between them those of round numbers."""
+    steps = (many * 10**power for power in range(10) for many in (1, 2, 5))
+    step = next(step for step in steps if count <= step * (most - 1))
+    return [n - 1 for n in range(1, count + 1) if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)]

@@ -1,0 +1,600 @@
+"""Reads attitude parameter messages in KVN: state, inertia and manoeuvres, with every fault and its line.
+
+Other readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here
+nothing is guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
+
+A spacecraft file, and a schedule, from an attitude parameter message.
+
+Blocks that were read, held against their tables: every keyword known, once, in order, of the right form.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from nutdamp.common.time import DIGITS, UNIFORM, Epoch
+from nutdamp.errors import Fault, FaultyFile, listed, nearest, printable
+from nutdamp.files.ccsds.message import (
+    APM_BLOCKS,
+    APM_METADATA,
+    HEADER,
+    MOMENTUM,
+    VERSION,
+    Block,
+    Entry,
+    Keyword,
+    from_kvn,
+)
+from nutdamp.files.export import FRAMES
+from nutdamp.files.reader import read_spacecraft
+from nutdamp.files.yaml import read_limited, utf8_text
+from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
+
+LARGEST = 1e15
+"""Larger magnitudes are nothing physical."""
+
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+
+
+class Checked:
+    """A block by keyword; what is wrong goes to ``faults``, and what cannot be read is then None."""
+
+    def __init__(self, file: str, block: Block, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
+        self.file, self.block, self.faults = file, block, faults
+        self.entries: dict[str, Entry] = {}
+        self._known = {keyword.name: keyword for keyword in keywords}
+        self._fill()
+        for keyword in keywords:
+            if keyword.required and keyword.name not in self.entries:
+                self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
+
+    def _fill(self) -> None:
+        order = list(self._known)
+        last = ""
+        for entry in self.block.entries:
+            name = entry.keyword
+            if name not in self._known:
+                close = nearest(name, order)
+                cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
+                self.faults.append(Fault(self.file, entry.line, 1, name, f"unknown keyword; {cure}"))
+            elif name in self.entries:
+                first = self.entries[name].line
+                self.faults.append(Fault(self.file, entry.line, 1, name, f"given again, first in line {first}"))
+            else:
+                self.entries[name] = entry
+                if last and order.index(name) < order.index(last):
+                    self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
+                else:
+                    last = name
+                self._form(entry, self._known[name])
+
+    def _form(self, entry: Entry, keyword: Keyword) -> None:
+        """Whether the value is of the kind that the table has, in its unit."""
+        if not entry.value:
+            self.fault(keyword.name, "empty; expected a value")
+        elif not keyword.text and not _NUMBER.fullmatch(entry.value):
+            self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
+        elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
+            self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
+        if entry.unit and entry.unit != keyword.unit:
+            expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
+            self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
+
+    def fault(self, keyword: str, problem: str) -> None:
+        """Something wrong with a keyword, or, where it is missing, with the block."""
+        entry = self.entries.get(keyword)
+        line = self.block.line if entry is None else entry.line
+        self.faults.append(Fault(self.file, line, 1, keyword, problem))
+
+    def text(self, keyword: str) -> str | None:
+        """The value as it is; None where it is missing or empty."""
+        entry = self.entries.get(keyword)
+        return entry.value or None if entry else None
+
+    def number(self, keyword: str) -> float | None:
+        """The value as a number."""
+        text = self.text(keyword)
+        if text is None or not _NUMBER.fullmatch(text) or not abs(float(text)) <= LARGEST:
+            return None
+        return float(text)
+
+    def numbers(self, *keywords: str) -> list[float] | None:
+        """Several numbers; None where one cannot be read."""
+        found = [self.number(keyword) for keyword in keywords]
+        return None if any(value is None for value in found) else [value for value in found if value is not None]
+
+    def epoch(self, keyword: str, system: str) -> Epoch | None:
+        """The value as a moment of a time system, see `Epoch.parse`."""
+        text = self.text(keyword)
+        if text is None:
+            return None
+        try:
+            return Epoch.parse(text, system)
+        except ValueError as wrong:
+            self.fault(keyword, str(wrong))
+            return None
+
+    def has(self, keywords: Iterable[str]) -> bool:
+        """Whether all of ``keywords`` are here; some without the others is a fault."""
+        expected = list(keywords)
+        there = [keyword for keyword in expected if keyword in self.entries]
+        if there and len(there) < len(expected):
+            absent = next(keyword for keyword in expected if keyword not in there)
+            self.fault(there[0], f"given without {absent}; {', '.join(expected)} go together")
+            return False
+        return bool(there)
+
+
+def unit_length(parts: list[float], tolerance: float) -> bool:
+    """Whether the parts are those of a unit vector, but for rounding of what was written."""
+    return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
+
+
+UNIT = 1e-4
+"""Deviation from length one up to which a quaternion counts as rounded."""
+
+AGREES = 1e-4
+"""Difference up to which SPIN says the same as the other blocks: rad, and relative for rates."""
+
+SAME_AXES = {"ICRF": "GCRF"}
+"""Frames whose axes are those of another that a spacecraft file knows."""
+
+_VERSION = "CCSDS_APM_VERS"
+_OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
+_BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
+_BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
+"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
+
+_NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """A torque (3,) N m fixed in the body from ``start`` s after the epoch for ``duration`` s; ``mass`` kg or None."""
+
+    start: float
+    duration: float
+    torque: Vector
+    mass: float | None
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class ApmContents:
+    """What a message says, in body axes.
+
+    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m².
+    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` what a reader
+    should know.
+    """
+
+    name: str
+    object_id: str | None
+    epoch: Epoch
+    frame: str | None
+    quaternion: Vector | None
+    rates: Vector
+    tensor: Vector
+    nutation: float | None
+    manoeuvres: tuple[Manoeuvre, ...]
+    lines: dict[str, int]
+    remarks: tuple[str, ...]
+
+
+MOST_BYTES = 16 << 20
+"""Of a message: many times more than its most manoeuvres take."""
+
+
+def read_apm(path: str) -> ApmContents:
+    """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
+    data = read_limited(path, MOST_BYTES)
+    if data.lstrip(_BEFORE).startswith(b"<"):
+        cure = "write the message in keyword = value notation (KVN)"
+        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
+    blocks, faults = from_kvn(utf8_text(data, path), path)
+    _refuse_other_versions(path, blocks[0], faults)
+    contents = _Reader(path, blocks, faults).read()
+    if faults or contents is None:
+        raise FaultyFile(faults)
+    return contents
+
+
+def _refuse_other_versions(path: str, outside: Block, faults: list[Fault]) -> None:
+    """Another message, or another version of it, makes no sense by these tables."""
+    first = outside.entries[0] if outside.entries else None
+    if first is None or not re.fullmatch("CCSDS_[A-Z]+_VERS", first.keyword):
+        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an APM: its first line is {_VERSION} = {VERSION}")])
+    if first.keyword != _VERSION:
+        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {_VERSION}")])
+    if first.value != VERSION:
+        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
+        raise FaultyFile([Fault(path, first.line, 1, _VERSION, problem)])
+
+
+class _Reader:
+    """One message; what is wrong goes to ``faults``."""
+
+    def __init__(self, path: str, blocks: list[Block], faults: list[Fault]) -> None:
+        self.path, self.faults = path, faults
+        self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
+        self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
+        self.remarks: list[str] = []
+        self.body: str | None = None
+        self.frame: str | None = None
+        self.system = "UTC"
+        self.nutation: float | None = None
+        self._sort(blocks[1:])
+
+    def _sort(self, blocks: list[Block]) -> None:
+        order, last = list(APM_BLOCKS), ""
+        for block in blocks:
+            if block.name not in APM_BLOCKS:
+                known = ", ".join(f"{name}_START" for name in order)
+                self._fault(block.line, f"{block.name}_START", f"unknown block; known are {known}")
+                continue
+            if last and order.index(block.name) < order.index(last):
+                self._fault(block.line, block.name, f"comes after {last}; the order is {', '.join(order)}")
+            elif self.blocks[block.name] and block.name != "MAN":
+                self._fault(block.line, block.name, "a second block of this kind; which one counts is not said")
+            last = block.name
+            self.blocks[block.name].append(Checked(self.path, block, APM_BLOCKS[block.name].keywords, self.faults))
+
+    def _fault(self, line: int, where: str, problem: str) -> None:
+        self.faults.append(Fault(self.path, line, 1, where, problem))
+
+    def _one(self, name: str) -> Checked | None:
+        return self.blocks[name][0] if self.blocks[name] else None
+
+    def read(self) -> ApmContents | None:
+        """The contents; None where faults leave none."""
+        outside = self.outside
+        self.system = outside.text("TIME_SYSTEM") or "UTC"
+        if self.system not in ("UTC", *UNIFORM):
+            outside.fault("TIME_SYSTEM", f"expected UTC, {listed(list(UNIFORM), 'or')}, got {self.system!r}")
+            self.system = "UTC"
+        elif self.system != "UTC":
+            self._remark(f"times are {self.system}; the spacecraft file has them in UTC")
+        epoch = outside.epoch("EPOCH", self.system)
+        quaternion = self._attitude()
+        rates = self._rates(quaternion)
+        quaternion, rates = self._spin(quaternion, rates)
+        tensor = self._inertia()
+        manoeuvres = self._manoeuvres(epoch)
+        if rates is None and not self.faults:
+            self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
+        if self.faults or epoch is None or rates is None or tensor is None:
+            return None
+        if quaternion is None:
+            self.remarks.append("the message gives no attitude: frame and epoch are left out")
+        object_id = outside.text("OBJECT_ID")
+        return ApmContents(
+            name=outside.text("OBJECT_NAME") or "UNKNOWN",
+            object_id=None if object_id == "UNKNOWN" else object_id,
+            epoch=epoch,
+            frame=self.frame,
+            quaternion=quaternion,
+            rates=rates,
+            tensor=tensor,
+            nutation=self.nutation,
+            manoeuvres=manoeuvres,
+            lines={name: blocks[0].block.line for name, blocks in self.blocks.items() if blocks},
+            remarks=tuple(self.remarks),
+        )
+
+    def _endpoints(self, block: Checked, *, reversible: bool = True) -> bool | None:
+        """Whether the block leads from the inertial frame to the body (else the other way); None for other frames."""
+        first, second = block.text("REF_FRAME_A"), block.text("REF_FRAME_B")
+        if first is None or second is None:
+            return None
+        forward = _BODY.fullmatch(second) is not None
+        inertial, body = (first, second) if forward else (second, first)
+        keyword = "REF_FRAME_A" if forward else "REF_FRAME_B"
+        if not _BODY.fullmatch(body):
+            block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
+            return None
+        if inertial not in (*FRAMES, *SAME_AXES):
+            block.fault(keyword, f"{inertial!r} is no inertial frame known here; expected one of {', '.join(FRAMES)}")
+            return None
+        if not forward and not reversible:
+            block.fault("REF_FRAME_A", "the body comes first; this block leads from the inertial frame to the body")
+            return None
+        self._body_frame(block, "REF_FRAME_B" if forward else "REF_FRAME_A", body)
+        known = SAME_AXES.get(inertial, inertial)
+        if known != inertial:
+            self._remark(f"{inertial} is taken as {known}, whose axes are the same")
+        if self.frame not in (None, known):
+            block.fault(keyword, f"{inertial!r} here, {self.frame!r} in another block; expected one frame")
+        self.frame = self.frame or known
+        return forward
+
+    def _body_frame(self, block: Checked, keyword: str, frame: str | None) -> None:
+        """Every block must mean the same body axes."""
+        if frame is None:
+            return
+        if not _BODY.fullmatch(frame):
+            block.fault(keyword, f"{frame!r} is no frame fixed in the body; expected SC_BODY_1")
+        elif self.body not in (None, frame):
+            block.fault(keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame")
+        else:
+            self.body = frame
+
+    def _remark(self, text: str) -> None:
+        if text not in self.remarks:
+            self.remarks.append(text)
+
+    def _attitude(self) -> Vector | None:
+        """Quaternion body -> frame of QUAT, or of EULER."""
+        turn: Vector | None = None
+        forward: bool | None = None
+        block = self._one("QUAT")
+        if block is not None:
+            forward, parts = self._endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
+            if parts is not None and not unit_length(parts, UNIT):
+                block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; expected 1")
+            elif parts is not None and forward is not None:
+                turn = np.array(parts) / math.hypot(*parts)
+        elif (block := self._one("EULER")) is not None:
+            forward, parts = self._endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
+            sequence = block.text("EULER_ROT_SEQ") or ""
+            if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
+                block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
+            elif parts is not None and forward is not None:
+                turn = euler(sequence, *map(math.radians, parts))
+        return turn if turn is None or forward else attitude.conjugate(turn)
+
+    def _rates(self, quaternion: Vector | None) -> Vector | None:
+        """Rates of the body against the frame, in body axes, rad/s."""
+        block = self._one("ANGVEL")
+        if block is None:
+            return None
+        forward, parts = self._endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+        axes = block.text("ANGVEL_FRAME")
+        if parts is None or axes is None or forward is None:
+            return None
+        # The rate "from A to B" is that of B against A (annex F4).
+        rates = np.radians(parts) if forward else -np.radians(parts)
+        if _BODY.fullmatch(axes):
+            self._body_frame(block, "ANGVEL_FRAME", axes)
+            return rates
+        if SAME_AXES.get(axes, axes) != self.frame:
+            block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
+        elif quaternion is None:
+            block.fault("ANGVEL_FRAME", f"rates in {axes} need an attitude, and the message gives none")
+        else:
+            return np.asarray(attitude.matrix(quaternion).T @ rates)
+        return None
+
+    def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
+        """Fills in what the other blocks do not say; remarks where it says something else."""
+        block = self._one("SPIN")
+        if block is None or self._endpoints(block, reversible=False) is None:
+            return quaternion, rates
+        angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
+        nutating, with_momentum = block.has(_NUTATION), block.has(MOMENTUM)
+        if nutating and with_momentum:
+            block.fault("MOMENTUM_ALPHA", "given together with NUTATION; keep one set of the two")
+        if angles is None:
+            return quaternion, rates
+        alpha, delta, angle, about_axis = map(math.radians, angles)
+        turn = euler("ZXZ", alpha + 0.5 * math.pi, 0.5 * math.pi - delta, angle)
+        rate = np.array([0.0, 0.0, about_axis])
+        if nutating and (values := block.numbers(*_NUTATION)) is not None:
+            tilt, phase = math.radians(values[0]), math.radians(values[2])
+            if values[1] <= 0.0:
+                block.fault("NUTATION_PER", f"{values[1]:g} s is no period; expected more than 0")
+                return quaternion, rates
+            self.nutation = tilt
+            side = math.sin(tilt)
+            momentum = np.array([side * math.cos(phase), -side * math.sin(phase), math.cos(tilt)])
+            rate += 2.0 * math.pi / values[1] * momentum
+        elif with_momentum and (values := block.numbers(*MOMENTUM)) is not None:
+            right, up, about_momentum = map(math.radians, values)
+            momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
+            rate += about_momentum * (attitude.matrix(turn).T @ momentum)
+        if quaternion is not None and not _same_turn(quaternion, turn):
+            self._remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
+        if rates is not None and not np.allclose(rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)):
+            self._remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
+        return turn if quaternion is None else quaternion, rate if rates is None else rates
+
+    def _inertia(self) -> Vector | None:
+        block = self._one("INERTIA")
+        if block is None:
+            self._fault(1, "INERTIA", "missing; a spacecraft file needs moments of inertia")
+            return None
+        self._body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
+        parts = block.numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ")
+        if parts is None:
+            return None
+        xx, yy, zz, xy, xz, yz = parts
+        # Off the diagonal is minus the product (annex F6); + 0.0 makes 0 of -0.
+        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
+
+    def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
+        found: list[Manoeuvre] = []
+        last: tuple[Epoch, int] | None = None
+        for block in self.blocks["MAN"]:
+            begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
+            torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
+            frame = block.text("MAN_REF_FRAME")
+            self._body_frame(block, "MAN_REF_FRAME", frame)
+            if duration is not None and duration <= 0.0:
+                block.fault("MAN_DURATION", f"{duration:g} s is no duration; expected more than 0")
+            if mass is not None and mass > 0.0:
+                block.fault("MAN_DELTA_MASS", f"{mass:g} kg would be gained; expected 0 or less")
+            if torque is not None and not any(torque):
+                block.fault("MAN_TOR_X", "the torque is zero; expected at least one component other than 0")
+            if begins is not None:
+                if epoch is not None and begins < epoch:
+                    block.fault("MAN_EPOCH_START", "begins before EPOCH, the start of the motion")
+                if last is not None and begins < last[0]:
+                    block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
+                last = begins, block.block.line
+            if begins is not None and epoch is not None and duration is not None and torque is not None:
+                found.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
+        return tuple(found)
+
+
+def euler(sequence: str, *angles: float) -> Vector:
+    """Quaternion of successive turns by ``angles`` (rad) about the axes of the turned body (annex F3)."""
+    turn = np.array([1.0, 0.0, 0.0, 0.0])
+    for axis, angle in zip(sequence, angles, strict=True):
+        step = np.zeros(4)
+        step[0], step[1 + "XYZ".index(axis)] = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        turn = attitude.multiply(turn, step)
+    return turn
+
+
+def _same_turn(first: Vector, second: Vector) -> bool:
+    """Whether two quaternions are the same attitude within `AGREES`."""
+    return float(min(np.linalg.norm(first - second), np.linalg.norm(first + second))) <= 0.5 * AGREES
+
+
+ALIKE = 1e-9
+"""Relative difference up to which torques count as transverse, and as of one magnitude."""
+
+_BLOCKS = {"inertia": "INERTIA", "omega0": "ANGVEL", "attitude": "EPOCH", "steerable": "MAN"}
+"""Where a part of the spacecraft file comes from in the message."""
+
+
+SAME_NUTATION, ROUNDED = 0.01, 1e-5
+"""Share of a nutation, and rad besides, by which that of the inertia may differ: messages round."""
+
+
+def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
+    """Text of the spacecraft file, the spacecraft in it, and the manoeuvres as a schedule (empty without any).
+
+    Raises FaultyFile, with lines of the message, where what it says cannot be a spacecraft for nutdamp.
+    """
+    bare = _read(spacecraft_text(contents, path, None), contents, path)
+    torques = [bare.inertia.axes.T @ one.torque for one in contents.manoeuvres]
+    torquer = _torquer(torques)
+    text = spacecraft_text(contents, path, torquer)
+    body = _read(text, contents, path)
+    return text, body, _schedule(contents.manoeuvres, body)
+
+
+def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
+    """Where the motion of the spacecraft is another than the message states: its nutation, by inertia and period."""
+    stated, follows = contents.nutation, body.widest.nutation
+    if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
+        return []
+    return [
+        f"SPIN says a nutation of {math.degrees(abs(stated)):.4g} deg, but with this INERTIA NUTATION_PER gives one "
+        f"of {math.degrees(follows):.4g} deg, which the file has; one of the three is wrong"
+    ]
+
+
+def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
+    """The spacecraft in the text; its faults are those of the message that it came from."""
+    try:
+        return read_spacecraft(text, path)
+    except FaultyFile as wrong:
+        faults = []
+        for fault in wrong.faults:
+            block = _BLOCKS.get(fault.where.partition(".")[0].partition("[")[0], "")
+            line = contents.lines.get(block, contents.lines.get("SPIN", 1) if block == "ANGVEL" else 1)
+            faults.append(Fault(path, line, 1, block or fault.where, fault.problem))
+        raise FaultyFile(faults) from None
+
+
+def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> str:
+    """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
+    lines = [
+        f"# From the attitude parameter message {printable(path)}; numbers as given there.",
+        "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
+        f"name: {_text(contents.name)}",
+    ]
+    if contents.object_id is not None:
+        lines.append(f"object_id: {_text(contents.object_id)}")
+    lines += [
+        *_inertia(contents.tensor),
+        f"omega0: [{', '.join(f'{rate!r} deg/s' for rate in _degrees(contents.rates))}]",
+    ]
+    if contents.quaternion is not None:
+        parts = ", ".join(repr(part) for part in contents.quaternion.tolist())
+        lines += [
+            "attitude:",
+            f"  epoch: {contents.epoch.text.rstrip('0').rstrip('.')}Z",
+            f"  frame: {contents.frame}",
+            f"  quaternion: [{parts}]   # body -> frame, scalar first",
+        ]
+    lines += _actuators(contents.manoeuvres, torquer)
+    return "\n".join(lines) + "\n"
+
+
+def _text(value: str) -> str:
+    """A text in double quotes, in which JSON and YAML agree."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _degrees(rates: Vector) -> list[float]:
+    return [math.degrees(rate) for rate in rates.tolist()]
+
+
+def _inertia(tensor: Vector) -> list[str]:
+    first, second, third = np.diag(tensor).tolist()
+    if first == second and not (tensor - np.diag(np.diag(tensor))).any():
+        return [f"inertia: {{A: {first!r} kg m^2, C: {third!r} kg m^2}}"]
+    rows = (", ".join(f"{part!r} kg m^2" for part in row) for row in tensor.tolist())
+    return ["inertia:", "  tensor:", *(f"    - [{row}]" for row in rows)]
+
+
+def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list[str]:
+    if not manoeuvres:
+        return ["# The message fires nothing; without thrusters an ideal steerable impulse is assumed."]
+    if torquer is not None:
+        lines = [
+            "# All manoeuvres of the message are transverse and of one torque, as a steerable torquer gives them.",
+            f"steerable: {{torque: {torquer!r} N m}}",
+        ]
+        first = round(manoeuvres[0].start, DIGITS)
+        return [*lines, f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"] if first else lines
+    distinct = {tuple(one.torque.tolist()): None for one in manoeuvres}
+    return [
+        "# The torques that the message fires, as thrusters to begin with; without any, an ideal steerable impulse is",
+        "# assumed.",
+        "# thrusters:",
+        *(
+            f"#   - {{name: MAN{number}, torque: [{', '.join(f'{part!r} N m' for part in torque)}]}}"
+            for number, torque in enumerate(distinct, start=1)
+        ),
+    ]
+
+
+def _torquer(torques: list[Vector]) -> float | None:
+    """The torque in N m that all have, where all are transverse (principal axes); None else."""
+    if not torques:
+        return None
+    sizes = [float(np.linalg.norm(torque)) for torque in torques]
+    transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
+    return sizes[0] if transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes) else None
+
+
+def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
+    """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
+    pulses: list[Pulse] = []
+    free = 0.0
+    for number, one in enumerate(manoeuvres, start=1):
+        torque = body.inertia.axes.T @ one.torque
+        alone = one.start >= free - 1e-9
+        pulses.append(
+            Pulse(
+                t=one.start + 0.5 * one.duration,
+                on_time=one.duration,
+                channel=STEERABLE if alone else f"MAN{number}",
+                impulse=torque * one.duration,
+                torque=torque,
+                propellant=None if one.mass is None else -one.mass,
+            )
+        )
+        free = max(free, one.start + one.duration) if alone else free
+    return Schedule(tuple(pulses))

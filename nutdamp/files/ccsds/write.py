@@ -1,0 +1,348 @@
+"""The attitude parameter message: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse.
+
+Everything is given in the axes of the spacecraft file, which the message calls `message.BODY_FRAME`.
+
+The orbit parameter message (CCSDS 502.0-B-3): the velocity change of each pulse as a manoeuvre.
+
+Its state vector is the orbit of the spacecraft file. Without one the message is only the part with the manoeuvres,
+which says so: the standard demands a state.
+
+The attitude ephemeris message: the flown motion, a new segment at each edge of a pulse.
+
+As quaternions and rates, which fit every body, or as spin, nutation and momentum, for those symmetric about axis 3.
+
+Spin and nutation of a body that is symmetric about its third axis, as attitude data messages have them.
+
+Euler angles Z-X-Z (504.0-B-2, annex F5): the third body axis turns about H at |H|/A, and the body about that axis at ω3
+less its share of that turn, aω3 (Poinsot). A body that spins backwards has its third axis at more than 90 deg from H.
+Both rates are those of the moment, under torque too: ω = (|H|/A) h + aω3 e3 whatever moves H.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from nutdamp import __version__
+from nutdamp.common.numerics import cleaned
+from nutdamp.common.time import Epoch
+from nutdamp.errors import BadRequest
+from nutdamp.files.ccsds.message import (
+    AEM_METADATA,
+    AEM_RECORDS,
+    APM_BLOCKS,
+    APM_METADATA,
+    BODY_FRAME,
+    HEADER,
+    MOMENTUM,
+    OPM_BLOCKS,
+    OPM_METADATA,
+    QUATERNION_ANGVEL,
+    SPIN_NUTATION_MOM,
+    Block,
+    Keyword,
+    Message,
+    Segment,
+    block,
+    label,
+    number,
+)
+from nutdamp.files.export import Reference, Stretch, interpolated
+from nutdamp.flight.end_state import momentum_gained
+from nutdamp.flight.propagation import Flight, shed
+from nutdamp.physics import attitude
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Inertia, Orbit, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+AXIS = 1e-12
+"""Tilt in rad up to which the symmetry axis counts as the third axis of the file."""
+
+FULL = 2.0 * math.pi
+
+
+def spinning(inertia: Inertia) -> bool:
+    """Whether the model of these keywords is that of the body."""
+    return inertia.symmetric and math.hypot(*inertia.axes[:2, 2]) <= AXIS
+
+
+def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str, Vector]:
+    """Every keyword of the spin, (n,) each in deg, deg/s and s, for a motion in the axes of the file.
+
+    ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first.
+    """
+    first, second, third = (cleaned(attitude.rotate(quaternion, axis)) for axis in np.eye(3))
+    right_ascension, declination = _on_sphere(third)
+    # The first axis after the first two turns is the node; the angle from it to body axis 1 is the third.
+    node = cleaned(np.stack([-np.sin(right_ascension), np.cos(right_ascension), 0.0 * declination], axis=-1))
+    momentum = rates @ inertia.tensor
+    size, transverse = np.linalg.norm(momentum, axis=-1), np.hypot(momentum[:, 0], momentum[:, 1])
+    phase = np.where(transverse > 0.0, np.arctan2(-momentum[:, 1], momentum[:, 0]), 0.0)
+    of_momentum = _on_sphere(cleaned(attitude.rotate(quaternion, momentum)))
+    along = [np.sum(node * axis, axis=-1) for axis in (first, second)]
+    return {
+        "SPIN_ALPHA": np.degrees(right_ascension),
+        "SPIN_DELTA": np.degrees(declination),
+        "SPIN_ANGLE": np.degrees(np.arctan2(-along[1], along[0])),
+        "SPIN_ANGLE_VEL": np.degrees(inertia.a * rates[:, 2]),
+        "NUTATION": np.degrees(np.arctan2(transverse, momentum[:, 2])),
+        "NUTATION_PER": FULL * inertia.A / size,
+        "NUTATION_PHASE": np.degrees(phase),
+        "MOMENTUM_ALPHA": np.degrees(of_momentum[0]),
+        "MOMENTUM_DELTA": np.degrees(of_momentum[1]),
+        "NUTATION_VEL": np.degrees(size / inertia.A),
+    }
+
+
+def _on_sphere(vectors: Vector) -> tuple[Vector, Vector]:
+    """Right ascension in [0, 2π) and declination of vectors (n, 3), rad; the former is 0 at a pole."""
+    x, y, z = vectors.T
+    turned = np.arctan2(y, x) % FULL
+    return np.where(turned < FULL, turned, 0.0), np.arctan2(z, np.hypot(x, y))
+
+
+ORIGINATOR = "NUTDAMP"
+
+Values = dict[str, str | float]
+
+
+def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+    """The message for a plan; ``created`` is the moment at which it is made.
+
+    Raises BadRequest for an ideal impulse, which has no duration and so no manoeuvre block.
+    """
+    body = plan.spacecraft
+    spins = spinning(body.inertia)
+    state = block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *unsaid(body), *_spinless(spins))
+    blocks = [state, *_motion(body, reference.frame)]
+    if spins:
+        blocks.append(_apm_block("SPIN", {**_frames(reference.frame), **_spin(body)}))
+    blocks.append(_apm_block("INERTIA", _inertia(body)))
+    blocks += [
+        _apm_block("MAN", _apm_manoeuvre(pulse, number, body, reference), *notes_on(pulse, number, reference))
+        for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
+    ]
+    about = block("", APM_METADATA, {**identity(body), "TIME_SYSTEM": "UTC"})
+    return Message("APM", header(plan, created), (Segment(about, tuple(blocks)),))
+
+
+def header(plan: Plan, created: Epoch) -> Block:
+    """Who made the message, when, and of what."""
+    moment = created.text.partition(".")[0]
+    values: Values = {
+        "CREATION_DATE": moment,
+        "ORIGINATOR": ORIGINATOR,
+        "MESSAGE_ID": label(f"{plan.scheme}-{moment}"),
+    }
+    return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
+
+
+def identity(body: Spacecraft) -> Values:
+    """Name and designator of the object."""
+    return {"OBJECT_NAME": label(body.name), "OBJECT_ID": label(body.object_id or "")}
+
+
+def unsaid(body: Spacecraft) -> list[str]:
+    """What the spacecraft file has and a message of state and pulses cannot hold."""
+    found = []
+    if body.disturbances:
+        found.append("The disturbances of the spacecraft file are not in this message.")
+    if body.dissipation is not None:
+        found.append("The energy dissipation of the spacecraft file is not in this message.")
+    per_kg = shed(body)
+    if per_kg is not None:
+        values = ", ".join(f"{one:.9g}" for one in per_kg)
+        found.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
+    return found
+
+
+def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
+    """What is said of the manoeuvre of a pulse: its channel, and through a valve what is commanded for it."""
+    found = [f"pulse {number}: {pulse.channel}"]
+    if pulse.command is not None:
+        start, on_time = pulse.loaded
+        found.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
+        found.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
+    return found
+
+
+def _spinless(spins: bool) -> list[str]:
+    if spins:
+        return []
+    return ["No SPIN block: the body is not symmetric about its third axis, as the model of that block is."]
+
+
+def _apm_block(name: str, values: Values, *comments: str) -> Block:
+    return block(name, APM_BLOCKS[name].keywords, values, *comments)
+
+
+def _frames(frame: str) -> Values:
+    return {"REF_FRAME_A": frame, "REF_FRAME_B": BODY_FRAME}
+
+
+def _motion(body: Spacecraft, frame: str) -> list[Block]:
+    """Attitude and angular velocity at t = 0."""
+    rates, quaternion = map(cleaned, body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion))
+    scalar, *vector = quaternion.tolist()
+    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
+    turn: Values = dict(zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True))
+    rate: Values = {"ANGVEL_FRAME": BODY_FRAME, **angular_velocity(rates)}
+    return [_apm_block("QUAT", {**_frames(frame), **turn}), _apm_block("ANGVEL", {**_frames(frame), **rate})]
+
+
+def angular_velocity(rates: Vector) -> dict[str, float]:
+    """Components in deg/s."""
+    return dict(zip(("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z"), np.degrees(rates).tolist(), strict=True))
+
+
+def _spin(body: Spacecraft) -> Values:
+    """Spin and nutation at t = 0."""
+    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    found = spin_values(body.inertia, rates[None], quaternion[None])
+    return {name: float(value[0]) for name, value in found.items() if name not in MOMENTUM}
+
+
+def _inertia(body: Spacecraft) -> Values:
+    """Moments and products; the products are minus what is off the diagonal (annex F6)."""
+    tensor = body.inertia.tensor.tolist()
+    return {
+        "INERTIA_REF_FRAME": BODY_FRAME,
+        "IXX": tensor[0][0],
+        "IYY": tensor[1][1],
+        "IZZ": tensor[2][2],
+        "IXY": -tensor[0][1],
+        "IXZ": -tensor[0][2],
+        "IYZ": -tensor[1][2],
+    }
+
+
+def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
+    if pulse.torque is None or pulse.on_time == 0.0:
+        cure = "give the torquer a torque (steerable: {torque: 20 N m}) and plan again"
+        raise BadRequest(f"pulse {number} is an ideal impulse without a duration, which an APM cannot hold; {cure}")
+    torque = body.inertia.in_file(pulse.torque).tolist()
+    values: Values = {
+        "MAN_EPOCH_START": reference.epoch.plus(max(pulse.start, 0.0)).text,
+        "MAN_DURATION": pulse.on_time,
+        "MAN_REF_FRAME": BODY_FRAME,
+        **dict(zip(("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), torque, strict=True)),
+    }
+    return values if pulse.propellant is None else {**values, "MAN_DELTA_MASS": -pulse.propellant}
+
+
+def aem(
+    plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
+) -> Message:
+    """The message for the flight of a plan from 0 to ``until`` s; ``created`` is the moment at which it is made.
+
+    Nobody interpolates across the edges of pulses, where the torque jumps, because segments end there. ``kind`` is the
+    ATTITUDE_TYPE. Raises BadRequest for one that is not for this body.
+    """
+    body = plan.spacecraft
+    if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
+        raise BadRequest(
+            f"{SPIN_NUTATION_MOM} is for a body symmetric about the third axis of its file, which this one is not; "
+            "take --format aem, which has quaternions"
+        )
+    segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
+    return Message("AEM", header(plan, created), segments)
+
+
+def _segment(body: Spacecraft, stretch: Stretch, reference: Reference, kind: str) -> Segment:
+    times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
+    metadata = block(
+        "",
+        AEM_METADATA,
+        {
+            **identity(body),
+            "REF_FRAME_A": reference.frame,
+            "REF_FRAME_B": BODY_FRAME,
+            "TIME_SYSTEM": "UTC",
+            "START_TIME": times[0],
+            "STOP_TIME": times[-1],
+            "ATTITUDE_TYPE": kind,
+            **({"ANGVEL_FRAME": BODY_FRAME} if kind == QUATERNION_ANGVEL else {}),
+            "INTERPOLATION_METHOD": "HERMITE",
+            "INTERPOLATION_DEGREE": "3",
+        },
+        f"pulses completed: {stretch.completed}",
+    )
+    rows = _turns(stretch) if kind == QUATERNION_ANGVEL else _spins(body, stretch)
+    records = tuple((time, *map(number, row)) for time, row in zip(times, rows, strict=True))
+    return Segment(metadata, records=records, record=AEM_RECORDS[kind])
+
+
+def _turns(stretch: Stretch) -> Iterable[tuple[float, ...]]:
+    """Q1 Q2 Q3 QC and the rates."""
+    for (scalar, *vector), rates in zip(stretch.quaternion.tolist(), stretch.rates, strict=True):
+        yield (*vector, scalar, *angular_velocity(rates).values())
+
+
+def _spins(body: Spacecraft, stretch: Stretch) -> Iterable[list[float]]:
+    """Spin axis, angle and its rate, momentum, and the rate about that."""
+    found = spin_values(body.inertia, stretch.rates, stretch.quaternion)
+    names = [keyword.name for keyword in AEM_RECORDS[SPIN_NUTATION_MOM].keywords[1:]]
+    rows: list[list[float]] = np.column_stack([found[name] for name in names]).tolist()
+    return rows
+
+
+PART = (
+    "Only the part with the manoeuvres: the spacecraft file has no orbit.",
+    "CENTER_NAME and the state (EPOCH, X to Z_DOT), which the standard demands, are to be added.",
+)
+
+KILO = 1e-3
+
+
+def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
+    """The message for a plan; ``created`` is the moment at which it is made.
+
+    Raises BadRequest where mass, forces or propellant are not known.
+    """
+    body, flown = plan.spacecraft, plan.flight
+    if body.mass is None:
+        raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")
+    orbit = body.orbit
+    centre: Values = {} if orbit is None else {"CENTER_NAME": orbit.center}
+    about = {**identity(body), **centre, "REF_FRAME": reference.frame, "TIME_SYSTEM": "UTC"}
+    metadata = block("", OPM_METADATA, about, *(PART if orbit is None else ()))
+    blocks = [] if orbit is None else [_opm_block("STATE", {"EPOCH": reference.epoch.text, **_state(orbit)})]
+    blocks.append(_opm_block("SPACECRAFT", {"MASS": body.mass}))
+    for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
+        gained = _velocity(pulse, place, flown, body.mass)
+        values = _opm_manoeuvre(pulse, place, gained, reference)
+        blocks.append(_opm_block("MANEUVER", values, *notes_on(pulse, place, reference)))
+    return Message("OPM", header(plan, created), (Segment(metadata, tuple(blocks)),))
+
+
+def _opm_block(name: str, values: Values, *comments: str) -> Block:
+    return block(name, OPM_BLOCKS[name].keywords, values, *comments)
+
+
+def _state(orbit: Orbit) -> Values:
+    numbers = (KILO * np.concatenate([orbit.position, orbit.velocity])).tolist()
+    return dict(zip(("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT"), numbers, strict=True))
+
+
+def _velocity(pulse: Pulse, number: int, flown: Flight, mass: float) -> Vector:
+    """What a pulse adds to the velocity, (3,) m/s, inertial: along its force as the body turns."""
+    if pulse.force is None:
+        cure = "give the thrusters position, direction and force"
+        raise BadRequest(f"the velocity change by pulse {number} ({pulse.channel}) is not known; {cure}")
+    return cleaned(momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
+
+
+def _opm_manoeuvre(pulse: Pulse, number: int, velocity: Vector, reference: Reference) -> Values:
+    if pulse.propellant is None:
+        cure = "give the thrusters isp"
+        raise BadRequest(f"the propellant of pulse {number} ({pulse.channel}) is not known, which an OPM needs; {cure}")
+    return {
+        "MAN_EPOCH_IGNITION": reference.epoch.plus(max(pulse.start, 0.0)).text,
+        "MAN_DURATION": pulse.on_time,
+        "MAN_DELTA_MASS": -pulse.propellant,
+        "MAN_REF_FRAME": reference.frame,
+        **dict(zip(("MAN_DV_1", "MAN_DV_2", "MAN_DV_3"), (KILO * velocity).tolist(), strict=True)),
+    }

@@ -1,0 +1,348 @@
+"""A script that flies a schedule in Basilisk and prints what is left: for whoever has Basilisk and not nutdamp.
+
+When and in which axes: what exchange formats need besides the plan, and the motion in the axes of the file.
+
+Attitude file (.a) of the Systems Tool Kit: the flown motion as quaternions, scalar last, and body rates in deg/s.
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp import __version__
+from nutdamp.common.numerics import cleaned
+from nutdamp.common.time import Epoch
+from nutdamp.errors import BadRequest, Unsuitable
+from nutdamp.flight.basilisk import default_step, stretches
+from nutdamp.flight.propagation import Flight, Leg, shed
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, Vector
+
+LONGEST_STEP = 0.1
+"""rad; the body turns by no more in one step of the script."""
+
+
+def basilisk_script(plan: Plan) -> str:
+    """The text of the script: data of the body and of each stretch of constant torque, and the code that flies them.
+
+    Raises BadRequest for a body with energy dissipation, or moments that fall, which a rigid hub has not.
+    """
+    body = plan.spacecraft
+    if body.dissipation is not None:
+        raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
+    if shed(body) is not None:
+        problem = "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft"
+        raise BadRequest(f"{problem} file, and plan without it, if the moments may count as constant")
+    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    title = " ".join(f"{plan.scheme} schedule for {body.name}".split()).replace("\\", "/").replace('"', "'")
+    return _SCRIPT.format(
+        title=title,
+        version=__version__,
+        tensor=_rows(body.inertia.tensor),
+        moments=_vector(body.inertia.moments),
+        axes=_rows(body.inertia.axes),
+        rates=_vector(rates),
+        quaternion=_vector(quaternion),
+        turn=LONGEST_STEP,
+        steps="\n".join(f"    {step}," for step in _steps(plan, body)),
+    )
+
+
+def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
+    """Rows of the schedule: what fires, how long, torque; an ideal impulse lasts no time and gives its impulse."""
+    pulses, axes = plan.pulses, body.inertia.axes
+    longest = default_step(body, pulses, pulses.end)
+    edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
+    for now, end in zip(edges, [*edges[1:], pulses.end], strict=True):
+        for pulse in pulses:
+            if pulse.torque is None and pulse.t == now:
+                yield f"({pulse.channel!r}, 0.0, {_vector(axes @ pulse.impulse)})"
+        firing = [pulse.channel for pulse in pulses if pulse.push(now, end) is not None]
+        if end > now:
+            for duration, torque in stretches(body, pulses, now, end, longest):
+                yield f"({' + '.join(firing) or 'coast'!r}, {float(duration)!r}, {_vector(axes @ torque)})"
+
+
+def _vector(vector: Iterable[float] | Vector) -> str:
+    return "[" + ", ".join(repr(float(part) + 0.0) for part in vector) + "]"
+
+
+def _rows(matrix: Vector) -> str:
+    return "[" + ", ".join(_vector(row) for row in np.asarray(matrix)) + "]"
+
+
+_SCRIPT = '''\
+"""{title}, flown by Basilisk. Written by nutdamp {version}.
+
+Run it with Python and Basilisk (pip install bsk). Vectors are in the axes of the spacecraft file; units are SI.
+"""
+
+import math
+
+import numpy as np
+from Basilisk.architecture import bskLogging
+from Basilisk.simulation import extForceTorque, spacecraft, svIntegrators
+from Basilisk.utilities import SimulationBaseClass
+
+INERTIA = np.array({tensor})
+PRINCIPAL_MOMENTS = {moments}
+PRINCIPAL_AXES = np.array({axes})  # columns
+RATES = np.array({rates})  # at t = 0
+QUATERNION = {quaternion}  # body -> inertial at t = 0, scalar first
+
+# What fires, for how many seconds, and the torque in N m (an impulse in N m s where it lasts no time).
+SCHEDULE = [
+{steps}
+]
+
+STEP = 10_000_000  # ns of the simulation's clock
+TURN = {turn}  # rad by which the body turns in one step at most
+
+
+def main():
+    simulation = SimulationBaseClass.SimBaseClass()
+    simulation.bskLogger.setLogLevel(bskLogging.BSK_ERROR)
+    simulation.CreateNewProcess("flight").addTask(simulation.CreateNewTask("dynamics", STEP))
+    body = spacecraft.Spacecraft()
+    body.hub.IHubPntBc_B = INERTIA.tolist()
+    body.hub.omega_BN_BInit = column(RATES)
+    body.hub.sigma_BNInit = column(to_mrp(np.array(QUATERNION)))
+    push = extForceTorque.ExtForceTorque()
+    body.addDynamicEffector(push)
+    integrator = svIntegrators.svIntegratorRKF78(body)
+    integrator.relTol = integrator.absTol = 1e30  # keep the step given
+    body.setIntegrator(integrator)
+    for model in (body, push):
+        simulation.AddModelToTask("dynamics", model)
+    simulation.InitializeSimulation()
+    rates = body.dynManager.getStateObject(body.hub.nameOfHubOmega)
+    attitude = body.dynManager.getStateObject(body.hub.nameOfHubSigma)
+
+    def momentum():
+        """Angular momentum in the inertial frame."""
+        return to_inertial(np.ravel(attitude.getState()), INERTIA @ np.ravel(rates.getState()))
+
+    before, clock = momentum(), 0
+    for _, duration, torque in SCHEDULE:
+        now = np.ravel(rates.getState())
+        if duration == 0.0:
+            rates.setState(column(now + np.linalg.solve(INERTIA, torque)))
+            continue
+        # The clock counts whole nanoseconds and stops on whole steps only. So time is counted in a unit in which this
+        # stretch lasts a whole number of steps: rates times the unit, torque times its square, which leaves Euler's
+        # equations as they are. Pulses begin and end exactly when they should.
+        fastest = np.linalg.norm(now) + np.linalg.norm(torque) * duration / min(PRINCIPAL_MOMENTS)
+        steps = max(math.ceil(fastest * duration / TURN), 1)
+        unit = duration / (steps * STEP * 1e-9)
+        push.extTorquePntB_B = column(np.array(torque) * unit**2)
+        rates.setState(column(now * unit))
+        clock += steps * STEP
+        simulation.ConfigureStopTime(clock)
+        simulation.ExecuteSimulation()
+        rates.setState(column(np.ravel(rates.getState()) / unit))
+
+    left = PRINCIPAL_AXES.T @ np.ravel(rates.getState())
+    sense = math.copysign(1.0, (PRINCIPAL_AXES.T @ RATES)[2])
+    after = momentum()
+    shift = math.atan2(np.linalg.norm(np.cross(before, after)), before @ after)
+    nutation, body_cone = largest_cones(left, sense)
+    print("nutation left ", shown(nutation))
+    print("body cone     ", shown(body_cone))
+    print("shift of H    ", shown(shift))
+
+
+def largest_cones(rates, sense):
+    """Largest angle between H and the spin axis on the torque-free motion that follows, and the body cone then."""
+    first, second, third = PRINCIPAL_MOMENTS
+    h = PRINCIPAL_MOMENTS * rates
+    square, moment = h[0] ** 2 + h[1] ** 2, first
+    if first != second:
+        # 2T - H²/I3 and H are constant; the angle is largest where the momentum about one of the two axes is zero.
+        excess = h[0] ** 2 * (1 / first - 1 / third) + h[1] ** 2 * (1 / second - 1 / third)
+        crossings = [(excess / (1 / one - 1 / third), one) for one in (first, second) if one != third]
+        pick = max if sense * h[2] >= 0.0 else min
+        square, moment = pick([one for one in crossings if one[0] <= h @ h], default=(h @ h, first))
+    transverse, axial = math.sqrt(square), sense * math.copysign(math.sqrt(h @ h - square), h[2])
+    return math.atan2(transverse, axial), math.atan2(transverse / moment, axial / third)
+
+
+def to_mrp(q):
+    """Modified Rodrigues parameters of a quaternion."""
+    upper = -q if q[0] < 0 else q
+    return upper[1:] / (1 + upper[0])
+
+
+def to_inertial(sigma, vector):
+    """A body vector in the inertial frame, by the body's modified Rodrigues parameters."""
+    square = sigma @ sigma
+    once = np.cross(sigma, vector)
+    return vector + (4 * (1 - square) * once + 8 * np.cross(sigma, once)) / (1 + square) ** 2
+
+
+def column(vector):
+    return [[float(part)] for part in vector]
+
+
+def shown(angle):
+    degrees = math.degrees(angle)
+    return f"{{degrees:.4g}} deg" if abs(degrees) >= 1e-9 else "< 1e-9 deg"
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+
+FRAMES = ("EME2000", "J2000", "GCRF")
+"""Inertial frames that the formats have a name for."""
+
+EXAMPLE = {
+    "epoch": "2026-03-01T12:00:00Z           # of t = 0, UTC",
+    "frame": "EME2000                        # or J2000, GCRF",
+    "quaternion": "[1, 0, 0, 0]              # body -> frame at t = 0, scalar first",
+}
+
+TURN = math.radians(6.0)
+"""rad; the body turns by no more between two records. Interpolation with the rates then errs by less than 1e-5 deg, and
+even a plain turn from one attitude to the next by less than 0.01 deg at 5 deg of nutation."""
+
+LEAST_RECORDS = 4
+"""Records of a stretch, however short: enough for interpolation of degree 3."""
+
+MOST_RECORDS = 1_000_000
+"""More make no file that anyone reads."""
+
+NANOSECONDS = 1e9
+"""In a second; to divide by them gives the number nearest to the decimal one."""
+
+
+class Reference(NamedTuple):
+    """The moment t = 0 and the frame of the attitude."""
+
+    epoch: Epoch
+    frame: str
+
+
+class Stretch(NamedTuple):
+    """Motion without jumps, in the axes of the file.
+
+    ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first, without
+    jumps of sign; ``completed`` pulses are over when it begins.
+    """
+
+    t: Vector
+    rates: Vector
+    quaternion: Vector
+    completed: int
+
+
+def reference(spacecraft: Spacecraft) -> Reference:
+    """Epoch and frame of the file; raises BadRequest with the lines to add, or for those that no format knows."""
+    given = spacecraft.attitude
+    if given is None or given.epoch is None or given.frame is None:
+        missing = [key for key in EXAMPLE if given is None or getattr(given, key) is None]
+        names = " and ".join(f"attitude.{key}" for key in missing if key != "quaternion")
+        lines = "\n".join(f"  {key}: {EXAMPLE[key]}" for key in missing)
+        verb = "add" if given is None else "add there"
+        raise BadRequest(
+            f"this format needs {names}, which the spacecraft file does not give; {verb}\nattitude:\n{lines}"
+        )
+    if given.frame not in FRAMES:
+        problem = f"{given.frame!r} is no frame that the format knows; expected one of {', '.join(FRAMES)}"
+        raise Unsuitable(("attitude", "frame"), problem)
+    try:
+        return Reference(Epoch.parse(given.epoch), given.frame)
+    except ValueError as wrong:
+        raise Unsuitable(("attitude", "epoch"), str(wrong)) from None
+
+
+def interpolated(flown: Flight, until: float) -> Iterator[Stretch]:
+    """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
+
+    Stretches too short to be distinguished in nanoseconds are left out. Raises BadRequest for a motion that would take
+    more than `MOST_RECORDS`.
+    """
+    legs = [leg for leg in flown.legs if leg.start < until]
+    counts = [_records(leg, until) for leg in legs]
+    if sum(counts) > MOST_RECORDS:
+        raise BadRequest(
+            f"the track would have {sum(counts)} records, more than {MOST_RECORDS}; choose an earlier end (until)"
+        )
+    previous: Vector | None = None
+    for leg, count in zip(legs, counts, strict=True):
+        begin, end = (round(time * NANOSECONDS) for time in (leg.start, min(leg.end, until)))
+        t = np.unique(np.rint(np.linspace(begin, end, count))) / NANOSECONDS
+        if len(t) < LEAST_RECORDS:
+            continue
+        rates, quaternion = map(cleaned, flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t)))
+        quaternion = _steady(quaternion, previous)
+        previous = quaternion[-1]
+        yield Stretch(t, rates, quaternion, leg.completed)
+
+
+def _records(leg: Leg, until: float) -> int:
+    """How many records keep the turn from one to the next below `TURN`."""
+    end = min(leg.end, until)
+    rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
+    turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
+    return max(math.ceil(turn / TURN) + 1, LEAST_RECORDS)
+
+
+def _steady(quaternion: Vector, previous: Vector | None) -> Vector:
+    """The same attitudes, of q and -q always the one nearer to the record before."""
+    before = quaternion[0] if previous is None else previous
+    steps = np.sum(quaternion * np.vstack([before, quaternion[:-1]]), axis=1)
+    return np.asarray(quaternion * np.cumprod(np.where(steps < 0.0, -1.0, 1.0))[:, None])
+
+
+AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
+"""What the format calls the frames."""
+
+
+def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
+    """The text of the file for a flight from 0 to ``until`` s.
+
+    Times are never repeated: where an ideal impulse makes the rates jump, the row after it comes a nanosecond later.
+    """
+    rows: list[str] = []
+    last: tuple[float, list[float]] | None = None
+    for stretch in interpolated(flown, until):
+        rates = np.degrees(stretch.rates).tolist()
+        for t, (scalar, *vector), rate in zip(stretch.t.tolist(), stretch.quaternion.tolist(), rates, strict=True):
+            if last is not None and t <= last[0]:
+                if np.allclose(rate, last[1], rtol=0.0, atol=1e-9 * np.linalg.norm(rate)):
+                    continue
+                t = last[0] + 1.0 / NANOSECONDS
+            rows.append(" ".join([f"{t:.9f}", *(f"{part:.16e}" for part in (*vector, scalar, *rate))]))
+            last = t, rate
+    lines = [
+        "stk.v.11.0",
+        f"# nutdamp {__version__}: {_plain(flown.spacecraft.name)}",
+        "BEGIN Attitude",
+        f"NumberOfAttitudePoints {len(rows)}",
+        f"ScenarioEpoch {_calendar(reference)}",
+        "CentralBody Earth",
+        f"CoordinateAxes {AXES[reference.frame]}",
+        "InterpolationOrder 1",
+        "AttitudeTimeQuatAngVels",
+        *rows,
+        "END Attitude",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _calendar(reference: Reference) -> str:
+    """``1 Mar 2026 12:00:00.000000000``."""
+    date, _, clock = reference.epoch.text.partition("T")
+    day = datetime.date.fromisoformat(date)
+    months = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+    return f"{day.day} {months[day.month - 1]} {day.year} {clock}"
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,762 @@
+"""The keys of a spacecraft file, their types and ranges; also the source of the JSON Schema.
+
+What needs more than one key to judge is in `rules`.
+
+The keys below ``dispersions`` in a spacecraft file, and what they say as `Dispersions`.
+
+The sizes of tolerances stay as they are written here: `dispersion_rules` finds what is wrong with them.
+
+The keys of a spacecraft file that describe a closed loop: its sensor, its law, faults to fly with.
+
+The keys of a spacecraft file that say what thrusters make of commands: valves, cold nozzles, the tank.
+
+The keys of a spacecraft file that name directions in space, and the command blocks that a Sun pulse fires.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
+
+from nutdamp.files.fields import (
+    RIGHT_ANGLE,
+    AcuteAngle,
+    Angle,
+    Apart,
+    Count,
+    Declination,
+    Direction,
+    DisturbingTorques,
+    Epoch,
+    Field,
+    Force,
+    InTheSky,
+    Length,
+    Lever,
+    ListOf,
+    Mass,
+    Moment,
+    Name,
+    Nutation,
+    OrWord,
+    Position,
+    PositiveTime,
+    Probability,
+    Quantity,
+    Quaternion,
+    Rate,
+    Rates,
+    Rule,
+    Section,
+    Tensor,
+    Tilt,
+    Time,
+    Torque,
+    Torques,
+    Velocity,
+    Window,
+)
+from nutdamp.spacecraft.tolerances import KINDS, Dispersions, Tolerance
+from nutdamp.units import parse, pattern, shown
+
+if TYPE_CHECKING:
+    from nutdamp.spacecraft.equipment import Steerable, Thruster
+
+
+READING = "reading"
+"""The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
+
+RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
+"""The kinds of quantity that may be dispersed by a percentage of the nominal value."""
+
+VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
+
+ALL = ""
+"""Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
+
+
+def size_of(value: object, kind: str) -> tuple[float, bool]:
+    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and whether it is a fraction.
+
+    Raises ValueError, which says what would be right.
+    """
+    if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
+        return parse(value, "ratio"), True
+    if kind == READING:
+        with suppress(ValueError):
+            return parse(value, "acceleration"), False
+        return parse(value, "rate"), False
+    try:
+        return parse(value, kind), kind == "ratio"
+    except ValueError as wrong:
+        hint = ", or in % of the nominal value" if kind in RELATIVE and kind != "ratio" else ""
+        raise ValueError(f"{wrong}{hint}") from None
+
+
+def unit_kinds(kind: str) -> list[str]:
+    """The kinds of quantity (keys of `units.KINDS`) by which a tolerance of ``kind`` may be given."""
+    if kind == READING:
+        return ["rate", "acceleration"]
+    return [kind, "ratio"] if kind in RELATIVE and kind != "ratio" else [kind]
+
+
+def by_name(value: Mapping[str, object]) -> bool:
+    """Whether a mapping holds tolerances by thruster, and is not itself one."""
+    return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
+
+
+class ToleranceSection(Section):
+    """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
+
+    written = "a tolerance, such as {normal: 2 %}"
+
+    normal: Any = Field("One sigma of a normal distribution, in its unit or in %.", "2 %", default=None)
+    uniform: Any = Field("Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None)
+    triangular: Any = Field("Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None)
+    bias: Any = Field("Fixed offset, signed, in its unit or in %.", "-2 ms", default=None)
+
+    def tolerance(self, key: str) -> Tolerance:
+        """The checked tolerance, which is at ``key`` of the dispersions."""
+        kind = next(kind for kind in KINDS if getattr(self, kind) is not None)
+        size, relative = size_of(getattr(self, kind), QUANTITIES[key])
+        return Tolerance(kind, size, relative)
+
+
+class _Tolerance(Rule):
+    """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which may be for all."""
+
+    def __init__(self, kind: str, each: Literal["", "axis", "thruster"] = "") -> None:
+        self.kind, self.each = kind, each
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """A single tolerance is that of all three axes, or for all thrusters."""
+        if isinstance(value, dict) and self.each == "axis":
+            return inner([value] * 3)
+        alone = isinstance(value, dict) and self.each == "thruster" and not by_name(value)
+        return inner({ALL: value} if alone else value)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """One tolerance or several, with their units."""
+        single = _json_schema(self.kind)
+        if self.each == "axis":
+            return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
+        if self.each == "thruster":
+            return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
+        return single
+
+
+def _json_schema(kind: str) -> dict[str, Any]:
+    """JSON Schema of a tolerance of ``kind``."""
+    texts = [{"type": "string", "pattern": pattern(one)} for one in unit_kinds(kind)]
+    spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
+    return {
+        "type": "object",
+        "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
+        "additionalProperties": False,
+        "minProperties": 1,
+        "maxProperties": 1,
+    }
+
+
+_Three = Annotated[list[ToleranceSection], Length(3, 3)]
+_ByThruster = dict[str, ToleranceSection]
+_Moment = Annotated[ToleranceSection, _Tolerance("inertia")]
+_Share = Annotated[ToleranceSection, _Tolerance("ratio")]
+_Time = Annotated[ToleranceSection, _Tolerance("time")]
+_Pressure = Annotated[ToleranceSection, _Tolerance("pressure")]
+_Times = Annotated[_ByThruster, _Tolerance("time", "thruster")]
+
+
+class DispersionsSection(Section):
+    """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
+
+    A: _Moment | None = Field("Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"})
+    C: _Moment | None = Field("Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"})
+    omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
+        "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
+    )
+    thrust: Annotated[_ByThruster, _Tolerance("force", "thruster")] | None = Field(
+        "Of each thruster, the same in all its pulses, % or N; or by name.", {"normal": "3 %"}
+    )
+    thrust_per_pulse: _Share | None = Field("Of the thrust, in each pulse anew, %.", {"normal": "1 %"})
+    thrust_direction: Annotated[_ByThruster, _Tolerance("angle", "thruster")] | None = Field(
+        "Tilt of each force about two axes across it, rad; or by name.", {"normal": "0.5 deg"}
+    )
+    position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
+        "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
+    )
+    timing: _Time | None = Field("Shift of each pulse, s.", {"uniform": "5 ms"})
+    timing_offset: _Time | None = Field("One shift of the whole schedule, s.", {"bias": "2 ms"})
+    attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
+        "Of the direction of the spin axis at t = 0, about two axes across it, rad.", {"normal": "0.2 deg"}
+    )
+    open_delay: _Times | None = Field(
+        "Of each valve's open_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    close_delay: _Times | None = Field(
+        "Of each valve's close_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    rise_time: _Times | None = Field(
+        "Of each valve's rise_time, the same in all its pulses, s; or by name.", {"normal": "0.5 ms"}
+    )
+    fall_time: _Times | None = Field(
+        "Of each valve's fall_time, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    impulse_bit: Annotated[_ByThruster, _Tolerance("ratio", "thruster")] | None = Field(
+        "Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.", {"normal": "2 %"}
+    )
+    cold: _Share | None = Field("Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"})
+    sensor_bias: Annotated[ToleranceSection, _Tolerance(READING)] | None = Field(
+        "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", {"normal": "0.01 deg/s"}
+    )
+    sensor_scale: _Share | None = Field(
+        "Of the scale of each gyro of a loop, or of its accelerometer, %.", {"normal": "1 %"}
+    )
+    sensor_noise: _Share | None = Field("Of the noise of the sensor of a loop, %.", {"uniform": "20 %"})
+    sensor_delay: _Time | None = Field(
+        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", {"uniform": "2 ms"}
+    )
+    cold_pulses: _Share | None = Field("Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"})
+    tank_propellant: Annotated[ToleranceSection, _Tolerance("mass")] | None = Field(
+        "Of the propellant in the tank at t = 0, kg or %.", {"normal": "1 %"}
+    )
+    tank_pressure: _Pressure | None = Field(
+        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", {"normal": "0.2 bar"}
+    )
+    tank_final_pressure: _Pressure | None = Field("Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"})
+    tank_exponent: _Share | None = Field(
+        "Of the power of the pressure that the thrust goes with, in %.", {"normal": "5 %"}
+    )
+    inertia_per_kg: _Share | None = Field(
+        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", {"normal": "10 %"}
+    )
+    correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
+        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
+        " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
+        [["A", "C", 0.99]],
+        default=[],
+    )
+
+
+_TOLERANCES = {
+    key: rule
+    for key, field in DispersionsSection.fields().items()
+    for rule in get_args(get_args(field.type)[0])
+    if isinstance(rule, _Tolerance)
+}
+QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}
+"""The keys of dispersions with the kind of quantity that they hold."""
+
+BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")
+"""The keys that hold one tolerance for all thrusters, or one by name."""
+
+
+def dispersions(
+    section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
+) -> Dispersions | None:
+    """The tolerances of a checked file; None where it has none. A thrust in N becomes a fraction of the thruster's.
+
+    ``torquer`` is the steerable one, also where an ideal one is assumed.
+    """
+    if section is None:
+        return None
+    from nutdamp.spacecraft.schedule import STEERABLE
+
+    thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
+    if torquer is not None:
+        thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
+
+    def fraction(name: str, tolerance: Tolerance) -> Tolerance:
+        thrust = thrusts[name]
+        if tolerance.relative or thrust is None:
+            return tolerance
+        return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
+
+    found: dict[str, Any] = {}
+    for key in (one.name for one in fields(Dispersions)):
+        entry = getattr(section, key)
+        if key == "correlation":
+            found[key] = tuple((one, other, size) for one, other, size in entry)
+        elif isinstance(entry, ToleranceSection):
+            found[key] = entry.tolerance(key)
+        elif isinstance(entry, list | tuple):  # by axis
+            found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)
+        elif entry is not None:  # by thruster
+            named = {name: one.tolerance(key) for name, one in entry.items()}
+            found[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
+    if "thrust" in found:
+        found["thrust"] = {name: fraction(name, tolerance) for name, tolerance in found["thrust"].items()}
+    return Dispersions(**found)
+
+
+def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:
+    """Thrust in N behind a torque (N m) on a lever arm (m); None where one of them is not known."""
+    return None if torque is None or lever_arm is None else torque / lever_arm
+
+
+class Reading(Quantity):
+    """Annotation of a quantity in the unit of the sensor: an angular rate of a gyro, else an acceleration."""
+
+    def __init__(self, **bounds: float) -> None:
+        super().__init__("rate", **bounds)
+
+    def check(self, value: object) -> float:
+        """SI value; raises ValueError, which says what would be right."""
+        try:
+            result = parse(value, "acceleration")
+        except ValueError:
+            result = parse(value, self.kind)
+        if not self._allows(result):
+            raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
+        return result
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """A number, or a text with a unit of either."""
+        texts = [{"type": "string", "pattern": pattern(kind)} for kind in ("rate", "acceleration")]
+        return {"anyOf": [{"type": "number", **self.bounds}, *texts]}
+
+
+Frequency = Annotated[float, Quantity("frequency", exclusiveMinimum=0)]
+Least = Annotated[float, Reading(minimum=0)]
+Threshold = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
+
+
+class LoopSensorSection(Section):
+    """What the loop sees: two rate gyros about the axes 1 and 2, or an accelerometer."""
+
+    kind: Literal["gyro", "accelerometer"] = Field(
+        "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
+    )
+    rate: Frequency | None = Field("Samples a second, Hz; default: a continuous signal.", "100 Hz")
+    quantisation: Least = Field(
+        "Step of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.002 deg/s", default=0.0
+    )
+    noise: Least = Field(
+        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.01 deg/s", default=0.0
+    )
+    bias: Annotated[float, Reading()] = Field(
+        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.", "0.02 deg/s", default=0.0
+    )
+    scale: Annotated[float, Quantity("ratio")] = Field(
+        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.", "101 %", default=1.0
+    )
+    delay: Time = Field("Time until a sample reaches the valves, s; default 0.", "20 ms", default=0.0)
+    low_pass: Time = Field(
+        "Time constant of a first-order low-pass filter over the samples, s; default 0: none.", "50 ms", default=0.0
+    )
+    position: Position | None = Field("Where an accelerometer is, from the centre of mass, m.", ["0.8 m", 0, 0])
+    axis: Direction | None = Field(
+        "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
+    )
+
+
+class LoopFaultsSection(Section):
+    """Faults that the loop is flown with and does not know of."""
+
+    reversed: list[Name] = Field("Channels that push the other way when they are fired.", ["+M1"], default=[])
+
+
+class LoopSection(Section):
+    """A closed loop, for `nutdamp loop`: it fires from where the sensor shows start down to stop."""
+
+    sensor: LoopSensorSection = Field("The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"})
+    law: Literal["four-pulse", "one-pulse", "bang"] = Field(
+        "four-pulse: each channel that comes into line, as long as what is left requires, at most "
+        "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. Default four-pulse.",
+        "four-pulse",
+        default="four-pulse",
+    )
+    start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
+    stop: Threshold = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
+    settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
+    min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
+    predict: bool = Field(
+        "Whether delay, filter and half the on-time are compensated, so that firings are centred on "
+        "their moments; default true.",
+        True,
+        default=True,
+    )
+    alias: bool = Field(
+        "Whether fewer than four samples a nutation period are meant; default false.", True, default=False
+    )
+    on_time: PositiveTime | None = Field(
+        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: an eighth of the "
+        "nutation period, within min_on_time and max_on_time.",
+        "50 ms",
+    )
+    faults: LoopFaultsSection | None = Field("Faults to fly with, default none.", {"reversed": ["+M1"]})
+
+
+class OrbitSection(Section):
+    """Where the spacecraft is at t = 0, at attitude.epoch and in attitude.frame; for messages to flight dynamics."""
+
+    position: Position = Field("Position from the center, m.", ["7000 km", 0, 0])
+    velocity: Velocity = Field("Velocity, m/s.", [0, "7.5 km/s", 0])
+    center: Name = Field("Body at the origin; default EARTH.", "EARTH", default="EARTH")
+
+
+class SunSensorSection(Section):
+    """A sensor that gives a pulse in each spin, when the Sun passes it."""
+
+    azimuth: Angle = Field("Azimuth in the body at which the Sun pulse comes, about axis 3 from axis 1, rad.", "35 deg")
+    elevation: Declination = Field(
+        "Middle of its view, from the plane square to axis 3 towards the spin axis, rad; default 0.",
+        "45 deg",
+        default=0.0,
+    )
+    half_width: Apart = Field(
+        "How far from there it sees the Sun, rad; default 90 deg, which is always.", "45 deg", default=RIGHT_ANGLE
+    )
+    jitter: Time = Field("One sigma of its pulses, s; default 0.", "0.5 ms", default=0.0)
+
+
+class WidthSection(Section):
+    """Widths of pulses that can be commanded: min, min + step, … up to max."""
+
+    step: PositiveTime = Field("Resolution of the width, s.", "1 ms")
+    min: PositiveTime = Field("Shortest width, s.", "20 ms")
+    max: PositiveTime = Field("Longest width, s.", "500 ms")
+
+
+Widths = Annotated[list[PositiveTime], Length(1)] | WidthSection
+
+
+class CommandsSection(Section):
+    """What a command block may hold: so many pulses of one channel, fired by the Sun pulse."""
+
+    delay_step: PositiveTime = Field("Resolution of the delay after the Sun pulse, s.", "2 ms")
+    delay_max: PositiveTime = Field("Longest delay, s; up to a spin turn is used.", "1.9 s")
+    width: Widths = Field(
+        "Widths that can be commanded, s: a list, or step, min and max.",
+        {"step": "1 ms", "min": "20 ms", "max": "500 ms"},
+        ["0.1 s", "0.2 s"],
+    )
+    max_count: Count = Field("Most pulses of a block; default 255.", 255, default=255)
+    every: Annotated[list[Count], Length(1)] = Field(
+        "Spins from one pulse to the next that can be chosen; default [1].", [1, 2], default=[1]
+    )
+
+
+class KeepSection(Section):
+    """A cone about a direction in space which the spin axis must not enter, or must not leave, nutation included."""
+
+    name: Name = Field("Name of the cone, for reports.", "Earth")
+    direction: Annotated[InTheSky, OrWord("sun")] = Field(
+        "Right ascension and declination in the attitude's frame, rad; or sun.", "sun", ["120 deg", "10 deg"]
+    )
+    min: Apart | None = Field("Least angle to the spin axis, rad; default 0.", "4 deg")
+    max: Apart | None = Field("Largest angle between it and the spin axis, rad; default 180 deg.", "20 deg")
+
+
+Pressure = Annotated[float, Quantity("pressure", exclusiveMinimum=0)]
+Impulse = Annotated[float, Quantity("impulse", exclusiveMinimum=0)]
+
+Shed = Annotated[float, Quantity("shed", minimum=0)]
+
+ImpulseBits = Annotated[list[tuple[PositiveTime, Impulse, PositiveTime]], Length(2)]
+"""Rows of on-time, impulse and centroid."""
+
+
+class ValveSection(Section):
+    """A valve: from the command to the thrust, which then rises and falls evenly."""
+
+    open_delay: Time = Field("From the start of the command to the first thrust, s; default 0.", "8 ms", default=0.0)
+    close_delay: Time = Field(
+        "From the end of the command until the thrust begins to fall, s; default 0.", "12 ms", default=0.0
+    )
+    rise_time: Time = Field("From the first thrust to full thrust, s; default 0.", "5 ms", default=0.0)
+    fall_time: Time = Field("From full thrust to none, s; default 0.", "10 ms", default=0.0)
+    on_time_is: Literal["command", "effective"] = Field(
+        "Meaning of a commanded on-time: the length of the command (default), or impulse over full "
+        "thrust, which the electronics of the valve turns into one.",
+        "command",
+        default="command",
+    )
+
+
+class ShedSection(Section):
+    """What the propellant in the tank gives to the moments of inertia."""
+
+    A: Shed = Field("Off the transverse moment for each kg used, kg m²/kg.", "0.4 kg m^2/kg")
+    C: Shed = Field("Off the moment about axis 3 for each kg used, kg m²/kg.", "0.6 kg m^2/kg")
+
+
+class TankSection(Section):
+    """A tank in blowdown: the gas expands as the propellant is used, and pressure and thrust fall."""
+
+    propellant: Mass = Field("Propellant in it at t = 0, kg.", "30 kg")
+    pressure: Pressure = Field("Pressure at t = 0, Pa.", "22 bar")
+    final_pressure: Pressure = Field("Pressure when the propellant is used up, Pa.", "8 bar")
+    exponent: Annotated[float, Quantity("number", minimum=0)] = Field(
+        "Exponent n in thrust ~ pressure^n; default 1.", 1, default=1.0
+    )
+    isp: Annotated[list[tuple[Pressure, PositiveTime]], Length(2)] | None = Field(
+        "Rows of pressure, Pa, rising, and specific impulse, s, instead of that of the thrusters; it runs "
+        "evenly between them, and below the first it is that of the first.",
+        [["8 bar", "215 s"], ["22 bar", "228 s"]],
+    )
+    inertia_per_kg: Annotated[list[Shed], Length(3, 3)] | ShedSection | None = Field(
+        "What each kg that is used takes off the moments of inertia, kg m²/kg: A and C, or a list of the "
+        "three principal moments, the one about axis 3 last. Default: they stay.",
+        {"A": "0.4 kg m^2/kg", "C": "0.6 kg m^2/kg"},
+    )
+
+
+class ColdSection(Section):
+    """Cold nozzles: the first pulses of each channel are weaker."""
+
+    first: Annotated[float, Quantity("ratio", exclusiveMinimum=0)] = Field(
+        "Thrust of the first pulse of a channel, over that of a warm one.", "90 %"
+    )
+    pulses: Annotated[float, Quantity("number", exclusiveMinimum=0)] = Field(
+        "Pulses in which the difference from a warm one falls by a factor of e.", 4
+    )
+
+
+def _needs(*keys: str, without: tuple[str, ...]) -> dict[str, Any]:
+    """JSON Schema for: all of ``keys`` and none of ``without``."""
+    return {"required": list(keys), "not": {"anyOf": [{"required": [key]} for key in without]}}
+
+
+class InertiaSection(Section):
+    """Moments of inertia about the centre of mass: A and C, or the whole tensor."""
+
+    schema_extra: ClassVar = {"oneOf": [_needs("A", "C", without=("tensor",)), _needs("tensor", without=("A", "C"))]}
+
+    A: Moment | None = Field("Transverse moment of inertia, kg m².", "120 kg m^2")
+    C: Moment | None = Field("Moment of inertia about the spin axis 3, kg m²; at most 2 A.", "80 kg m^2")
+    tensor: Tensor | None = Field(
+        "Inertia tensor, 3 rows of 3, kg m²; axis 3 is the principal axis nearest the file's.",
+        [[120, 0.5, 0], [0.5, 118, 0], [0, 0, 80]],
+    )
+
+
+class StateSection(Section):
+    """The motion at t = 0 by spin and nutation angle."""
+
+    spin: Rate = Field("Spin rate about axis 3, signed, rad/s; not zero.", "30 rpm")
+    nutation: Nutation = Field(
+        "Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.", "5 deg"
+    )
+    phase: Angle = Field("Direction of the transverse rate, arg(ω1 + i ω2), rad; default 0.", "20 deg", default=0.0)
+
+
+class AttitudeSection(Section):
+    """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
+
+    quaternion: Quaternion = Field("Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0])
+    epoch: Epoch | None = Field("Date and time of t = 0, ISO 8601; without a zone it is UTC.", "2026-03-01T12:00:00Z")
+    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the quaternion.", "EME2000")
+
+
+class ThrusterSection(Section):
+    """A thruster: position, direction and force, or only its torque."""
+
+    schema_extra: ClassVar = {
+        "oneOf": [
+            _needs("position", "direction", "force", without=("torque", "lever_arm")),
+            _needs("torque", without=("position", "direction", "force")),
+        ]
+    }
+
+    name: Name = Field("Name of the thruster, used by channels and in schedules.", "T1")
+    position: Position | None = Field("Where the force acts, from the centre of mass, m.", [0, "0.5 m", "0.8 m"])
+    direction: Direction | None = Field(
+        "Direction of the force on the spacecraft (against the plume), any length but zero.", [1, 0, 0]
+    )
+    force: Force | None = Field("Thrust, N.", "10 N")
+    torque: Torques | None = Field(
+        "Torque about the centre of mass, N m; instead of position, direction and force.", [0, "-8 N m", 0]
+    )
+    lever_arm: Lever | None = Field("Lever arm, m, that gives the thrust of a torque, for the propellant.", "0.8 m")
+    isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
+    min_on_time: Time = Field("Shortest firing, s; default 0.", "20 ms", default=0.0)
+    max_on_time: PositiveTime | None = Field("Longest firing, s; default: no limit.", "2 s")
+    valve: ValveSection | None = Field(
+        "How the thrust follows a command; default: that of the file, or full thrust at once.",
+        {"open_delay": "8 ms", "close_delay": "12 ms"},
+    )
+    impulse_bit: ImpulseBits | None = Field(
+        "Instead of valve a table from tests: rows of on-time, s, impulse, N s, and its centroid after the "
+        "start of the command, s.",
+        [["20 ms", "0.15 N s", "16 ms"], ["100 ms", "0.95 N s", "58 ms"]],
+    )
+
+
+class SteerableSection(Section):
+    """A torquer for any transverse axis; body-fixed during one pulse."""
+
+    torque: Torque | None = Field("Torque, N m; without it ideal impulses of no duration.", "20 N m")
+    isp: PositiveTime | None = Field("Specific impulse, s, for the propellant.", "220 s")
+    lever_arm: Lever | None = Field("Lever arm, m, for the propellant.", "1 m")
+
+
+class RequirementSection(Section):
+    """What a plan must reach at its end."""
+
+    nutation: AcuteAngle | None = Field("Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg")
+    momentum_shift: AcuteAngle | None = Field(
+        "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
+    )
+    probability: Probability | None = Field(
+        "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"
+    )
+
+
+class GoalSection(Section):
+    """Where the motion is to end; without it the angular momentum stays where it is, and the spin may change."""
+
+    tilt: Tilt | None = Field(
+        "Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.", "10 deg"
+    )
+    azimuth: Angle | None = Field(
+        "Azimuth of the target axis about the angular momentum, rad, from the side to which the spin axis "
+        "leans at t = 0.",
+        "45 deg",
+    )
+    right_ascension: Angle | None = Field(
+        "Right ascension of the target axis in the attitude's frame, rad.", "83.6 deg"
+    )
+    declination: Declination | None = Field("Declination of the target axis in the attitude's frame, rad.", "22 deg")
+    spin: Rate | None = Field("Spin rate about axis 3 at the end, rad/s, signed.", "31 rpm")
+
+
+class LimitsSection(Section):
+    """What every schedule respects."""
+
+    horizon: PositiveTime | None = Field("End of the planning time, s; default: 20 nutation periods.", "120 s")
+    earliest: Time = Field("Earliest start of a pulse, s; default 0.", "5 s", default=0.0)
+    gap: Time = Field("Least time between two pulses, s; default 0.", "0.5 s", default=0.0)
+    tick: PositiveTime | None = Field("Resolution of commanded starts and on-times, s; default: none.", "1 ms")
+    max_pulses: Count | None = Field("Largest number of pulses; default: no limit.", 8)
+    blackout: Annotated[list[Window], ListOf("[begin, end]")] = Field(
+        "Windows [begin, end], s, in which no pulse may be on.", [["10 s", "20 s"]], default=[]
+    )
+
+
+_TURNING = [{"required": ["rate"]}, {"required": ["fixed_in"]}]
+_KINDS: list[Any] = [
+    {"properties": {"kind": {"const": "constant"}, "torque": {"type": "array"}}, "not": {"anyOf": _TURNING}},
+    {"properties": {"kind": {"const": "rotating"}, "torque": {"type": "array"}}, "oneOf": _TURNING},
+    {"properties": {"kind": {"const": "axial"}}, "required": ["kind"], "not": {"anyOf": _TURNING}},
+]
+"""JSON Schema for the kinds of a disturbance, the first two also without the key."""
+
+
+class DisturbanceSection(Section):
+    """A disturbance torque, in the axes of the file."""
+
+    schema_extra: ClassVar = {"oneOf": _KINDS}
+
+    name: Name | None = Field("Name of the disturbance, for reports.", "leak")
+    kind: Literal["constant", "rotating", "axial"] | None = Field(
+        "constant: fixed in the body; rotating: turns about axis 3; axial: about axis 3 only. "
+        "Default: rotating where rate or fixed_in is given, else constant.",
+        "rotating",
+    )
+    torque: DisturbingTorques = Field(
+        "Torque [M1, M2, M3] about the centre of mass, N m, of a rotating one at t = 0 and with M3 = 0; "
+        "of an axial one a single torque.",
+        ["20 mN m", 0, 0],
+    )
+    rate: Rate | None = Field(
+        "Rate at which a rotating torque turns about axis 3, seen in the body, signed, rad/s.", "-3 rad/s"
+    )
+    fixed_in: Literal["inertial"] | None = Field(
+        "inertial: a rotating torque nearly fixed in space; its rate is minus the spin.", "inertial"
+    )
+
+
+class DissipationSection(Section):
+    """Energy dissipation within the body, by flexible parts or liquids."""
+
+    time_constant: PositiveTime = Field(
+        "Time, s, in which the nutation angle grows or decays by the factor e.", "600 s"
+    )
+    nutation: Literal["grows", "decays"] | None = Field(
+        "What it does; default by shape: it grows where A > C, and decays where A < C.", "grows"
+    )
+
+
+class SpacecraftFile(Section):
+    """A spinning spacecraft: its inertia, its motion at t = 0, and what it can fire. Bare numbers are SI."""
+
+    schema_extra: ClassVar = {"oneOf": [_needs("omega0", without=("state",)), _needs("state", without=("omega0",))]}
+
+    name: Name = Field("Name of the spacecraft.", "Sounder-1")
+    mass: Mass | None = Field("Mass, kg; without it no velocity change is worked out.", "250 kg")
+    inertia: InertiaSection = Field(
+        "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
+    )
+    omega0: Rates | None = Field(
+        "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]
+    )
+    state: StateSection | None = Field(
+        "Motion at t = 0 by spin and nutation; or instead omega0.", {"spin": "30 rpm", "nutation": "5 deg"}
+    )
+    attitude: AttitudeSection | None = Field(
+        "Attitude at t = 0.", {"quaternion": [1, 0, 0, 0], "epoch": "2026-03-01T12:00:00Z", "frame": "EME2000"}
+    )
+    object_id: Name | None = Field(
+        "International designator, such as 1998-001A, for messages to flight dynamics.", "1998-001A"
+    )
+    orbit: OrbitSection | None = Field(
+        "Position and velocity at t = 0, for messages to flight dynamics.",
+        {"position": ["7000 km", 0, 0], "velocity": [0, "7.5 km/s", 0]},
+    )
+    thrusters: list[ThrusterSection] = Field(
+        "Body-fixed thrusters.",
+        [{"name": "T2", "torque": [0, "-8 N m", 0], "isp": "220 s", "lever_arm": "0.8 m"}],
+        default=[],
+    )
+    channels: Annotated[dict[str, Annotated[list[Name], Length(1)]], Length(1)] | None = Field(
+        "Names of thrusters that fire together; without it each thruster is a channel of its own.",
+        {"+M1": ["T1", "T2"]},
+    )
+    steerable: SteerableSection | None = Field("A torquer for any transverse axis.", {"torque": "20 N m"})
+    valve: ValveSection | None = Field(
+        "How the thrust of every thruster that does not say it itself follows a command.",
+        {"open_delay": "8 ms", "close_delay": "12 ms", "rise_time": "5 ms", "fall_time": "10 ms"},
+    )
+    cold: ColdSection | None = Field(
+        "Cold nozzles, which make the first pulses of each channel weaker.", {"first": "90 %", "pulses": 4}
+    )
+    tank: TankSection | None = Field(
+        "The tank in blowdown, whose pressure the thrust goes with.",
+        {"propellant": "30 kg", "pressure": "22 bar", "final_pressure": "8 bar"},
+    )
+    disturbances: list[DisturbanceSection] = Field(
+        "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
+    )
+    dissipation: DissipationSection | None = Field(
+        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s"}
+    )
+    requirement: RequirementSection | None = Field("What a plan must reach.", {"nutation": "0.5 deg"})
+    limits: LimitsSection | None = Field("Limits that every schedule respects.", {"horizon": "120 s"})
+    goal: GoalSection | None = Field(
+        "Where the spin axis and the spin are to end.", {"tilt": "10 deg", "azimuth": "45 deg"}
+    )
+    sun: Annotated[InTheSky, OrWord("epoch")] | None = Field(
+        "Right ascension and declination of the Sun in the attitude's frame, rad; epoch computes them.",
+        "epoch",
+        ["120 deg", "10 deg"],
+    )
+    keep: list[KeepSection] = Field(
+        "Cones that the spin axis keeps on its way to a target.",
+        [{"name": "Sun", "direction": "sun", "min": "4 deg", "max": "20 deg"}],
+        default=[],
+    )
+    sun_sensor: SunSensorSection | None = Field("The sensor whose pulse fires command blocks.", {"azimuth": "35 deg"})
+    commands: CommandsSection | None = Field(
+        "Command blocks: pulses fired by the Sun pulse.",
+        {"delay_step": "2 ms", "delay_max": "1.9 s", "width": {"step": "1 ms", "min": "20 ms", "max": "500 ms"}},
+    )
+    loop: LoopSection | None = Field(
+        "A closed loop that damps by what a sensor shows.",
+        {"sensor": {"kind": "gyro", "rate": "100 Hz"}, "start": "0.5 deg", "stop": "0.05 deg"},
+    )
+    dispersions: DispersionsSection | None = Field(
+        "How far the real spacecraft may be off what the file says.", {"A": {"normal": "2 %"}}
+    )

@@ -1,0 +1,490 @@
+"""Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians.
+
+Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
+
+JSON Schema of the spacecraft file, from the sections that read it.
+
+Spacecraft files to start from, which ship with the package: the built-in example, and those of ``configs/``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, replace
+from functools import cache
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common.time import Epoch
+from nutdamp.errors import Fault, FaultyFile, in_order, nearest
+from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
+from nutdamp.files.keys import (
+    AttitudeSection,
+    CommandsSection,
+    DisturbanceSection,
+    GoalSection,
+    InertiaSection,
+    KeepSection,
+    LimitsSection,
+    LoopSection,
+    OrbitSection,
+    RequirementSection,
+    SpacecraftFile,
+    SunSensorSection,
+    ThrusterSection,
+    by_name,
+    dispersions,
+)
+from nutdamp.files.overrides import Setting, overlay
+from nutdamp.files.plausibility import doubts, foreign
+from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
+from nutdamp.files.study_rules import dispersion_findings, thrust_findings
+from nutdamp.files.yaml import Node, dotted, read_text, read_tree
+from nutdamp.physics import attitude, sky
+from nutdamp.physics.body import principal_axes
+from nutdamp.physics.thruster import Cold, Tank
+from nutdamp.spacecraft.equipment import Channel, Commands, Loop, Sensor, Steerable, SunSensor, Thruster
+from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Inertia, Keep, Limits, Orbit, Requirement, Spacecraft
+from nutdamp.units import shown
+
+if TYPE_CHECKING:
+    from nutdamp.files.keys import TankSection, ValveSection
+    from nutdamp.physics.thruster import Valve
+
+
+BUILT_IN = "example"
+"""Name of the built-in example, which commands plan where no file is named, and which `init` writes by default."""
+
+_PACKAGE = Path(__file__).parents[1]
+
+
+@cache
+def _places() -> dict[str, Path]:
+    """Where the file of each name lies: an installed package holds the folder ``configs``, a checkout has it beside."""
+    folders = (_PACKAGE / "data" / "configs", _PACKAGE.parent / "configs")
+    shipped = next((sorted(folder.glob("*.yaml")) for folder in folders if folder.is_dir()), [])
+    return {path.stem: path for path in (_PACKAGE / "data" / f"{BUILT_IN}.yaml", *shipped)}
+
+
+def example_names() -> tuple[str, ...]:
+    """Names of all files, the built-in example first."""
+    return tuple(_places())
+
+
+def example_text(name: str = BUILT_IN) -> str:
+    """The text of the file of that ``name``; KeyError for any other."""
+    return _places()[name].read_text(encoding="utf-8")
+
+
+def example_subject(name: str) -> str:
+    """What the file of that ``name`` is about: the comment it begins with, up to the line that ends a sentence."""
+    lines: list[str] = []
+    for line in example_text(name).splitlines():
+        lines.append(line.removeprefix("#").strip())
+        if line.endswith("."):
+            break
+    return " ".join(lines).rstrip(".")
+
+
+def read_contents(
+    text: str, name: str, settings: Sequence[Setting] = (), warn: Callable[[Fault], None] = lambda _: None
+) -> SpacecraftFile:
+    """The checked contents of a spacecraft file with ``settings`` in place of what it says.
+
+    ``warn`` is given what is hardly meant. Raises `FaultyFile` with all faults, sorted by place.
+    """
+    other = foreign(text.removeprefix("\ufeff"))
+    if other is not None:
+        raise FaultyFile([Fault(name, 1, 1, "", other)])
+    root, faults = read_tree(text, name)
+    root, unplaced = overlay(root, settings)
+    faults += unplaced
+    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
+    if root.get("loop") is not None:
+        from nutdamp.files.study_rules import loop_findings  # few files have one
+
+        found += loop_findings(root)
+    problems: Problems = []
+    contents = SpacecraftFile.read(root.plain(), problems)
+    judged = {finding.path for finding in found if not finding.at_key}
+    found += [Finding(path, problem) for path, problem in problems if path not in judged]
+    faults += [_placed(finding, root, name) for finding in found]
+    for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
+        warn(doubt)
+    if faults or contents is None:
+        raise FaultyFile(faults)
+    return contents
+
+
+def _placed(finding: Finding, root: Node, name: str) -> Fault:
+    """The finding with its place; what is missing is reported at the key of its parent."""
+    path = finding.path
+    if finding.at_key:
+        place = root.key_place_of(path)
+    elif root.get(*path) is None:
+        place = root.key_place_of(path[:-1])
+    else:
+        place = root.place_of(path)
+    return place.fault(name, dotted(path), finding.problem)
+
+
+def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
+    """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
+
+    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too; any
+    other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
+    names, of entries of the ``model``.
+    """
+    fields = model.fields() if model else {}
+    named = named and isinstance(node.value, dict) and by_name(node.value)
+    if fields and isinstance(node.value, dict) and not named:
+        for key in [key for key in node.value if key not in fields]:
+            dropped = node.value.pop(key)
+            beside = bool(node.keys[key].setting)
+            meant = nearest(key, [field for field in fields if beside or field not in node.value])
+            cure = f"did you mean {shown(meant)}?" if meant else f"known here: {', '.join(fields)}"
+            if meant and meant not in node.value:
+                node.value[meant], node.keys[meant] = dropped, node.keys[key]
+            elif "tensor" in fields and MOMENT.fullmatch(key):
+                cure = "write tensor: [[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]], or A and C"
+            elif key == "<<":
+                cure = "merge keys are of YAML 1.1; write the keys out"
+            elif ":" in key:
+                cure = "put a space behind the colon"
+            yield Finding((*path, key), f"unknown key; {cure}", at_key=True)
+    for step, child in node.children():
+        annotation = fields[step].type if isinstance(step, str) and fields and not named else model
+        if child.value is None:
+            cure = "give a value, or leave the key out" if isinstance(step, str) else "expected a value"
+            yield Finding((*path, step), f"empty; {cure}")
+        below = section_of(annotation) if fields else None
+        yield from _spelling(child, below, (*path, step), _holds_names(annotation))
+
+
+def _holds_names(annotation: Any) -> bool:
+    """Whether the type of a field is that of a mapping by names."""
+    return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
+
+
+__all__ = ["load_spacecraft", "read_spacecraft"]
+
+Vector = NDArray[np.float64]
+Part = TypeVar("Part")
+
+Warn = Callable[[Fault], None]
+"""Is given each number that is hardly what was meant."""
+
+
+GROWS = {"grows": True, "decays": False, None: None}
+"""What ``dissipation.nutation`` says."""
+
+
+def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
+    """The spacecraft in a file; raises `CannotRead`, or `FaultyFile` with everything that is wrong in it."""
+    return read_spacecraft(read_text(Path(path)), str(path), settings, warn)
+
+
+def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
+    """The spacecraft in the text of a file; ``name`` is that of the file in messages.
+
+    ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
+    """
+    contents = read_contents(text, name, settings, warn)
+    inertia = _inertia(contents.inertia)
+    omega0 = _rates(contents, inertia)
+    thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve) for entry in contents.thrusters}
+    channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
+    steerable = _part(Steerable, contents.steerable)
+    torquer = steerable if thrusters else steerable or Steerable()
+    spacecraft = Spacecraft(
+        name=contents.name,
+        inertia=inertia,
+        omega0=omega0,
+        mass=contents.mass,
+        attitude=_attitude(contents.attitude),
+        channels=tuple(
+            Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
+        ),
+        steerable=steerable,
+        requirement=_requirement(contents.requirement),
+        limits=_limits(contents.limits),
+        disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
+        dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
+        nutation_grows=None if contents.dissipation is None else GROWS[contents.dissipation.nutation],
+        dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
+        object_id=contents.object_id,
+        orbit=_orbit(contents.orbit),
+        cold=_part(Cold, contents.cold),
+        tank=_tank(contents.tank),
+    )
+    sunward = _sun(contents)
+    return replace(
+        spacecraft,
+        goal=_goal(contents.goal, spacecraft),
+        sun=sunward,
+        keep=tuple(_keep(entry, sunward) for entry in contents.keep),
+        sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
+        commands=_commands(contents.commands),
+        loop=_loop(contents.loop, inertia.axes),
+    )
+
+
+def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
+    """What a section describes, where it is given: keys have the names of fields, but for ``others``."""
+    if section is None:
+        return None
+    named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
+    given = {field.name: getattr(section, field.name) for field in named if hasattr(section, field.name)}
+    return kind(**{**given, **others})
+
+
+def _inertia(section: InertiaSection) -> Inertia:
+    if section.tensor is not None:
+        moments, axes = principal_axes(symmetric(np.array(section.tensor)))
+        return Inertia(moments, axes)
+    assert section.A is not None
+    assert section.C is not None
+    return Inertia((section.A, section.A, section.C))
+
+
+def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
+    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/(I3|ω3|), Magnus 1970 (19).
+
+    So θ is the angle between H and the spin axis at t = 0, whatever I1 and I2 are.
+    """
+    if contents.omega0 is not None:
+        rates: Vector = inertia.axes.T @ np.array(contents.omega0)
+        return rates
+    state = contents.state
+    assert state is not None
+    first, second, third = inertia.moments
+    way = np.array([math.cos(state.phase), math.sin(state.phase)])
+    moment = first if first == second else math.hypot(first * way[0], second * way[1])
+    return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])
+
+
+def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None) -> Thruster:
+    """A thruster in principal axes; ``every`` is the valve of those that have none of their own."""
+    force: Vector | None = None
+    position: Vector | None = None
+    if entry.torque is not None:
+        torque = np.array(entry.torque)
+        thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
+    else:
+        assert entry.position is not None
+        assert entry.direction is not None
+        assert entry.force is not None
+        thrust, force = entry.force, force_vector(entry.direction, entry.force)
+        position = np.array(entry.position)
+        torque = np.cross(position, force)
+    valve = _valve(entry, every, thrust)
+    least, most = entry.min_on_time, math.inf if entry.max_on_time is None else entry.max_on_time
+    if entry.impulse_bit is not None:  # outside its rows nothing is known
+        least, most = max(least, entry.impulse_bit[0][0]), min(most, entry.impulse_bit[-1][0])
+    return Thruster(
+        name=entry.name,
+        torque=axes.T @ torque,
+        force=None if force is None else axes.T @ force,
+        thrust=thrust,
+        isp=entry.isp,
+        min_on_time=least,
+        max_on_time=most,
+        position=None if position is None else axes.T @ position,
+        valve=valve,
+    )
+
+
+def _tank(section: TankSection | None) -> Tank | None:
+    if section is None:
+        return None
+    isp = None if section.isp is None else tuple((pressure, value) for pressure, value in section.isp)
+    shed = section.inertia_per_kg
+    per_kg = None
+    if shed is not None and any(rows := shed if isinstance(shed, list) else [shed.A, shed.A, shed.C]):
+        per_kg = rows[0], rows[1], rows[2]
+    return _part(Tank, section, isp=isp, inertia_per_kg=per_kg)
+
+
+def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
+    """What a thruster of ``thrust`` N makes of commands; None where that is full thrust from start to end."""
+    if entry.impulse_bit is None and entry.valve is None and every is None:
+        return None
+    from nutdamp.physics import thruster  # few files have any
+
+    if entry.impulse_bit is not None:
+        assert thrust is not None
+        return thruster.Measured(
+            tuple((on_time, impulse / thrust, centroid) for on_time, impulse, centroid in entry.impulse_bit)
+        )
+    section = entry.valve or every
+    assert section is not None
+    times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
+    return thruster.Trapezoid(*times, section.on_time_is == "effective") if any(times) else None
+
+
+def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
+    """A disturbance in principal axes; ``spin`` is ω3 at t = 0, rad/s.
+
+    What is fixed in space turns in the body at minus the spin, Magnus 1970 (27). Where the principal axes are
+    tilted, a transverse torque has a part about axis 3, which does not turn.
+    """
+    torque = np.array(entry.torque)
+    if not inertia.aligned:
+        torque = inertia.axes.T @ torque
+        torque[np.abs(torque) <= CANCELLED * math.hypot(*torque)] = 0.0
+    rate = 0.0
+    if disturbance_kind(entry.kind, entry.rate is not None or entry.fixed_in is not None) == "rotating":
+        rate = -spin if entry.rate is None else entry.rate
+    return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
+
+
+def _attitude(section: AttitudeSection | None) -> Attitude | None:
+    if section is None:
+        return None
+    return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
+
+
+def _orbit(section: OrbitSection | None) -> Orbit | None:
+    if section is None:
+        return None
+    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
+
+
+def _requirement(section: RequirementSection | None) -> Requirement | None:
+    """None also for a requirement that names nothing."""
+    if section is None or (section.nutation is None and section.momentum_shift is None):
+        return None
+    return _part(Requirement, section)
+
+
+def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
+    """The goal of a file; its tilt and azimuth count from the motion at t = 0."""
+    if section is None:
+        return Goal()
+    if section.tilt is not None:
+        return Goal(spacecraft.direction_in_n(section.tilt, section.azimuth or 0.0), section.spin)
+    if section.right_ascension is not None and section.declination is not None:
+        return Goal(attitude.on_sphere(section.right_ascension, section.declination), section.spin)
+    return Goal(spin=section.spin)
+
+
+def _sun(contents: SpacecraftFile) -> Vector | None:
+    """The direction of the Sun: as given, or at t = 0."""
+    given: list[float] | str | None = contents.sun
+    if not isinstance(given, str):
+        return None if given is None else attitude.on_sphere(*given)
+    assert contents.attitude is not None
+    assert contents.attitude.epoch is not None
+    return sky.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
+
+
+def _keep(section: KeepSection, sunward: Vector | None) -> Keep:
+    given: list[float] | str = section.direction
+    direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
+    assert direction is not None
+    return Keep(section.name, direction, section.min or 0.0, math.pi if section.max is None else section.max)
+
+
+def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | None:
+    if section is None:
+        return None
+    azimuth = section.azimuth
+    if not np.array_equal(axes, np.eye(3)):
+        first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        azimuth = math.atan2(second, first)
+    return _part(SunSensor, section, azimuth=azimuth)
+
+
+def _commands(section: CommandsSection | None) -> Commands | None:
+    if section is None:
+        return None
+    given, step = section.width, None
+    if isinstance(given, list):
+        widths = np.unique(given)
+    else:
+        step = given.step
+        widths = given.min + step * np.arange(math.floor((given.max - given.min) / step * (1.0 + 1e-12)) + 1)
+    every = tuple(sorted(set(section.every)))
+    return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
+
+
+def _loop(section: LoopSection | None, axes: Vector) -> Loop | None:
+    if section is None:
+        return None
+    given = section.sensor
+    along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
+    position = axes.T @ np.array(given.position or (0.0, 0.0, 0.0))
+    sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)))
+    turned = () if section.faults is None else tuple(section.faults.reversed)
+    return _part(Loop, section, sensor=sensor, reversed=turned)
+
+
+def _limits(section: LimitsSection | None) -> Limits:
+    windows = () if section is None else tuple((begin, end) for begin, end in section.blackout)
+    return _part(Limits, section, blackout=windows) or Limits()
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of the spacecraft file, for editors."""
+    parts: dict[str, Any] = {}
+    whole = {**section_schema(SpacecraftFile, parts), "title": "nutdamp spacecraft file"}
+    schema = {"$defs": dict(sorted(parts.items())), **whole}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_in_order(schema)}
+
+
+def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of a section; those that it refers to are added to ``parts``."""
+    properties = {}
+    for name, key in section.fields().items():
+        properties[name] = {**_schema(key.type, parts), "description": key.description, "examples": key.examples}
+        if key.default is not None and key.default is not REQUIRED:
+            properties[name]["default"] = key.default
+    required = [name for name, key in section.fields().items() if key.default is REQUIRED]
+    about = " ".join((section.__doc__ or "").split())
+    found: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
+    found |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
+    return {**found, "required": required} if required else found
+
+
+def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of a type."""
+    origin, of = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _ruled_schema(of[0], of[1:], parts)
+    if origin in (Union, UnionType):
+        given = [_schema(one, parts) for one in of if one is not NoneType]
+        return given[0] if len(given) == 1 else {"oneOf": given}
+    if origin is Literal:
+        return {"type": "string", **({"enum": list(of)} if len(of) > 1 else {"const": of[0]})}
+    section = section_of(annotation)
+    if section is not None and section is annotation:
+        if section.__name__ not in parts:
+            parts[section.__name__] = section_schema(section, parts)
+        return {"$ref": f"#/$defs/{section.__name__}"}
+    if origin is list:
+        return {"type": "array", "items": _schema(of[0], parts)}
+    if origin is tuple:
+        entries = [_schema(one, parts) for one in of]
+        return {"type": "array", "prefixItems": entries, "minItems": len(of), "maxItems": len(of)}
+    if origin is dict:
+        return {"type": "object", "additionalProperties": _schema(of[1], parts)}
+    return {} if annotation is Any else {"type": {str: "string", int: "integer", bool: "boolean"}[annotation]}
+
+
+def _ruled_schema(annotation: Any, rules: tuple[Rule, ...], parts: dict[str, Any]) -> dict[str, Any]:
+    if not rules:
+        return _schema(annotation, parts)
+    return rules[-1].schema(lambda: _ruled_schema(annotation, rules[:-1], parts))
+
+
+def _in_order(schema: Any, within: str = "") -> Any:
+    """Keywords in the order of the alphabet, properties in that of the section."""
+    if isinstance(schema, dict):
+        names = schema if within in ("properties", "default") else sorted(schema)
+        return {name: _in_order(schema[name], name if within != "properties" else "") for name in names}
+    return [_in_order(one, within) for one in schema] if isinstance(schema, list) else schema

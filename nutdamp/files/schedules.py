@@ -1,0 +1,574 @@
+"""Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
+
+Those are start_s (or t_s, the centre), on_time_s and channel. What a channel of the spacecraft file does follows from
+there; the columns of torque, impulse, propellant and date are looked at only to say where they contradict. Pulses of
+the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the schedule.
+
+Command blocks as CSV: ``plan --blocks`` writes them, ``simulate --blocks`` fires them, edited or not.
+
+Schedules as CSV, as ``plan`` writes them; `schedule_file` reads them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common.time import Epoch
+from nutdamp.errors import nearest, printable
+from nutdamp.files.tabular import Cells, Table, csv_text, number
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.propellant import Supply
+from nutdamp.planning.decision import broken_limits
+from nutdamp.planning.plan import Plan
+from nutdamp.schemes.block_model import fired, spin_turn
+from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.spacecraft.equipment import Block, Channel
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, on_command, overlapping
+from nutdamp.units import shown
+
+PULSES_HEADER = (
+    "pulse",
+    "t_s",
+    "start_s",
+    "on_time_s",
+    "channel",
+    "torque_1_Nm",
+    "torque_2_Nm",
+    "torque_3_Nm",
+    "impulse_1_Nms",
+    "impulse_2_Nms",
+    "impulse_3_Nms",
+    "propellant_kg",
+    "nutation_before_deg",
+    "nutation_after_deg",
+)
+EFFECTIVE = ("effective_start_s", "effective_on_time_s")
+"""Behind those, where pulses go through valves: start and on-time are those of the command then."""
+
+UTC = "utc"
+IMPULSE = PULSES_HEADER[8:11]
+TORQUE = PULSES_HEADER[5:8]
+
+
+def pulses_array(flown: Flight) -> NDArray[np.void]:
+    """The schedule of a flown flight, one row a pulse, fields as in `HEADER`; vectors in the axes of the file.
+
+    What is not known is NaN: the torque of an ideal impulse, a propellant. Through valves the fields `EFFECTIVE`
+    follow; with an epoch, a last field ``utc`` has the date and time of each start.
+    """
+    before, after = flown.around_pulses()
+    body = flown.spacecraft
+    dated, valves = body.utc(0.0) is not None, flown.schedule.through_valves
+    header = (*PULSES_HEADER, *(EFFECTIVE if valves else ()), *((UTC,) if dated else ()))
+    rows = [
+        (
+            index + 1,
+            *(pulse.t, *pulse.loaded),
+            pulse.channel,
+            *(np.full(3, math.nan) if pulse.torque is None else body.inertia.in_file(pulse.torque)),
+            *body.inertia.in_file(pulse.impulse),
+            math.nan if pulse.propellant is None else pulse.propellant,
+            math.degrees(before.nutation[index]),
+            math.degrees(after.nutation[index]),
+            *((pulse.start, pulse.on_time) if valves else ()),
+            *([body.utc(pulse.loaded[0]) or ""] if dated else []),
+        )
+        for index, pulse in enumerate(flown.schedule)
+    ]
+    longest = max((len(pulse.channel) for pulse in flown.schedule), default=1)
+    kinds = {"pulse": "i8", "channel": f"U{longest}", UTC: "U30"}
+    return np.array(rows, dtype=[(name, kinds.get(name, "f8")) for name in header])
+
+
+def pulses_csv(flown: Flight) -> str:
+    """The rows of `pulses_array` as CSV; what is not known is empty."""
+    table = pulses_array(flown)
+    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
+    return csv_text(table.dtype.names or PULSES_HEADER, texts)
+
+
+BLOCKS_HEADER = (
+    "block",
+    "channel",
+    "first_sun_pulse",
+    "first_utc",
+    "delay_s",
+    "delay_counts",
+    "delay_deg",
+    "width_s",
+    "width_counts",
+    "count",
+    "every",
+    "impulse_Nms",
+    "nutation_after_deg",
+)
+
+COUNTS = 1e-6
+"""Share of a step by which a time may be off the commands that there are: the rounding of files."""
+
+MOST_FIRED = 5_000
+"""Pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds."""
+
+LATEST = 100_000
+"""Number of the last Sun pulse that may fire a block."""
+
+
+def blocks_csv(flown: Flight) -> str:
+    """The blocks of a flown schedule, one row each; what is not known is empty."""
+    body, commands = flown.spacecraft, flown.spacecraft.commands
+    _, after = flown.around_pulses()
+    pulses, rows = flown.schedule.pulses, []
+    lasts = list(accumulate(block.count for block in flown.schedule.blocks))
+    for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True), start=1):
+        rows.append(
+            [
+                str(index),
+                block.channel,
+                str(block.first),
+                body.utc(pulses[last - block.count].loaded[0]) or "",
+                number(block.delay),
+                "" if commands is None else str(commands.delay_counts(block.delay)),
+                _shown(math.degrees(block.delay * abs(body.spin))),
+                number(block.width),
+                "" if commands is None else str(commands.width_counts(block.width)),
+                str(block.count),
+                str(block.every),
+                _shown(math.fsum(pulse.magnitude for pulse in pulses[last - block.count : last])),
+                number(math.degrees(float(after.nutation[last - 1]))),
+            ]
+        )
+    return csv_text(BLOCKS_HEADER, rows)
+
+
+def _shown(value: float) -> str:
+    """A number for people, without the noise of its last digits."""
+    return number(float(f"{value:.9g}"))
+
+
+def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
+    """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
+
+    Needed are channel, first_sun_pulse, count, delay_s and width_s; delay_counts and width_counts do for the last two
+    where the spacecraft file has the steps. every is 1 where it is left out. A first_utc must be that of a first
+    pulse. Raises CannotRead, and FaultyFile with every fault of the file.
+    """
+    table = Table(path, BLOCKS_HEADER, "blocks")
+    times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
+    table.expect("channel", "first_sun_pulse", *times, "count")
+    blocks: list[Block] = []
+    for line, row in table.rows:
+        cells = table.cells(line, row)
+        block = None if cells is None else _block(table, line, cells, spacecraft)
+        if cells is None or block is None:
+            continue
+        before = blocks[-1] if blocks else None
+        over = 0 if before is None else before.first + (before.count - 1) * before.every
+        if block.first <= over:
+            problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
+            table.fault(line, "first_sun_pulse", problem)
+        _against_commands(table, line, cells, block, spacecraft)
+        blocks.append(block)
+    if sum(block.count for block in blocks) > MOST_FIRED:
+        fired = sum(block.count for block in blocks)
+        table.fault(1, "count", f"the blocks fire {fired} pulses; expected at most {MOST_FIRED}")
+    table.check()
+    _expect_utc(table, spacecraft, blocks)
+    return tuple(blocks), table.warned
+
+
+def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
+    """Faults of a first_utc that is no time, or more than a spin turn from when the first pulse of its block begins.
+
+    So much may a delay be edited by. Without an epoch only its form is looked at.
+    """
+    given = [(line, row[table.header.index("first_utc")]) for line, row in table.rows if "first_utc" in table.header]
+    parsed: dict[int, Epoch] = {}
+    for line, text in given:
+        try:
+            if text.strip():
+                parsed[line] = Epoch.parse(text.strip())
+        except ValueError:
+            table.fault(line, "first_utc", f"{shown(text)} is no date and time; expected 2026-03-01T12:00:00Z")
+    table.check()
+    place = spacecraft.attitude
+    if not parsed or place is None or place.epoch is None:
+        return
+    pulses, epoch, number = fired(spacecraft, blocks).pulses, Epoch.parse(place.epoch), 0
+    for (line, _), block in zip(given, blocks, strict=True):
+        begins = pulses[number].loaded[0]
+        number += block.count
+        if line in parsed and abs(parsed[line].since(epoch) - begins) > spin_turn(spacecraft):
+            cure = "correct first_sun_pulse, or leave first_utc empty"
+            table.fault(line, "first_utc", f"its first pulse begins at {spacecraft.utc(begins)}; {cure}")
+    table.check()
+
+
+TIMES = ("delay", "width")
+
+
+def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
+    """Whether delay or width of the blocks is given by counts alone, of the commands that the spacecraft file has."""
+    alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
+    if alone and spacecraft.commands is None:
+        problem = f"the spacecraft file has no commands to count the {name} in; expected the column {name}_s"
+        table.fault(1, f"{name}_counts", problem)
+    return alone
+
+
+def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Block | None:
+    """The block of one row; None where it has faults."""
+    faults, channels = len(table.faults), [channel.name for channel in spacecraft.channels]
+    name = cells["channel"]
+    if name not in channels:
+        close = nearest(name, channels)
+        cure = f"did you mean {shown(close)}?" if close else f"it has {', '.join(map(shown, channels)) or 'none'}"
+        table.fault(line, "channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
+    delay, width = (_time(table, line, cells, spacecraft, name) for name in TIMES)
+    if width == 0.0:
+        column = "width_s" if "width_s" in cells else "width_counts"
+        table.fault(line, column, "0 s fires nothing; expected a time above 0")
+    first, count = (_whole(table, line, cells, *one) for one in (("first_sun_pulse", LATEST), ("count", MOST_FIRED)))
+    every = _whole(table, line, cells, "every", LATEST) if cells.get("every") else 1
+    if len(table.faults) > faults or None in (delay, width, first, count, every):
+        return None
+    return Block(name, first or 1, delay or 0.0, width or 0.0, count or 1, every or 1)
+
+
+def _time(table: Table, line: int, cells: Cells, spacecraft: Spacecraft, name: str) -> float | None:
+    """A delay or width, s: as it is given, or so many steps."""
+    column = f"{name}_s" if f"{name}_s" in cells else f"{name}_counts"
+    value = table.number(line, cells, column)
+    if value is None:
+        return None
+    if value < 0.0:
+        unit = " s" if column.endswith("_s") else ""
+        table.fault(
+            line, column, f"{value:g}{unit} is negative; expected {'a time' if unit else 'a number'} of at least 0"
+        )
+        return None
+    if column.endswith("_s"):
+        return value
+    if not value.is_integer():
+        table.fault(line, column, f"expected a whole number of steps, got {cells[column]}")
+        return None
+    commands = spacecraft.commands
+    if commands is None:
+        return 0.0
+    time = commands.delay_of(value) if name == "delay" else commands.width_of(value)
+    if time is None:
+        table.fault(
+            line,
+            column,
+            f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, got {cells[column]}",
+        )
+    return time
+
+
+def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int | None:
+    value = table.number(line, cells, column)
+    if value is not None and not (value.is_integer() and 1 <= value <= most):
+        table.fault(line, column, f"expected a whole number from 1 to {most}, got {cells[column]}")
+        return None
+    return None if value is None else int(value)
+
+
+def _against_commands(table: Table, line: int, cells: Cells, block: Block, spacecraft: Spacecraft) -> None:
+    """Warn of what cannot be commanded: it is flown as given."""
+    commands = spacecraft.commands
+    if commands is None:
+        return
+    longest = math.floor(commands.delay_max / commands.delay_step * (1.0 + COUNTS)) * commands.delay_step
+    nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
+    nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
+    allowed = ", ".join(map(str, commands.every))
+    off = {
+        "delay_s": (block.delay, nearest_delay, COUNTS * commands.delay_step),
+        "width_s": (block.width, nearest_width, COUNTS * block.width),
+    }
+    for column, (given, near, slack) in off.items():
+        if abs(given - near) > slack:
+            text = f"{column} = {given:.6g} s cannot be commanded, {near:.6g} s is the nearest: flown as given"
+            table.warn(line, column, text)
+    if block.count > commands.max_count:
+        text = f"count = {block.count} cannot be commanded, {commands.max_count} is the most: flown as given"
+        table.warn(line, "count", text)
+    if block.every not in commands.every:
+        table.warn(line, "every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
+    counted = (commands.delay_counts(block.delay), commands.width_counts(block.width))
+    for name, time, right in zip(TIMES, (block.delay, block.width), counted, strict=True):
+        counts = cells.get(f"{name}_counts", "")
+        if counts and f"{name}_s" in cells and counts != str(right):
+            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
+            table.warn(line, f"{name}_counts", text)
+
+
+AGREES = 1e-6
+"""Relative difference up to which columns of a schedule say the same."""
+
+STARTS = ("start_s", "t_s")
+
+
+def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
+    """A schedule from a CSV file, and warnings: what columns contradict and so are ignored, channels not in the file.
+
+    Raises CannotRead, and FaultyFile with every fault of the file.
+    """
+    table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
+    return _Reader(table, spacecraft).read()
+
+
+def read_plan(
+    path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
+) -> tuple[Plan, tuple[str, ...]]:
+    """A schedule file as a plan of that name, and the warnings of `read_pulses` and of limits that it breaks.
+
+    ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
+    """
+    pulses, warnings = read_pulses(path, spacecraft)
+    made = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
+    return made, (*warnings, *broken_limits(spacecraft, pulses))
+
+
+class _Reader:
+    """Rows of one file into pulses, collecting faults, contradictions and warnings."""
+
+    def __init__(self, table: Table, spacecraft: Spacecraft) -> None:
+        self.table, self.spacecraft = table, spacecraft
+        self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.commanded: dict[int, Cells] = {}  # of pulses of a channel of the file, by line
+
+    def read(self) -> tuple[Schedule, list[str]]:
+        header = self.table.header
+        if not set(STARTS) & set(header):
+            problem = f"the column is missing (or {STARTS[1]}, the centre){self.table.misspelt(STARTS[0])}"
+            self.table.fault(1, STARTS[0], problem)
+        bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
+        self.table.expect("on_time_s", *["channel"] * bare)
+        pulses = [(line, pulse) for line, row in self.table.rows if (pulse := self._pulse(line, row)) is not None]
+        for line, other in overlapping(pulses):
+            self.table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
+        self.table.check()
+        return Schedule(tuple(self._supplied(pulses))), self.table.warned
+
+    def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
+        """The pulses as strong as they are one after the other, compared with what their rows say."""
+        supply = Supply(self.spacecraft)
+        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda one: one[1].loaded[0]):
+            fired = supply.fire(pulse, self.channels.get(pulse.channel))
+            if line in self.commanded:
+                self._expect(line, self.commanded[line], fired)
+            yield fired
+        if supply.shortage is not None:
+            self.table.warn(pulses[-1][0], "tank", f"{supply.shortage}: the last pulses do not fire")
+
+    def _instead(self, name: str) -> str:
+        """The channel that is meant by a name not in the file, or all there are."""
+        found = nearest(name, list(self.channels))
+        return f"it has {', '.join(map(shown, self.channels))}" if found is None else f"did you mean {shown(found)}?"
+
+    def _on_times(self, cells: Cells) -> str:
+        """The on-times that the channel of a row can have, in words."""
+        channel = self.channels.get(cells.get("channel", ""))
+        if channel is None or channel.max_on_time == math.inf:
+            least = 0.0 if channel is None else channel.min_on_time
+            return f"{least:g} s or more is expected (0 for an ideal impulse)"
+        return f"{channel.min_on_time:g} s to {channel.max_on_time:g} s is expected (0 for an ideal impulse)"
+
+    def _pulse(self, line: int, row: list[str]) -> Pulse | None:
+        """The pulse of one row; None where it has faults."""
+        cells = self.table.cells(line, row)
+        if cells is None:
+            return None
+        name = cells.get("channel") or STEERABLE
+        if not name.isprintable():
+            self.table.fault(
+                line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
+            )
+            return None
+        channel = self.channels.get(name)
+        timing = self._timing(line, cells, channel)
+        if timing is None:
+            return None
+        t, on_time, start = timing
+        if channel is not None and on_time > 0.0:
+            self.commanded[line] = cells
+            return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
+        return self._as_given(line, cells, name, t, on_time)
+
+    def _timing(self, line: int, cells: Cells, channel: Channel | None) -> tuple[float, float, float | None] | None:
+        """Centre and on-time, s; the start rules where there is one.
+
+        Through a valve the centre is the centroid of the thrust, and the third is the start of the command, s.
+        """
+        column = next((column for column in STARTS if cells.get(column)), None)
+        if column is None:
+            self.table.fault(line, STARTS[0], "the time is missing")
+            return None
+        time, on_time = self.table.number(line, cells, column), self.table.number(line, cells, "on_time_s")
+        if time is None or on_time is None:
+            return None
+        if on_time < 0.0:
+            self.table.fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
+            return None
+        lead = None if channel is None or on_time == 0.0 else self._lead(line, channel, on_time)
+        centre = 0.5 * on_time if lead is None else lead
+        start = time if column == STARTS[0] else time - centre
+        if start < -1e-9:
+            self.table.fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
+            return None
+        t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
+        if not Pulse(t, on_time, "", np.zeros(3)).resolved:
+            step = math.ulp(t + 0.5 * on_time)
+            self.table.fault(
+                line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart"
+            )
+            return None
+        meant = f"start_s + on_time_s/2 = {t:g}" if lead is None else f"the centroid of the thrust, {t:g}"
+        self._compare(line, cells, (STARTS[1],), [t], meant, scale=max(t, on_time))
+        begins = max(start, 0.0) if column == STARTS[0] else t - centre
+        return t, on_time, None if lead is None else begins
+
+    def _lead(self, line: int, channel: Channel, on_time: float) -> float | None:
+        """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
+        if channel.valve is None:
+            return None
+        least, most = channel.valve.known
+        if not least <= on_time <= most:
+            problem = f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {least:g} s to {most:g} s"
+            self.table.fault(line, "on_time_s", problem)
+        thrust = channel.valve.thrust(on_time)
+        if not thrust.ramps:
+            text = f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not open"
+            self.table.warn(line, f"closed {channel.name}", text)
+        return thrust.centroid
+
+    def _expect(self, line: int, cells: Cells, pulse: Pulse) -> None:
+        """Warn where the row of a pulse says something else than the spacecraft file, which says what it does."""
+        if pulse.torque is None:
+            return
+        inertia, named = self.spacecraft.inertia, shown(pulse.channel)
+        torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
+        self._compare(line, cells, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
+        length = "on_time_s" if pulse.command is None else "effective_on_time_s"
+        self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
+        if pulse.propellant is not None:
+            used = f"{pulse.propellant:g} by the spacecraft file"
+            self._compare(line, cells, ("propellant_kg",), [pulse.propellant], used)
+        if pulse.command is not None:
+            meant = f"what the valve of {named} makes of the command"
+            for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
+                self._compare(line, cells, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)
+        self._compare_dates(line, cells, pulse)
+
+    def _as_given(self, line: int, cells: Cells, name: str, t: float, on_time: float) -> Pulse | None:
+        """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
+        inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.table.faults)
+        torque = self._vector(line, cells, TORQUE) if on_time > 0.0 else None
+        impulse = self._vector(line, cells, IMPULSE)
+        if torque is not None:
+            self._compare(line, cells, IMPULSE, torque * on_time, f"torque × on_time_s, {_vector(torque * on_time)}")
+            impulse = torque * on_time
+        if impulse is None:
+            if len(self.table.faults) == faults:
+                self.table.fault(line, "on_time_s" if channel else "channel", self._missing(name, channel, on_time))
+            return None
+        given = inertia.axes.T @ impulse
+        push = None if on_time == 0.0 else given / on_time
+        pulse = Pulse(t, on_time, name, given, push, None, self._propellant(line, name, channel, given, push))
+        self._compare_dates(line, cells, pulse)
+        return pulse
+
+    def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
+        """What a row lacks whose torque or impulse does not follow from the spacecraft file."""
+        impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
+        columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
+        if channel is not None:
+            return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
+        known = f" ({self._instead(name)})" if self.channels else ""
+        kind = "a steered pulse" if name == STEERABLE else f"{shown(name)}, not in the spacecraft file{known},"
+        return f"{kind} needs {columns}"
+
+    def _propellant(
+        self, line: int, name: str, channel: Channel | None, impulse: Vector, torque: Vector | None
+    ) -> float | None:
+        """Propellant of a pulse that flies as the schedule has it, kg; warns of what is not as in the file."""
+        if channel is not None:
+            ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
+            self.table.warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
+            return None
+        torquer = self.spacecraft.torquer
+        if name != STEERABLE or torquer is None:
+            known = ", ".join(map(shown, self.channels)) or STEERABLE
+            text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
+            self.table.warn(line, f"unknown {name}", text)
+            return None
+        size = 0.0 if torque is None else float(np.linalg.norm(torque))
+        if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
+            text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
+            self.table.warn(line, "steerable torque", text)
+        rate = torquer.propellant_per_impulse
+        return None if rate is None else rate * float(np.linalg.norm(impulse))
+
+    # --- cells -------------------------------------------------------------------------------------------------------
+
+    def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
+        """Three numbers; None where none is given, or one is a fault."""
+        if not any(cells.get(column) for column in columns):
+            return None
+        for column in columns:
+            cells.setdefault(column, "")
+        numbers = [self.table.number(line, cells, column) for column in columns]
+        return None if None in numbers else np.array(numbers, dtype=float)
+
+    def _compare(
+        self,
+        line: int,
+        cells: Cells,
+        columns: Sequence[str],
+        expected: Sequence[float] | Vector,
+        meant: str,
+        scale: float | None = None,
+    ) -> None:
+        """Warn where ``columns`` are given and say something else than what counts."""
+        texts = [cells.get(column, "") for column in columns]
+        if not any(texts):
+            return
+        try:
+            off = float(np.linalg.norm(np.array([float(text) for text in texts]) - expected))
+        except ValueError:
+            off = math.inf
+        if not off <= AGREES * (float(np.linalg.norm(expected)) if scale is None else scale):
+            named = columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
+            given = ", ".join(map(_brief, texts))
+            given = given if len(columns) == 1 else f"({given})"
+            self.table.warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
+
+    def _compare_dates(self, line: int, cells: Cells, pulse: Pulse) -> None:
+        expected = self.spacecraft.utc(pulse.loaded[0])
+        if not cells.get(UTC) or expected is None:
+            return
+        try:
+            off = abs(Epoch.parse(cells[UTC]).since(Epoch.parse(expected)))
+        except ValueError:
+            off = math.inf
+        if not off <= AGREES * max(pulse.t, 1.0):
+            self.table.warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
+
+
+def _vector(parts: Vector) -> str:
+    return "(" + ", ".join(f"{part:g}" for part in parts.tolist()) + ")"
+
+
+def _brief(text: str) -> str:
+    """The text of a cell, a number in six digits."""
+    try:
+        return f"{float(text):g}"
+    except ValueError:
+        return shown(text)

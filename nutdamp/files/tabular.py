@@ -1,0 +1,370 @@
+"""Writing: whole files or none, and numbers that read back as they were.
+
+Tables in CSV files that people write: rows by the names of columns, all faults at once, warnings once each.
+
+The track of a flight as a table: an array with named columns, and CSV.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common.numerics import cleaned, finite
+from nutdamp.errors import CannotWrite, Fault, FaultyFile, nearest
+from nutdamp.files.yaml import read_utf8
+from nutdamp.flight.track import Track, in_file_axes
+from nutdamp.spacecraft.model import Inertia
+from nutdamp.units import shown
+
+if sys.platform != "win32":
+    import fcntl
+
+STDOUT = "-"
+"""File name that means standard output."""
+
+PREFIX, SUFFIX = ".nutdamp-", ".part"
+"""How the names of temporary files begin and end."""
+
+ATTEMPTS = 10
+"""Temporary files that are made before giving up, where others remove them."""
+
+
+def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
+    """Write ``content`` to ``path``, or leave what was there; ``-`` is standard output. Raises CannotWrite.
+
+    What is long writes itself: it is called with the stream. Text becomes UTF-8; what has no place there, such as a
+    byte of a file name that is not UTF-8, becomes \\udcff.
+    """
+    with whole_file(path) as stream:
+        if callable(content):
+            content(stream)
+        else:
+            stream.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
+
+
+@contextmanager
+def whole_file(path: str) -> Iterator[IO[bytes]]:
+    """A file to write piece by piece, which takes its place at ``path`` when the block ends well, or never.
+
+    Until then it is a temporary file in the same folder. What is no plain file (a pipe, /dev/null, standard output
+    as ``-``) is written to directly. Raises CannotWrite.
+    """
+    try:
+        if path == STDOUT:
+            sys.stdout.flush()
+            yield sys.stdout.buffer
+            sys.stdout.buffer.flush()
+            return
+        target = check_place(path)
+        if target.exists() and not target.is_file():
+            with target.open("wb") as stream:
+                yield stream
+            return
+        with _replacing(target) as stream:
+            yield stream
+    except BrokenPipeError:
+        raise
+    except OSError as reason:
+        raise CannotWrite(path, reason.strerror or str(reason)) from reason
+
+
+def check_place(path: str) -> Path:
+    """Where a file is to stand, behind links; seen before long work to be a place that can be written to.
+
+    Raises CannotWrite where it cannot: also where links go round in a circle, or the name cannot be one.
+    """
+    if path == STDOUT:
+        return Path(path)
+    try:
+        target = Path(path).resolve()
+        if target.is_symlink() or target.parent.is_symlink():  # `resolve` may give up on a circle without a word
+            raise CannotWrite(path, "too many levels of symbolic links")
+        if target.is_dir():
+            raise CannotWrite(path, "it is a directory")
+        if not target.parent.is_dir():
+            raise CannotWrite(path, f"{target.parent} is no directory")
+        if not os.access(target if target.exists() else target.parent, os.W_OK):
+            raise CannotWrite(path, "permission denied")
+    except (OSError, RuntimeError, ValueError) as reason:  # RuntimeError: links in a circle; ValueError: a zero byte
+        raise CannotWrite(path, _said(reason)) from reason
+    return target
+
+
+def _said(reason: Exception) -> str:
+    """What the system says, without the path."""
+    return getattr(reason, "strerror", None) or str(reason).partition(" from ")[0]
+
+
+def make_folder(path: str) -> None:
+    """Make the folder ``path`` unless it is there. Raises CannotWrite."""
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except FileExistsError as reason:
+        raise CannotWrite(path, "it is there, and no directory") from reason
+    except (OSError, ValueError) as reason:
+        raise CannotWrite(path, _said(reason)) from reason
+
+
+@contextmanager
+def _replacing(target: Path) -> Iterator[IO[bytes]]:
+    remove_abandoned(target.parent)
+    handle, temporary = _locked_file(target.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            if target.exists():
+                temporary.chmod(target.stat().st_mode & 0o7777)
+            else:
+                mask = os.umask(0)
+                os.umask(mask)
+                temporary.chmod(0o666 & ~mask)
+            if sys.platform == "win32":
+                stream.close()  # there an open file cannot be renamed; here it keeps its lock until it is
+            temporary.replace(target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _locked_file(folder: Path) -> tuple[int, Path]:
+    """A new temporary file in ``folder``, open, and locked until it is closed or the process ends."""
+    for _ in range(ATTEMPTS):
+        handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=folder)
+        with suppress(OSError):  # of a file system that knows no locks
+            _lock(handle)
+        if Path(name).exists():
+            return handle, Path(name)
+        os.close(handle)  # another run took it for abandoned just before it was locked
+    raise FileNotFoundError(f"temporary files in {folder} are removed as soon as they are made")
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the temporary files of runs that were killed: those that no process has locked."""
+    if sys.platform == "win32":
+        return
+    for path in folder.glob(f"{PREFIX}*{SUFFIX}"):
+        with suppress(OSError):
+            handle = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
+            try:
+                _lock(handle)
+                path.unlink()
+            finally:
+                os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock an open file until it is closed or the process ends. Raises OSError, also where another process has."""
+    if sys.platform != "win32":
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def number(value: float | None) -> str:
+    """A number with 17 significant digits at most, the shortest text that reads back the same; None is empty."""
+    return "" if value is None or not math.isfinite(value) else repr(float(value))
+
+
+def truth(value: bool | None) -> str:
+    """Yes or no as CSV has it; None is empty."""
+    return "" if value is None else str(value).lower()
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table as RFC 4180 CSV."""
+    stream = io.StringIO()
+    writer = csv.writer(stream)
+    writer.writerow(header)
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def json_text(data: dict[str, Any]) -> str:
+    """JSON with numbers that are not finite as null, characters that control a terminal escaped, newline at the end."""
+    text = json.dumps(finite(data), indent=2, ensure_ascii=False, allow_nan=False)
+    # Those below a blank are escaped already.
+    return re.sub("[\x7f-\x9f\u2028\u2029]", lambda found: f"\\u{ord(found[0]):04x}", text) + "\n"
+
+
+HEADER = (
+    "t_s",
+    "omega_1_rad_s",
+    "omega_2_rad_s",
+    "omega_3_rad_s",
+    "q_w",
+    "q_x",
+    "q_y",
+    "q_z",
+    "axis_x",
+    "axis_y",
+    "axis_z",
+    "momentum_x_Nms",
+    "momentum_y_Nms",
+    "momentum_z_Nms",
+    "nutation_deg",
+    "body_cone_deg",
+    "space_cone_deg",
+    "pulse",
+)
+
+
+ROW = np.dtype([(name, np.int64 if name == "pulse" else np.float64) for name in HEADER])
+"""One row of the track."""
+
+
+def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
+    """One row a sample, fields as in `HEADER`; rates and quaternion (scalar first) in the axes of the file."""
+    turned = in_file_axes(track, inertia)
+    cones = np.degrees(np.column_stack([track.nutation, track.body_cone, track.space_cone]))
+    vectors = map(cleaned, (turned.rates, turned.quaternion, track.axis, track.momentum))
+    table = np.column_stack([track.t, *vectors, cones])
+    rows = np.empty(len(track.t), dtype=ROW)
+    for name, column in zip(HEADER[:-1], table.T, strict=True):
+        rows[name] = column
+    rows["pulse"] = track.pulse
+    return rows
+
+
+def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) -> None:
+    """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
+    stream.write(f"{','.join(HEADER)}\r\n".encode())
+    for piece in pieces:
+        if not len(piece.t):
+            continue
+        stream.write(_lines(track_array(piece, inertia).tolist()).encode())
+
+
+def _lines(rows: list[tuple[float, ...]]) -> str:
+    """Rows of finite numbers as CSV, each by its repr: the shortest text that reads back the same."""
+    return repr(rows)[2:-2].replace("), (", "\r\n").replace(", ", ",") + "\r\n"
+
+
+LARGEST = 1e15
+"""Larger magnitudes are nothing of a spacecraft, and would overflow later."""
+
+MOST_BYTES = 32 << 20
+"""Of a file: many times more than its most rows take."""
+
+MOST_ROWS = 100_000
+"""Rows of a file."""
+
+MOST_FAULTS = 5
+"""Faults of one column that are listed."""
+
+Cells = dict[str, str]
+
+
+class Table:
+    """The rows of one file, below its first line, which names the columns.
+
+    ``header`` (the names) and ``rows``, each the number of its line and its cells. Raises CannotRead, and FaultyFile
+    for what is no table.
+    """
+
+    def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
+        """``columns`` that are known; ``what`` a row is, for messages."""
+        self.name, self.known = str(path), columns
+        self.faults: list[Fault] = []
+        self.warnings: dict[str, list[tuple[int, str]]] = {}
+        reader = csv.reader(io.StringIO(read_utf8(self.name, MOST_BYTES), newline=""))
+        try:
+            rows = [(reader.line_num, row) for row in reader if row]
+        except csv.Error as reason:
+            raise FaultyFile([Fault(self.name, reader.line_num, 1, "", f"not CSV: {reason}")]) from reason
+        if not rows:
+            problem = f"empty; the first line names the columns: {','.join(columns)}"
+            raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
+        if len(rows) > MOST_ROWS + 1:
+            raise FaultyFile([Fault(self.name, rows[-1][0], 1, "", f"more than {MOST_ROWS} {what}")])
+        self.header, self.rows = [entry.strip() for entry in rows[0][1]], rows[1:]
+        if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
+            problem = "columns are separated by commas, not by semicolons or tabs"
+            raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
+
+    def expect(self, *columns: str) -> None:
+        """A fault for each of the ``columns`` that is missing, or that is given twice; raises FaultyFile with all.
+
+        Warns of columns that are not known.
+        """
+        for column in columns:
+            if column not in self.header:
+                self.fault(1, column, f"the column is missing{self.misspelt(column)}")
+        for column in dict.fromkeys(entry for entry in self.header if self.header.count(entry) > 1):
+            self.fault(1, column, "the column is given twice")
+        self.check()
+        for column in self.header:
+            if column not in self.known:
+                self.warn(1, column, f"the column {shown(column)} is not known: ignored")
+
+    def check(self) -> None:
+        """Raises FaultyFile with the faults so far, if there are any; of many in one column with the first."""
+        if self.faults:
+            raise FaultyFile(self._first())
+
+    def _first(self) -> list[Fault]:
+        """The faults, of more than `MOST_FAULTS` in one column the first and how many more there are."""
+        kept = []
+        for where in dict.fromkeys(fault.where for fault in self.faults):
+            every = [fault for fault in self.faults if fault.where == where]
+            kept += every[:MOST_FAULTS]
+            more = every[MOST_FAULTS:]
+            kept += more if len(more) < 2 else [more[0]._replace(problem=f"and {len(more)} more such rows")]
+        return kept
+
+    def misspelt(self, column: str) -> str:
+        """The column of the header that may be meant to be a missing one, in words."""
+        found = nearest(column, [entry for entry in self.header if entry not in self.known])
+        return "" if found is None else f"; rename {shown(found)} if that is meant"
+
+    def cells(self, line: int, row: list[str]) -> Cells | None:
+        """The cells of a row by the names of the columns; None for a fault."""
+        if len(row) != len(self.header):
+            self.fault(line, "", f"{len(row)} values under {len(self.header)} columns")
+            return None
+        return dict(zip(self.header, (entry.strip() for entry in row), strict=True))
+
+    def number(self, line: int, cells: Cells, column: str) -> float | None:
+        """The number in a cell that must have one; None for a fault."""
+        try:
+            value = float(cells[column])
+        except ValueError:
+            self.fault(line, column, f"{shown(cells[column])} is not a number")
+            return None
+        if not abs(value) <= LARGEST:
+            problem = f"{shown(cells[column])} is out of range, {-LARGEST:g} to {LARGEST:g}"
+            self.fault(line, column, problem)
+            return None
+        return value
+
+    def fault(self, line: int, where: str, problem: str) -> None:
+        """Keep a fault in the column ``where``."""
+        self.faults.append(Fault(self.name, line, 1, where, problem))
+
+    def warn(self, line: int, subject: str, text: str) -> None:
+        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
+        self.warnings.setdefault(subject, []).append((line, text))
+
+    @property
+    def warned(self) -> list[str]:
+        """The warnings in words, with file and line."""
+        return [self._worded(found) for found in self.warnings.values()]
+
+    def _worded(self, found: list[tuple[int, str]]) -> str:
+        line, text = found[0]
+        others = len(found) - 1
+        more = f" (and so in {others} more row{'s' if others > 1 else ''})" if others else ""
+        return f"{self.name}:{line}: {text}{more}"

@@ -1,0 +1,445 @@
+"""YAML text -> plain values that remember where they are, by the core schema of YAML 1.2.
+
+Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a bomb of aliases
+is refused before it unfolds. JSON is read by the same path. Whatever is wrong becomes `FaultyFile` with its place.
+
+Reading texts that people or other tools wrote.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import stat
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+from yaml.parser import Parser
+from yaml.reader import Reader, ReaderError
+from yaml.scanner import Scanner
+
+from nutdamp.errors import CannotRead, Fault, FaultyFile
+from nutdamp.files.fields import KeyPath as KeyPath
+from nutdamp.units import shown
+
+STDIN = "-"
+"""File name that means standard input."""
+
+
+def read_bytes(path: str, most: int = -1) -> bytes:
+    """What is in a file, at most ``most`` bytes of it; ``-`` is standard input. Raises CannotRead."""
+    try:
+        if path == STDIN:
+            if sys.stdin is None:
+                raise CannotRead(path, "there is no standard input")
+            return sys.stdin.buffer.read(most)
+        if _is_device(Path(path)):
+            raise CannotRead(path, "it is a device; expected a file, a pipe or -")
+        with Path(path).open("rb") as stream:
+            return stream.read(most)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CannotRead(path, reason.lower()) from error
+
+
+def _is_device(path: Path) -> bool:
+    """Whether reading may go on for ever, or do something: a device that is no terminal, or a socket."""
+    mode = path.stat().st_mode
+    if stat.S_ISCHR(mode):
+        with path.open("rb") as stream:
+            return not stream.isatty()
+    return stat.S_ISBLK(mode) or stat.S_ISSOCK(mode)
+
+
+def read_limited(path: str, most: int) -> bytes:
+    """What is in a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is larger."""
+    data = read_bytes(path, most + 1)
+    if len(data) > most:
+        raise FaultyFile([Fault(path, 1, 1, "", f"larger than {most >> 20} MiB")])
+    return data
+
+
+def read_utf8(path: str, most: int) -> str:
+    """The text of a file of at most ``most`` bytes, without a byte order mark; raises CannotRead or FaultyFile."""
+    return utf8_text(read_limited(path, most), path)
+
+
+def utf8_text(data: bytes, name: str) -> str:
+    """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file ``name``."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as reason:
+        raise FaultyFile([Fault(name, 1, 1, "", f"not UTF-8 text (byte {reason.start})")]) from reason
+
+
+MAX_BYTES = 1 << 20
+MAX_NODES = 10_000
+"""Values in a file, those that aliases repeat counted each time."""
+MAX_DEPTH = 32
+
+
+class Place(NamedTuple):
+    """Line and column of a value, both from 1; 0 where there are none.
+
+    What does not come from the file but is set beside it says so in ``setting``, as messages name it.
+    """
+
+    line: int = 0
+    column: int = 0
+    setting: str = ""
+
+    def __str__(self) -> str:
+        return self.setting or f"line {self.line}, column {self.column}"
+
+    def fault(self, name: str, where: str, problem: str) -> Fault:
+        """A fault here; ``name`` is that of the file."""
+        return Fault(self.setting or name, self.line, self.column, where, problem)
+
+
+Scalar = str | int | float | bool | None
+
+
+@dataclass(slots=True)
+class Node:
+    """A value and where it is; ``keys`` holds the places of a mapping's keys."""
+
+    value: Scalar | dict[str, Node] | list[Node]
+    place: Place
+    keys: dict[str, Place] = field(default_factory=dict)
+    size: int = 1
+
+    def get(self, *path: str | int) -> Node | None:
+        """The node at ``path`` below this one; None where there is none."""
+        node: Node | None = self
+        for step in path:
+            value, node = (None if node is None else node.value), None
+            if isinstance(value, dict) and isinstance(step, str):
+                node = value.get(step)
+            elif isinstance(value, list) and isinstance(step, int) and step < len(value):
+                node = value[step]
+        return node
+
+    def children(self) -> Iterator[tuple[str | int, Node]]:
+        """Keys or positions, and what is there; nothing for a scalar."""
+        if isinstance(self.value, dict):
+            yield from self.value.items()
+        elif isinstance(self.value, list):
+            yield from enumerate(self.value)
+
+    def plain(self) -> object:
+        """Dicts, lists, texts, numbers, booleans and None, without places."""
+        if isinstance(self.value, dict):
+            return {key: child.plain() for key, child in self.value.items()}
+        if isinstance(self.value, list):
+            return [child.plain() for child in self.value]
+        return self.value
+
+    def place_of(self, path: KeyPath) -> Place:
+        """Where the value at ``path`` is, or the innermost of its parents that exists."""
+        for length in range(len(path), 0, -1):
+            node = self.get(*path[:length])
+            if node is not None:
+                return node.place
+        return self.place
+
+    def key_place_of(self, path: KeyPath) -> Place:
+        """Where the key of ``path`` is; of a list entry or the root, the value."""
+        parent = self.get(*path[:-1]) if path else None
+        if parent is not None and isinstance(path[-1], str) and path[-1] in parent.keys:
+            return parent.keys[path[-1]]
+        return self.place_of(path)
+
+
+def dotted(path: KeyPath) -> str:
+    """``thrusters[1].force``; keys that are no plain words are quoted."""
+    text = ""
+    for step in path:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            word = step if re.fullmatch(r"[\w+-]{1,60}", step) else shown(step)
+            text += f".{word}" if text else word
+    return text
+
+
+def read_text(path: Path) -> str:
+    """Text of a file; raises `CannotRead`, or `FaultyFile` where it is too large, binary or not UTF-8."""
+    return decode(read_bytes(str(path), MAX_BYTES + 1), str(path))
+
+
+def decode(data: bytes, name: str) -> str:
+    """Text of UTF-8 bytes, without a byte order mark; raises `FaultyFile`."""
+
+    def fault(position: int, problem: str) -> FaultyFile:
+        before = data[:position].decode(errors="replace")
+        return FaultyFile([_place(before, len(before)).fault(name, "", problem)])
+
+    if len(data) > MAX_BYTES:
+        raise FaultyFile([Fault(name, 0, 0, "", "larger than 1 MiB; that is no spacecraft file")])
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise fault(0, "the text is UTF-16; save it as UTF-8")
+    if b"\0" in data:
+        position = data.index(b"\0")
+        raise fault(position, f"binary data (a zero byte at byte {position}); expected a YAML text")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # Python counts from behind a byte order mark here.
+        position = error.start + 3 * data.startswith(b"\xef\xbb\xbf")
+        raise fault(position, f"not UTF-8 (byte {position} is 0x{data[position]:02x}); save it as UTF-8") from None
+
+
+def read_tree(text: str, name: str) -> tuple[Node, list[Fault]]:
+    """The mapping in a YAML text, and the faults that leave it readable (duplicate keys: the first one counts).
+
+    Raises `FaultyFile` where it is not one document with one mapping, of core values only, of sensible size.
+    """
+    builder = _Builder(text.removeprefix("\ufeff"), name)
+    root = builder.document("a spacecraft file is a mapping with name, inertia, …", "one file holds one spacecraft")
+    if not isinstance(root.value, dict):
+        problem = f"expected a mapping with name, inertia, …, got {shown(root.plain())}"
+        raise builder.fatal(root.place, problem)
+    return root, builder.faults
+
+
+def read_value(text: str, name: str) -> tuple[Node, list[Fault]]:
+    """Any one value in a YAML text, such as ``8 deg`` or ``[[10 s, 20 s]]``, and its faults, as `read_tree` gives them.
+
+    Raises `FaultyFile` where it is not one value.
+    """
+    builder = _Builder(text, name)
+    return builder.document("expected a value", "expected one value"), builder.faults
+
+
+class _Events(Reader, Scanner, Parser):
+    """PyYAML's event stream in pure Python, whose messages are the same on every machine."""
+
+    def __init__(self, text: str) -> None:
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+
+    def scan_to_next_token(self) -> None:
+        # YAML allows tabs wherever they do not indent, and JSON is often indented with them; PyYAML allows none.
+        super().scan_to_next_token()
+        while self.peek() == "\t" and (self.flow_level or not self.allow_simple_key):
+            self.forward()
+            super().scan_to_next_token()
+
+
+class _Builder:
+    """Builds the nodes of one text from its events."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self.text, self.name = text, name
+        self.faults: list[Fault] = []
+        self.anchors: dict[str, Node | None] = {}  # None while the anchored value is still open
+        self.nodes = 0
+        try:
+            self.events = _Events(text)
+        except ReaderError as error:
+            place = _place(text, error.position)
+            raise self.fatal(place, f"the character {chr(error.character)!r} is not allowed in a text") from None
+
+    def fatal(self, place: Place, problem: str, path: KeyPath = ()) -> FaultyFile:
+        """A fault after which reading on makes no sense, together with those found so far."""
+        return FaultyFile([*self.faults, place.fault(self.name, dotted(path), problem)])
+
+    def next(self) -> yaml.Event:
+        """The next event; raises `FaultyFile` where the text is not YAML."""
+        try:
+            event: yaml.Event = self.events.get_event()  # type: ignore[no-untyped-call]
+        except yaml.MarkedYAMLError as error:
+            raise self.fatal(*_syntax_fault(error)) from None
+        except (ValueError, OverflowError):  # such as "\UFFFFFFFF", which is no character
+            place = Place(self.events.line + 1, self.events.column + 1)
+            raise self.fatal(place, "not YAML: a number here is out of range") from None
+        return event
+
+    def document(self, needed: str, single: str) -> Node:
+        """The only document of the stream; ``needed`` and ``single`` say what to do about none and about several."""
+        self.next()
+        event = self.next()
+        if isinstance(event, yaml.StreamEndEvent):
+            what = "only comments" if self.text.strip() else "empty"
+            raise self.fatal(Place(1, 1), f"{what}; {needed}")
+        root = self.node(self.next(), ())
+        self.next()
+        event = self.next()
+        if not isinstance(event, yaml.StreamEndEvent):
+            raise self.fatal(_start(event), f"a second document begins; {single}")
+        return root
+
+    def node(self, event: yaml.Event, path: KeyPath) -> Node:
+        """The value that ``event`` begins."""
+        place = _start(event)
+        if isinstance(event, yaml.AliasEvent):
+            node = self.alias(event, path)
+            self.count(node.size, place, path)
+            return node
+        assert isinstance(event, yaml.NodeEvent)
+        self.count(1, place, path)
+        if len(path) > MAX_DEPTH:
+            raise self.fatal(place, f"nested more than {MAX_DEPTH} levels deep")
+        if event.anchor is not None:
+            self.anchors[event.anchor] = None
+        if isinstance(event, yaml.ScalarEvent):
+            node = Node(self.scalar(event, path), place)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            node = self.sequence(event, path)
+        else:
+            node = self.mapping(event, path)
+        if event.anchor is not None:
+            self.anchors[event.anchor] = node
+        return node
+
+    def count(self, nodes: int, place: Place, path: KeyPath) -> None:
+        """Adds to the number of values and stops bombs."""
+        self.nodes += nodes
+        if self.nodes > MAX_NODES:
+            raise self.fatal(place, f"more than {MAX_NODES} values (aliases unfolded)", path[:1])
+
+    def alias(self, event: yaml.AliasEvent, path: KeyPath) -> Node:
+        """The value that an alias refers to."""
+        name = str(event.anchor)
+        node = self.anchors.get(name)
+        if node is not None:
+            return node
+        problem = "lies inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
+        raise self.fatal(_start(event), f"alias {shown('*' + name)} {problem}", path)
+
+    def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
+        """A list, up to its end event."""
+        self.check_tag(event.tag, ("seq",), _start(event), path)
+        entries: list[Node] = []
+        while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
+            entries.append(self.node(entry, (*path, len(entries))))
+        return Node(entries, _start(event), size=1 + sum(entry.size for entry in entries))
+
+    def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
+        """A mapping, up to its end event; a key that comes again is reported and its value dropped."""
+        assert isinstance(event, yaml.MappingStartEvent)
+        self.check_tag(event.tag, ("map",), _start(event), path)
+        values: dict[str, Node] = {}
+        keys: dict[str, Place] = {}
+        while not isinstance(key := self.next(), yaml.MappingEndEvent):
+            place = _start(key)
+            if not isinstance(key, yaml.ScalarEvent):
+                raise self.fatal(place, "a key must be a plain text", path)
+            text = self.characters(key.value, place, path)
+            self.check_tag(key.tag, ("str",), place, (*path, text))
+            if key.anchor is not None:
+                self.anchors[key.anchor] = Node(text, place)
+            value = self.node(self.next(), (*path, text))
+            if text in values:
+                problem = f"duplicate key; already given at {keys[text]}; remove one of them"
+                self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
+            else:
+                values[text], keys[text] = value, place
+        return Node(values, _start(event), keys, 1 + sum(node.size for node in values.values()))
+
+    def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
+        """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag overrides it."""
+        place = _start(event)
+        text = self.characters(event.value, place, path)
+        if event.tag is None:
+            return text if event.style else resolve(text)
+        if event.tag in ("!", f"{_CORE}str"):
+            return text
+        value = resolve(text)
+        self.check_tag(event.tag, _TAGS[type(value)], place, path)
+        return float(value) if event.tag == f"{_CORE}float" and isinstance(value, int) else value
+
+    def check_tag(self, tag: str | None, allowed: tuple[str, ...], place: Place, path: KeyPath) -> None:
+        """Raises `FaultyFile` for a tag that does not fit the value, above all one that needs an object."""
+        if tag not in (None, "!", *(f"{_CORE}{name}" for name in allowed)):
+            name = str(tag).replace(_CORE, "!!")
+            raise self.fatal(place, f"the tag {shown(name)} does not fit here; leave it out", path)
+
+    def characters(self, text: str, place: Place, path: KeyPath) -> str:
+        """The text with the surrogate pairs of JSON escapes joined; a lone half is no character."""
+        try:
+            return text.encode("utf-16", "surrogatepass").decode("utf-16")
+        except UnicodeDecodeError:
+            raise self.fatal(place, "half a surrogate pair; write the character itself", path) from None
+
+
+_CORE = "tag:yaml.org,2002:"
+_TAGS: dict[type, tuple[str, ...]] = {
+    str: ("str",),
+    int: ("int", "float"),
+    float: ("float",),
+    bool: ("bool",),
+    type(None): ("null",),
+}
+
+_WORDS: dict[str, Scalar] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
+    **dict.fromkeys((f"{sign}{word}" for sign in ("", "+") for word in (".inf", ".Inf", ".INF")), math.inf),
+    **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), -math.inf),
+}
+_NUMBER = re.compile(
+    r"(?P<dec>[-+]?[0-9]+)|0o(?P<oct>[0-7]+)|0x(?P<hex>[0-9a-fA-F]+)"
+    r"|(?P<float>[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?)"
+)
+_BASES = {"dec": 10, "oct": 8, "hex": 16}
+
+
+def resolve(text: str) -> Scalar:
+    """Value of a plain scalar by the core schema of YAML 1.2 (10.3.2); what is nothing else is text."""
+    if text in _WORDS:
+        return _WORDS[text]
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        return text
+    kind = match.lastgroup or ""
+    if kind not in _BASES:
+        return float(text)
+    # No number of a file has so many digits, and Python refuses to convert very long ones.
+    return int(match[kind], _BASES[kind]) if len(text) <= 300 else math.inf
+
+
+# What PyYAML's scanner and parser say, and what a person can do about it; True where the slip lies where the
+# construct began and not where reading it failed.
+_SYNTAX = (
+    (r"'\\t' that cannot start", "a tab indents here; use spaces", False),
+    (r"mapping values are not", "a second ': ' in one line, or wrong indentation; quote texts that hold ': '", False),
+    (r"could not find expected ':'", "no 'key: value' (a space must follow the colon)", True),
+    (r"unexpected end of stream", "the quotation mark is never closed", True),
+    (r"unknown escape", "unknown \\ escape; use single quotes for texts with a backslash", False),
+    (r"expected <block end>", "indentation that fits no line above, or text behind a closed value", False),
+    (r"expected ',' or '[\]}]'", "a comma or the closing bracket is missing", False),
+    (r"sequence entries are not", "'- ' where no list can begin; put it on a line of its own", False),
+    (r"expected the node content", "a value is missing before this", False),
+    (r"'<document start>'", "text behind the end of the file's mapping", False),
+    (r"cannot start any token", "a text that begins with a reserved character; put it in quotes", False),
+    (r"undefined tag handle", "an unknown tag; leave it out", False),
+)
+
+
+def _syntax_fault(error: yaml.MarkedYAMLError) -> tuple[Place, str]:
+    """Place and wording of a syntax error: own words for the frequent slips, PyYAML's for the rest."""
+    problem = " ".join(str(error.problem).split())
+    _, cure, at_beginning = next((slip for slip in _SYNTAX if re.search(slip[0], problem)), ("", problem, False))
+    return _mark_place(error.context_mark if at_beginning else error.problem_mark), f"not YAML: {cure}"
+
+
+def _start(event: yaml.Event) -> Place:
+    return _mark_place(event.start_mark)
+
+
+def _mark_place(mark: Any) -> Place:
+    """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
+    return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
+
+
+def _place(text: str, position: int) -> Place:
+    before = text[:position]
+    return Place(before.count("\n") + 1, position - (before.rfind("\n") + 1) + 1)

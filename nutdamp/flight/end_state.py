@@ -1,0 +1,269 @@
+"""How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included.
+
+What has become of a body by a given time, and how far two models of the same flight are apart.
+
+What pulses add to the velocity: the integral of their forces as the body turns.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.requirements import Left, Part
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
+"""Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
+
+
+def momentum_gained(flown: Flight) -> Vector:
+    """∫ R(t) F dt over all pulses, (3,) N s, by Gauss-Legendre over stretches of at most half a radian."""
+    gained = np.zeros(3)
+    nodes, weights = np.array([(sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)]).T
+    for leg in flown.legs:
+        firing = [p for p in flown.schedule if p.thrust[0] <= leg.start and leg.end <= p.thrust[1]]
+        if leg.end == leg.start or not any(p.force is not None and p.force.any() for p in firing):
+            continue
+        ends = leg.path.motion(np.array([leg.start, leg.end]))[0]
+        turned = float(np.linalg.norm(ends, axis=1).max()) * (leg.end - leg.start)
+        edges = np.linspace(leg.start, leg.end, math.ceil(turned / 0.5) + 1)
+        middles, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * (edges[1] - edges[0])
+        times = (middles[:, None] + half * nodes).ravel()
+        pushes = attitude.rotate(leg.path.motion(times)[1], _forces(firing, times)).reshape(-1, len(nodes), 3)
+        gained += half * np.einsum("snc,n->c", pushes, weights)
+    return gained
+
+
+def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
+    """Force (3,) N of pulses, or (n, 3) at the ``times`` (n,) s where that of one of them rises or falls."""
+    total = np.zeros(3)
+    for pulse in firing:
+        if pulse.force is None:
+            continue
+        if pulse.command is None:
+            total = total + pulse.force
+            continue
+        corners = [(ramp.begin, ramp.first) for ramp in pulse.command.ramps]
+        corners += [(ramp.end, ramp.last) for ramp in pulse.command.ramps]
+        places, levels = np.array(sorted(corners, key=lambda one: one[0])).T
+        total = total + np.interp(times, places, levels)[:, None] * pulse.force
+    return np.asarray(total)
+
+
+SHARE = 0.1
+"""Of a bound of the requirement, by which the impulse sum may err."""
+
+ANGLE = math.radians(0.01)
+"""rad by which it may err where nothing is required."""
+
+
+class Deviation(NamedTuple):
+    """By how much the impulse sum errs in a part, and the ``most`` by which it may (rad, rad/s)."""
+
+    part: Part
+    error: float
+    most: float
+
+    def __str__(self) -> str:
+        if self.part is Part.SPIN:
+            return f"{self.error:.2g} rad/s of {self.part.label}"
+        return f"{math.degrees(self.error):.2g} deg of {self.part.label}"
+
+
+def seen_at(flight: Flight, time: float) -> Flight:
+    """The flight as it has come by ``time`` s, which it must reach: residual, final state and rows end there.
+
+    Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
+    """
+    rates, quaternion = flight.motion(np.array([time]))
+    first, second, third = rates[0].tolist()
+    begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
+    kept = [index for index, one in enumerate(begun) if one]
+    return replace(
+        flight,
+        schedule=flight.schedule
+        if len(kept) == len(flight.schedule)
+        else Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
+        settled=SpinState(complex(first, second), third, quaternion[0]),
+        spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
+        until=time,
+    )
+
+
+def spin_phases(flight: Flight, times: Vector) -> Vector:
+    """Magnus 1970 (2): α = ∫ω3 dt from t = 0 to each of the ascending ``times`` (n,) s, rad.
+
+    By Simpson's rule over stretches of at most half a radian, exact where ω3 is constant or changes linearly.
+    """
+    last = float(times[-1]) if len(times) else 0.0
+    edges = sorted({0.0, *times.tolist(), *(leg.end for leg in flight.legs if leg.end <= last)})
+    phases, phase = {0.0: 0.0}, 0.0
+    for begin, end in itertools.pairwise(edges):
+        spins = abs(flight.motion(np.array([begin, end]))[0][:, 2])
+        count = 2 * math.ceil(float(spins.max()) * (end - begin) / 0.5) + 2
+        spin = flight.motion(np.linspace(begin, end, count + 1)[:-1])[0][:, 2]
+        final = flight.motion(np.array([np.nextafter(end, begin)]))[0][0, 2]  # before a jump at the end
+        weights = np.ones(count)
+        weights[1::2], weights[2::2] = 4.0, 2.0
+        phase += (end - begin) / (3.0 * count) * float(weights @ spin + final)
+        phases[end] = phase
+    return np.array([phases[time] for time in times.tolist()])
+
+
+def left_by(flight: Flight) -> Left:
+    """What a flight leaves, as `compliance` takes it."""
+    residual = flight.residual
+    return Left(residual.nutation, residual.axis_error, flight.settled.spin)
+
+
+def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
+    """By how much models may differ in nutation, in the direction of H, and in the spin where the goal names one.
+
+    A tenth of what is required; `ANGLE` for a part that nothing bounds.
+    """
+    required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
+    return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
+
+
+def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:
+    """In what two flights of one spacecraft end farther apart than is `tolerated`."""
+    body = one.spacecraft
+    ends = [left_by(flight) for flight in (one, other)]
+    found = []
+    for part, most in tolerated(body).items():
+        first, second = (end.spin if part is Part.SPIN else requirements.left_of(part, end, body) for end in ends)
+        if abs(first - second) > most:
+            found.append(Deviation(part, abs(first - second), most))
+    return tuple(found)
+
+
+ROWS = 48
+"""Rows in each nutation period; between them the moment is found by a parabola, and then looked for about it."""
+
+CLOSE, LOOKS, FINER = 3, 3, 9
+"""About so many moments it is looked so many times, at so many places: a pulse on its way bends the curve there."""
+
+TRIED = 8
+"""Of the turns of the axis those at which it is looked at closely."""
+
+
+class Aspect(NamedTuple):
+    """The ``least`` and the ``largest`` angle, rad, from the direction of ``keep`` to the spin axis, and when (s)."""
+
+    keep: Keep
+    least: float
+    least_at: float
+    largest: float
+    largest_at: float
+
+    @property
+    def too_near(self) -> bool:
+        """Whether the axis comes nearer than it may."""
+        return self.least < self.keep.least - SLACK
+
+    @property
+    def kept(self) -> bool:
+        """Whether the axis stays as near and as far as it is to."""
+        return bool(self.keep.used(self.least, self.largest) <= 1.0)
+
+
+def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
+    """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
+
+    Default: one inertial nutation period after the last pulse. A flight that ends earlier is flown on by its model.
+    Raises Infeasible as `flight.flown` does.
+    """
+    body = flown.spacecraft
+    if not body.watched:
+        return ()
+    end = flown.schedule.end + body.inertial_period if until is None else until
+    if flown.legs[-1].end < end:
+        fly = propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
+        flown = fly(body, flown.schedule, end)
+    period = min(body.inertial_period, body.body_period)
+    pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
+    times = np.concatenate([piece.t for piece in pieces])
+    axis = np.concatenate([piece.axis for piece in pieces])
+    found = []
+    for keep in body.watched:
+        nearness = axis @ keep.direction
+        tops = [
+            _closer(flown, way * keep.direction, _peaks(times, way * nearness), period / ROWS, end)
+            for way in (1.0, -1.0)  # farthest from a direction is nearest to the opposite one
+        ]
+        looked = np.concatenate(tops)
+        angles = attitude.angle_between(flown.axis(looked), keep.direction)
+        near, far = int(np.argmin(angles)), int(np.argmax(angles))
+        found.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
+    return tuple(found)
+
+
+def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
+    """The first of the directions to which the axis comes too near, or from which too far; None where there is none."""
+    return next((one for one in aspects(flown) if not one.kept), None) if spacecraft.keep else None
+
+
+def at_target(spacecraft: Spacecraft) -> Aspect | None:
+    """The first cone that an axis on the target breaks, at no time; None where there is none, or no target."""
+    if spacecraft.goal.axis is None:
+        return None
+    found = (_seen(spacecraft.goal.axis, keep, math.inf) for keep in spacecraft.keep)
+    return next((one for one in found if not one.kept), None)
+
+
+def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
+    """Each direction that the spacecraft watches, from the spin axis at t = 0."""
+    return tuple(_seen(spacecraft.axis, keep, 0.0) for keep in spacecraft.watched)
+
+
+def _seen(axis: Vector, keep: Keep, time: float) -> Aspect:
+    angle = float(attitude.angle_between(axis, keep.direction))
+    return Aspect(keep, angle, time, angle, time)
+
+
+def _closer(flown: Flight, direction: Vector, times: Vector, width: float, end: float) -> Vector:
+    """Moments up to ``end`` within ``width`` s of the ``times`` (n,) at which the axis is nearest.
+
+    Each look is among places a quarter as far apart as before, with a parabola in the square of the distance.
+    """
+    rough = attitude.angle_between(flown.axis(times), direction)
+    times = times[np.argsort(rough, kind="stable")[:CLOSE]]
+    for _ in range(LOOKS):
+        places = np.clip(times[:, None] + width * np.linspace(-1.0, 1.0, FINER), 0.0, end)
+        apart = np.sum((flown.axis(places.ravel()) - direction) ** 2, axis=1).reshape(places.shape)
+        best = np.argmin(apart, axis=1, keepdims=True)
+        middle = np.clip(best, 1, FINER - 2)
+        before, here, after = (np.take_along_axis(apart, middle + step, axis=1) for step in (-1, 0, 1))
+        bend, inside = before - 2.0 * here + after, best == middle
+        way = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0))
+        width *= 2.0 / (FINER - 1)
+        times = np.clip(np.take_along_axis(places, best, axis=1) + width * way, 0.0, end)[:, 0]
+    return times
+
+
+def _peaks(times: Vector, values: Vector) -> Vector:
+    """The times at which ``values`` (n,) may be largest: of the largest row, and on parabolas through three in a row.
+
+    Of the parabolas with their top between the three the `TRIED` highest count. Rows at the same time, before and after
+    a jump, are no neighbours.
+    """
+    before, after = np.diff(times)[:-1], np.diff(times)[1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after
+        way = 0.5 * (rise * after + fall * before) / (rise - fall)
+        peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
+    before, after, rise, fall, way = (one[peaked] for one in (before, after, rise, fall, way))
+    heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
+    highest = np.argsort(-heights)[:TRIED]
+    return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

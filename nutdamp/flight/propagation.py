@@ -1,0 +1,613 @@
+"""Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
+
+Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
+impulses. `flown` is the judge: real widths, true moments. Both give legs that tell the motion at any time.
+
+How a body moves from one moment to the next: the arcs and Taylor pieces of which flights are made.
+
+Motion without jumps between two moments: the coast of a symmetric body in closed form, or Taylor pieces.
+
+How light the propellant that is used leaves the body: principal moments that fall along a schedule.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common import work
+from nutdamp.common.results import Tabled
+from nutdamp.flight.track import PIECE, Track, even_times, in_file_axes, make_track, widest
+from nutdamp.physics import attitude, energy_sink, response, taylor
+from nutdamp.physics.taylor import Falling, Forcing, Piece
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+
+class Path(Protocol):
+    """Motion without jumps."""
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        ...
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s; ``growth`` 1/s: `energy_sink`'s κ."""
+
+    A: float
+    C: float
+    start: float
+    state: SpinState
+    growth: float = 0.0
+
+    @property
+    def steps(self) -> int:
+        """A closed form takes none."""
+        return 0
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        since = np.asarray(times) - self.start
+        state = self.state
+        if self.growth != 0.0:
+            omega, spin, quaternion = energy_sink.arc(
+                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since
+            )
+            return np.column_stack([omega.real, omega.imag, spin]), quaternion
+        omega = state.omega * np.exp(-1j * (self.A - self.C) / self.A * state.spin * since)
+        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since)
+        return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
+
+    def end(self, time: float) -> SpinState:
+        """The motion at ``time`` s."""
+        A, C, state, since = self.A, self.C, self.state, time - self.start
+        if self.growth != 0.0:
+            return SpinState(*energy_sink.arc_end(A, C, self.growth, state.quaternion, state.omega, state.spin, since))
+        turned = cmath.exp(-1j * (A - C) / A * state.spin * since)
+        quaternion = attitude.arc_end(A, C, state.quaternion, state.omega, state.spin, since)
+        return SpinState(state.omega * turned, state.spin, quaternion)
+
+
+@dataclass(frozen=True, slots=True)
+class Integrated:
+    """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
+
+    pieces: tuple[Piece, ...]
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        return len(self.pieces)
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        times = np.asarray(times, dtype=float)
+        starts = np.array([piece.start for piece in self.pieces])
+        owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(starts) - 1)
+        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+        for index in np.flatnonzero(np.bincount(owner)):  # np.unique would load numpy.ma
+            rows = owner == index
+            body[rows], quaternion[rows] = self.pieces[index].at(times[rows])
+        return body, quaternion
+
+
+LEG, PULSE = 0.03, 0.4
+"""Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
+
+SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
+"""Units of a step of a symmetric body, of any other, and of one with dissipation."""
+
+REMEMBERED = 1000
+"""Legs that are remembered, before all are forgotten."""
+
+
+class Push(NamedTuple):
+    """What acts on a leg besides what always does; see `Dynamics.path`."""
+
+    torques: Sequence[Vector]
+    slope: Vector | None
+    falling: Falling | None
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """The body as one of the two models flies it, and what acts on it besides the pulses.
+
+    ``known``: the legs flown before, where they are remembered: see `remembering`.
+    """
+
+    moments: tuple[float, float, float]
+    constant: Vector
+    forcing: Forcing
+    known: dict[bytes, tuple[Path, SpinState]] | None = None
+
+    def remembering(self) -> Dynamics:
+        """The same, for the flights of trial schedules: each flies anew only from the first pulse that has changed."""
+        return replace(self, known={})
+
+    @property
+    def free(self) -> bool:
+        """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
+        return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
+
+    @property
+    def step_cost(self) -> float:
+        """Units of `work` of one step of integration."""
+        if self.forcing.growth != 0.0:
+            return SUNK_STEP
+        return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
+
+    def path(
+        self,
+        state: SpinState,
+        start: float,
+        end: float,
+        torques: Sequence[Vector] = (),
+        slope: Vector | None = None,
+        *,
+        most: int,
+        falling: Falling | None = None,
+    ) -> tuple[Path, SpinState]:
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
+
+        With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
+        Infeasible where it takes more than ``most`` steps of integration.
+        """
+        push = Push(torques, slope, falling)
+        if self.known is None:
+            return self._path(state, start, end, push, most)
+        more = (*(() if slope is None else (slope,)), *(falling or ()))
+        leg = np.concatenate([self.moments, state.rates, state.quaternion, (start, end), *torques, *more]).tobytes()
+        found = self.known.get(leg)
+        if found is None or found[0].steps > most:
+            if len(self.known) >= REMEMBERED:
+                self.known.clear()
+            found = self.known[leg] = self._path(state, start, end, push, most)
+        return found
+
+    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+        work.spend(LEG)
+        torques, slope, falling = push
+        if end == start or (self.free and not torques and falling is None):
+            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
+            return arc, state if end == start else arc.end(end)
+        torque = np.asarray(sum(torques, self.constant))
+        pieces = taylor.integrate(
+            self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
+        )
+        work.spend(PULSE + self.step_cost * len(pieces))
+        rates_, quaternion_ = pieces[-1].final
+        return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
+
+    def with_moments(self, moments: Vector) -> Dynamics:
+        """The same with these principal moments (3,) kg m²."""
+        first, second, third = moments.tolist()
+        return replace(self, moments=(first, second, third))
+
+    def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
+        """The state after an ``impulse`` (3,) N m s."""
+        body = state.rates + impulse / np.asarray(self.moments)
+        return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
+
+
+def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
+    """What is flown: the true principal moments, and what acts besides the pulses."""
+    disturbances = spacecraft.disturbances
+    fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
+    transverse = sum(disturbance.transverse for disturbance in fixed)
+    return Dynamics(
+        moments=spacecraft.inertia.moments,
+        constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
+        forcing=Forcing(
+            turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
+            growth=spacecraft.growth,
+        ),
+    )
+
+
+def shed(spacecraft: Spacecraft) -> Vector | None:
+    """By how much the principal moments fall with each kg of propellant used, (3,) m²; None where they stay."""
+    per_kg = None if spacecraft.tank is None else spacecraft.tank.inertia_per_kg
+    return None if per_kg is None else np.array(per_kg)
+
+
+def lightened(spacecraft: Spacecraft, used: float) -> Inertia:
+    """The inertia once so many kg of propellant are ``used``."""
+    per_kg, inertia = shed(spacecraft), spacecraft.inertia
+    if per_kg is None or used == 0.0:
+        return inertia
+    first, second, third = (np.asarray(inertia.moments) - used * per_kg).tolist()
+    return replace(inertia, moments=(first, second, third))
+
+
+class Lightening:
+    """How the moments of the body fall along a flight, as the propellant of the pulses is used."""
+
+    def __init__(self, dynamics: Dynamics, spacecraft: Spacecraft, schedule: Schedule, edges: Sequence[float]) -> None:
+        self.first, self.per_kg = dynamics.moments, shed(spacecraft)
+        times = np.array([*edges, *(0.5 * (one + other) for one, other in pairwise(edges))])
+        self.used = {} if self.per_kg is None else dict(zip(times.tolist(), schedule.used_by(times), strict=True))
+
+    def halfway(self, dynamics: Dynamics, time: float) -> Dynamics:
+        """The body amid what is used all at once at ``time`` s."""
+        if self.per_kg is None:
+            return dynamics
+        before = max((used for when, used in self.used.items() if when < time), default=0.0)
+        return dynamics.with_moments(self.first - 0.5 * (before + self.used[time]) * self.per_kg)
+
+    def between(self, dynamics: Dynamics, start: float, end: float) -> tuple[Dynamics, Falling | None]:
+        """The body at ``start`` s, and how its moments fall until ``end`` s, with no edge of a pulse in between.
+
+        As no more than a quadratic of time: what is used by start, middle and end says all.
+        """
+        if self.per_kg is None:
+            return dynamics, None
+        before, length = self.used[start], end - start
+        body = dynamics.with_moments(self.first - before * self.per_kg)
+        if length == 0.0 or self.used[end] == before:
+            return body, None
+        half, whole = self.used[0.5 * (start + end)] - before, self.used[end] - before
+        rate, growth = (4.0 * half - whole) / length, 4.0 * (whole - 2.0 * half) / length**2
+        return body, Falling(-rate * self.per_kg, -growth * self.per_kg)
+
+
+IMPULSE_SUM = "impulse sum (17)"
+REAL_WIDTHS = "real pulse widths"
+"""The two models by which a schedule is flown."""
+
+IDEAL_IMPULSES = "exact motion, ideal impulses"
+"""How the second model is named to people where no pulse has a width."""
+
+PLANNED_STEPS = 30_000
+"""Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
+
+
+def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
+    """By which model ``schedules`` are flown, as people read it: widths are named where a pulse has one."""
+    wide = model != REAL_WIDTHS or any(pulse.on_time for schedule in schedules for pulse in schedule)
+    return model if wide else IDEAL_IMPULSES
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """What remains after the last pulse, rad.
+
+    ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
+    (signed) are those of that instant, so that they add up to it.
+    ``momentum_shift`` is the angle of H from where it was at t = 0, ``axis_error`` from the target axis; ``model`` by
+    which it was found, which does not count where two are compared.
+    """
+
+    nutation: float
+    body_cone: float
+    space_cone: float
+    momentum_shift: float
+    axis_error: float
+    model: str = field(default=REAL_WIDTHS, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Final:
+    """How the last pulse leaves the body: where it points, and what it does from then on.
+
+    ``axis`` spin axis and ``momentum`` direction of H, inertial unit vectors (3,), just after the last pulse;
+    ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
+    """
+
+    axis: Vector
+    momentum: Vector
+    spin: float
+    nutation: float
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A stretch of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped as it began.
+
+    ``completed`` pulses are over along it, ``completed_at_end`` at its very end (one more where a width ends).
+    """
+
+    start: float
+    end: float
+    path: Path
+    completed: int
+    jump: bool
+    completed_at_end: int
+
+
+Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
+"""Times (n,) s, rates (n, 3) rad/s, quaternions (n, 4) and pulses completed (n,)."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Flight(Tabled):
+    """A schedule flown by one ``model``: its legs in order, and the motion as the last pulse ends.
+
+    ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
+    the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
+    ``samples`` even times to ``until`` s, default its last leg, and rows just before and after each pulse. ``scheme``
+    is what planned it, empty where that is not known.
+    """
+
+    spacecraft: Spacecraft
+    schedule: Schedule
+    legs: tuple[Leg, ...]
+    settled: SpinState
+    moments: tuple[float, float, float]
+    spans: tuple[tuple[float, float], ...]
+    model: str = REAL_WIDTHS
+    until: float | None = None
+    samples: int = 1000
+    scheme: str = ""
+
+    @property
+    def steps(self) -> int:
+        """Steps of integration that it took."""
+        return sum(leg.path.steps for leg in self.legs)
+
+    @property
+    def residual(self) -> Residual:
+        """Cone angles after the last pulse, and where H went."""
+        start, moments = self.spacecraft.initial, self.last_moments
+        before = attitude.rotate(start.quaternion, start.rates * np.asarray(self.moments))
+        target = self.spacecraft.goal.axis
+        body = self.settled.rates * np.asarray(moments)
+        after = attitude.rotate(self.settled.quaternion, body)
+        shift = float(attitude.angle_between(before, after))
+        left = arc_cones(moments, self.settled.rates, self._sense)
+        error = shift if target is None else float(attitude.angle_between(target, after))
+        return Residual(left.nutation, left.body, left.space, shift, error, self.model)
+
+    @property
+    def final(self) -> Final:
+        """Where spin axis and angular momentum end."""
+        state = self.settled
+        momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.last_moments))
+        return Final(
+            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self._sense])),
+            momentum=np.asarray(momentum / np.linalg.norm(momentum)),
+            spin=state.spin,
+            nutation=self.residual.nutation,
+        )
+
+    def moments_at(self, times: Vector) -> Vector:
+        """Principal moments (kg m²) at ``times`` (n,) s: (3,), or (n, 3) where they fall with the propellant used."""
+        per_kg = shed(self.spacecraft)
+        if per_kg is None:
+            return np.asarray(self.moments)
+        used = self.schedule.used_by(np.asarray(times, dtype=float), at_once=self.model == IMPULSE_SUM)
+        return self.moments - used[:, None] * per_kg
+
+    @property
+    def last_moments(self) -> tuple[float, float, float]:
+        """Principal moments after the last pulse, kg m²."""
+        if shed(self.spacecraft) is None:
+            return self.moments
+        first, second, third = self.moments_at(np.array([math.inf]))[0].tolist()
+        return first, second, third
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""
+        times = np.asarray(times, dtype=float)
+        owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
+        body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+        for index in np.flatnonzero(np.bincount(owner + 1)) - 1:  # np.unique would load numpy.ma
+            rows = owner == index
+            body[rows], quaternion[rows] = self.legs[index].path.motion(times[rows])
+        return body, quaternion
+
+    def axis(self, times: Vector) -> Vector:
+        """Spin axis, inertial unit vectors (n, 3), at ``times`` (n,) s."""
+        return attitude.rotate(self.motion(times)[1], np.array([0.0, 0.0, self._sense]))
+
+    @property
+    def shown_to(self) -> float:
+        """End of the rows, s."""
+        return self.legs[-1].end if self.until is None else self.until
+
+    @property
+    def track(self) -> Track:
+        """The rows as arrays: SI and rad, body rates and quaternion in the axes of the file."""
+        return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
+
+    def sampled(self, samples: int, until: float) -> Track:
+        """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
+
+        The flight must have been made to reach ``until``.
+        """
+        return self._joined(self._motions(samples, until))
+
+    def pieces(self, samples: int, until: float) -> Iterator[Track]:
+        """The rows of `sampled` in order, about `track.PIECE` at a time, so that many of them take no more memory."""
+        motions: list[Motion] = []
+        count = 0
+        for motion in self._motions(samples, until):
+            motions.append(motion)
+            count += len(motion[0])
+            if count >= PIECE:
+                yield self._joined(motions)
+                motions, count = [], 0
+        if motions:
+            yield self._joined(motions)
+
+    def _joined(self, motions: Iterable[Motion]) -> Track:
+        t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
+        return make_track(self.moments_at(t), self.spacecraft.spin, t, body, quaternion, pulse)
+
+    def _motions(self, samples: int, until: float) -> Iterator[Motion]:
+        """The rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
+        for leg in self.legs:
+            if leg.start > until:
+                break
+            end = min(leg.end, until)
+            for part in even_times(samples, until, leg.start, end):
+                times = np.concatenate([[leg.start], part.times]) if leg.jump and part.first else part.times
+                times = np.append(times, end) if part.last and end > leg.start else times
+                body, quaternion = leg.path.motion(times)
+                completed = np.full(len(times), leg.completed)
+                completed[times == leg.end] = leg.completed_at_end
+                yield times, body, quaternion, completed
+
+    def around_pulses(self) -> tuple[Track, Track]:
+        """The motion just before and just after each pulse, one row a pulse; cone angles as in `Residual`."""
+        before, after = [], []
+        starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
+        for begins, ends in self.spans:
+            first, last = self.legs[bisect_left(overs, begins)], self.legs[bisect_right(starts, ends) - 1]
+            before.append((begins, *first.path.motion(np.array([begins]))))
+            after.append((ends, *last.path.motion(np.array([ends]))))
+        return self._rows(before, 0), self._rows(after, 1)
+
+    def _rows(self, states: list[tuple[float, Vector, Vector]], completed: int) -> Track:
+        t = np.array([time for time, _, _ in states])
+        body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
+        quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
+        numbers = completed + np.arange(len(t), dtype=np.int64)
+        moments = self.moments_at(t)
+        made = make_track(moments, self.spacecraft.spin, t, body, quaternion, numbers)
+        return widest(made, moments, self.spacecraft.spin)
+
+    @property
+    def _sense(self) -> float:
+        """Sign of the spin at t = 0: the spin axis stays the same end of the body through a reversal."""
+        return math.copysign(1.0, self.spacecraft.spin)
+
+
+def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
+    """The impulse-sum solution, Magnus 1970 (17), pulse by pulse.
+
+    Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
+    the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
+    between the pulses as in `flown`. The last leg reaches at least to ``until`` s. Raises Infeasible as `flown` does.
+    """
+    dynamics, state, allowed = make_dynamics(spacecraft), spacecraft.initial, _allowed(schedule, until)
+    legs: list[Leg] = []
+    now, used = 0.0, 0.0
+    for index, pulse in enumerate(schedule):
+        path, state = dynamics.path(state, now, pulse.t, most=allowed)
+        allowed -= path.steps
+        legs.append(Leg(now, pulse.t, path, index, jump=True, completed_at_end=index))
+        taken = pulse.propellant or 0.0
+        inertia = lightened(spacecraft, used + 0.5 * taken)
+        kick = _effective_impulse(spacecraft, inertia, pulse, state.spin)
+        impulse = np.array([kick.real, kick.imag, pulse.impulse[2]])
+        state = replace(dynamics, moments=inertia.moments).kicked(state, impulse)
+        now, used = pulse.t, used + taken
+        dynamics = replace(dynamics, moments=lightened(spacecraft, used).moments)
+    last = max(until, schedule.end)
+    path, _ = dynamics.path(state, now, last, most=allowed)
+    legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
+    spans = tuple((one.t, one.t) for one in schedule)
+    return Flight(spacecraft, schedule, tuple(legs), state, spacecraft.inertia.moments, spans, IMPULSE_SUM)
+
+
+def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np.complex128]:
+    """J1 + iJ2 with which each pulse acts on ω at its centre, (k,) N m s: its impulse times `rates.width_factor`.
+
+    With I1 ≠ I2 by the rate of a small nutation, which turns on an ellipse: exact for small angles.
+    """
+    arcs = by_impulses(spacecraft, schedule).legs[:-1]  # each up to its pulse
+    spins = [float(leg.path.motion(np.array([leg.end]))[0][0, 2]) for leg in arcs]
+    found, used = [], 0.0
+    for pulse, spin in zip(schedule, spins, strict=True):
+        taken = pulse.propellant or 0.0
+        found.append(_effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin))
+        used += taken
+    return np.array(found, dtype=complex)
+
+
+def _effective_impulse(spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float) -> complex:
+    """What ``pulse`` acts like on ω at its centre, N m s, with the ``inertia`` and ω3 before it acts, rad/s, there."""
+    drift = spacecraft.spin_drift
+    axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
+    if pulse.command is not None and pulse.command.ramps:
+        from nutdamp.physics import thruster  # few spacecraft have any
+
+        begin = spin - drift * (pulse.t - pulse.thrust[0])
+        rate, ramps = axial_torque / inertia.C, pulse.command.ramps
+        shape = thruster.shape_factor(inertia.body_rate, begin, rate, ramps, pulse.t, spacecraft.growth, drift)
+        return complex(pulse.impulse[0], pulse.impulse[1]) * shape
+    factor = response.width_factor(
+        inertia.body_rate,
+        spin - 0.5 * drift * pulse.on_time,
+        axial_torque / inertia.C,
+        pulse.on_time,
+        growth=spacecraft.growth,
+        drift=drift,
+    )
+    return complex(pulse.impulse[0], pulse.impulse[1]) * factor
+
+
+def flown(
+    spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0, *, dynamics: Dynamics | None = None
+) -> Flight:
+    """Euler's equations through the real pulse widths, with the true principal moments.
+
+    Coasts of symmetric bodies without disturbances are exact arcs, with dissipation too; everything else is Taylor
+    series at rounding accuracy. The last leg reaches at least to ``until`` s. ``dynamics`` are those of the
+    spacecraft, where they are known. Raises Infeasible where that takes more than `PLANNED_STEPS`, or
+    `rigid.MOST_STEPS` where a later end is requested.
+    """
+    dynamics, state = dynamics or make_dynamics(spacecraft), spacecraft.initial
+    allowed = _allowed(schedule, until)
+    pulses, over = schedule.pulses, schedule.end
+    spans = tuple(pulse.thrust for pulse in pulses)
+    starts, ends = np.array(spans).reshape(-1, 2).T
+    last = max(until, over)
+    edges = sorted({0.0, over, last, *(time for pulse in pulses for time in pulse.edges)})
+    light = Lightening(dynamics, spacecraft, schedule, edges)
+    legs: list[Leg] = []
+    settled = state
+    for now, end in zip(edges, [*edges[1:], last], strict=True):
+        dynamics, falling = light.between(dynamics, now, end)
+        # So late, start and end of a very short pulse may be the same number: then it too acts at once.
+        kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
+        if kicks and now == 0.0:  # so that the motion just before the kick is there too
+            legs.append(
+                Leg(now, now, dynamics.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0)
+            )
+        for kick in kicks:
+            state = light.halfway(dynamics, now).kicked(state, kick)
+        if now == over:
+            settled = state
+        on = [pulses[index] for index in np.flatnonzero((starts <= now) & (end <= ends))]
+        path, following = dynamics.path(state, now, end, *_torques(on, now, end), most=allowed, falling=falling)
+        allowed -= path.steps
+        completed, at_end = (
+            int(np.count_nonzero((ends < time) | ((ends == time) & ((starts < time) | (time == now)))))
+            for time in (now, end)
+        )
+        legs.append(Leg(now, end, path, completed, jump=bool(kicks) or now == 0.0, completed_at_end=at_end))
+        state = following
+    return Flight(spacecraft, schedule, tuple(legs), settled, light.first, spans)
+
+
+def _torques(pulses: Iterable[Pulse], start: float, end: float) -> tuple[list[Vector], Vector | None]:
+    """Torques (3,) N m at ``start`` of the ``pulses`` that fire until ``end`` s, and their slope together, N m/s.
+
+    No slope, None, where all keep even.
+    """
+    pushes = [push for push in (pulse.push(start, end) for pulse in pulses) if push is not None]
+    slopes = [slope for _, slope in pushes if slope is not None]
+    return [torque for torque, _ in pushes], np.sum(slopes, axis=0) if slopes else None
+
+
+def _allowed(schedule: Schedule, until: float) -> int:
+    """Steps of integration that a flight may take: a plan is flown again and again, a track once."""
+    return taylor.MOST_STEPS if until > schedule.end else PLANNED_STEPS

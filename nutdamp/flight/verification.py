@@ -1,0 +1,452 @@
+"""Fly a schedule by independent means, and tell what each imperfection costs: an error budget a reviewer can sign.
+
+Euler's equations by scipy's DOP853: written apart from everything else that flies, so that it can judge it.
+
+Cross products, a matrix for the tensor, in the axes of the file, and restarts at every edge of a pulse. Where the
+moments fall with the propellant, what is used of it is one number more to be integrated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nutdamp.errors import Infeasible, MissingExtra
+from nutdamp.flight import basilisk, propagation
+from nutdamp.flight.propagation import Flight, Residual, shed
+from nutdamp.flight.propellant import lacking, supplied
+from nutdamp.physics import attitude, response
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft.constraints import commandable
+from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
+
+EVALUATIONS = 200_000
+"""Evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds."""
+
+Push = tuple[Vector, Vector | None]
+"""Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
+
+
+class Equations:
+    """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
+
+    A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
+    the propellant used too, kg.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, most: int | None = None) -> None:
+        self.most = EVALUATIONS if most is None else most
+        self.spacecraft, self.axes = spacecraft, spacecraft.inertia.axes
+        self.tensor = self.axes @ np.diag(spacecraft.inertia.moments) @ self.axes.T
+        self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)
+        per_kg = shed(spacecraft)
+        self.shed = None if per_kg is None else self.axes @ np.diag(per_kg) @ self.axes.T
+        self.evaluations = 0
+
+    def state(self, motion: SpinState) -> Vector:
+        """The state of a motion."""
+        turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
+        return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
+
+    def motion(self, states: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) and quaternions (n, 4) in principal axes of ``states`` (n, 7) or (n, 8)."""
+        quaternion = states[:, 3:7] / np.linalg.norm(states[:, 3:7], axis=1, keepdims=True)
+        return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
+
+    def kicked(self, state: Vector, impulse: Vector, propellant: float = 0.0) -> Vector:
+        """The state after an ``impulse`` (3,) N m s in principal axes, which takes so many kg of ``propellant``."""
+        _, inverse = self._body(state[7:] + 0.5 * propellant)
+        return np.concatenate([state[:3] + inverse @ (self.axes @ impulse), state[3:7], state[7:] + propellant])
+
+    def _body(self, used: Vector) -> tuple[Vector, Vector]:
+        """The tensor and its inverse once so many kg are ``used``, (1,), or (0,) where they stay."""
+        if self.shed is None:
+            return self.tensor, self.inverse
+        tensor: Vector = self.tensor - used[0] * self.shed
+        return tensor, np.asarray(np.linalg.inv(tensor), dtype=np.float64)
+
+    def solved(
+        self,
+        state: Vector,
+        start: float,
+        end: float,
+        pushes: Iterable[Push],
+        *,
+        burn: tuple[float, float] = (0.0, 0.0),
+        dense: bool = False,
+    ) -> Any:
+        """What solve_ivp gives from ``state`` at ``start`` to ``end`` s, with its interpolant where it is ``dense``.
+
+        ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
+        together take more than ``most``.
+        """
+        from scipy.integrate import solve_ivp
+
+        derivative = self._derivative(start, tuple(pushes), burn)
+        return solve_ivp(derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense)
+
+    def _derivative(
+        self, start: float, pushes: tuple[Push, ...], burn: tuple[float, float]
+    ) -> Callable[[float, Vector], Vector]:
+        constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
+        slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
+
+        def derivative(t: float, y: Vector) -> Vector:
+            self.evaluations += 1
+            if self.evaluations > self.most:
+                raise Infeasible(f"the motion takes more than {self.most} evaluations of Euler's equations")
+            body, q = y[:3], y[3:7]
+            tensor, inverse = self._body(y[7:])
+            momentum = tensor @ body
+            drive = self._sink(momentum)
+            torque = self.axes @ (constant + slope * (t - start) + self._disturbed(t))
+            spin = inverse @ (torque + drive - np.cross(body, momentum))
+            # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
+            slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
+            turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
+            flow = [burn[0] + burn[1] * (t - start)]
+            return np.concatenate([spin, turning, flow[: len(y) - 7]])
+
+        return derivative
+
+    def _disturbed(self, t: float) -> Vector:
+        """Torque (3,) N m of the disturbances at ``t`` s, principal axes."""
+        total = np.zeros(3)
+        for one in self.spacecraft.disturbances:
+            turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
+            total += (turned.real, turned.imag, one.axial)
+        return total
+
+    def _sink(self, momentum: Vector) -> Vector:
+        """What energy dissipation adds to dH/dt in the body, (3,) N m in the axes of the file, from H there.
+
+        It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space.
+        So in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to
+        H.
+        """
+        axis, size = self.axes[:, 2], float(np.linalg.norm(momentum))
+        if self.spacecraft.growth == 0.0 or size == 0.0:
+            return np.zeros(3)
+        direction = momentum / size
+        across = direction * (direction @ axis) - axis  # of length sin θ
+        return np.asarray(self.spacecraft.growth * size * (direction @ axis) * across)
+
+
+def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
+    """The motion under a schedule: rates (n, 3) and quaternions (n, 4) in principal axes at ``times`` (n,) s ascending.
+
+    Raises Infeasible where that takes more than `EVALUATIONS`.
+    """
+    equations = Equations(spacecraft)
+    state = equations.state(spacecraft.initial)
+    edges = {0.0, float(times[-1]), *times.tolist()}
+    edges |= {edge for pulse in schedule for edge in pulse.edges}
+    knots = sorted(edge for edge in edges if edge <= times[-1])
+    rows = {}
+    for now, end in zip(knots, [*knots[1:], knots[-1]], strict=True):
+        for pulse in schedule:
+            if pulse.on_time == 0.0 and pulse.t == now:
+                state = equations.kicked(state, pulse.impulse, pulse.propellant or 0.0)
+        rows[now] = state
+        if end > now:
+            firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
+            burn = np.sum([_flow(*one) for one in firing], axis=0) if firing else (0.0, 0.0)
+            state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
+    return equations.motion(np.array([rows[time] for time in times.tolist()]))
+
+
+def _flow(pulse: Pulse, push: Push) -> tuple[float, float]:
+    """Flow of propellant, kg/s, as a stretch of a pulse begins, and its slope, kg/s²: as the torque, over all of it."""
+    torque, slope = push
+    along = (pulse.propellant or 0.0) * pulse.impulse / float(pulse.impulse @ pulse.impulse)
+    return float(along @ torque), 0.0 if slope is None else float(along @ slope)
+
+
+SAMPLES = 201
+"""Even times at which two flights are compared, besides the edges of the pulses."""
+
+AGREE = 1e-9
+"""rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
+
+
+IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"
+"""The rows of the budget that every schedule has."""
+
+WITHOUT = "without "
+"""How the rows of the budget begin that leave out what plans include."""
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One way to fly the schedule: its residual (rad), or why it could not be flown.
+
+    ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
+    ``outside``: an integration that shares nothing with it, and so is to confirm it.
+    """
+
+    name: str
+    nutation: float | None = None
+    momentum_shift: float | None = None
+    axis: float | None = None
+    momentum: float | None = None
+    rate: float | None = None
+    missing: str = ""
+    outside: bool = False
+
+    @property
+    def short(self) -> str:
+        """The name without what it says of the model."""
+        return self.name.partition(",")[0]
+
+    @property
+    def difference(self) -> float:
+        """The largest of the three, NaN where one is not known."""
+        found = (self.axis, self.momentum, self.rate)
+        return float(np.max([math.nan if one is None else one for one in found]))
+
+
+@dataclass(frozen=True, slots=True)
+class Imperfection:
+    """Residual (rad) with one imperfection alone, everything else ideal; or without one that plans include."""
+
+    name: str
+    nutation: float
+    momentum_shift: float
+    axis_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class Conservation:
+    """The largest relative change of |H| or of the energy on a coast; ``changed``: what may change it there, if any."""
+
+    name: str
+    drift: float
+    changed: tuple[str, ...] = ()
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether it keeps to `AGREE`; None where something may change it."""
+        return None if self.changed else self.drift <= AGREE
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """Methods side by side, what must be conserved, and the budget."""
+
+    methods: tuple[Method, ...]
+    momentum: Conservation
+    energy: Conservation
+    budget: tuple[Imperfection, ...]
+
+    @property
+    def checks(self) -> tuple[str, ...]:
+        """Names of the integrations from outside that were flown."""
+        return tuple(method.short for method in self._outside)
+
+    @property
+    def disagreeing(self) -> tuple[str, ...]:
+        """Names of those whose motion differs from the flown one by more than `AGREE`, or is not a number."""
+        return tuple(method.short for method in self._outside if not method.difference <= AGREE)
+
+    @property
+    def drifting(self) -> tuple[str, ...]:
+        """What changes on coasts although nothing may change it."""
+        return tuple(one.name for one in (self.momentum, self.energy) if one.kept is False)
+
+    @property
+    def agree(self) -> bool:
+        """Whether there are any, and all of them confirm the flown motion."""
+        return bool(self.checks) and not self.disagreeing
+
+    @property
+    def _outside(self) -> list[Method]:
+        return [method for method in self.methods if method.outside and not method.missing]
+
+
+def verify(
+    spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None = None, *, expected: bool = False
+) -> Verification:
+    """Fly ``schedule`` by the impulse sum, Taylor series, DOP853 and, where it is installed, Basilisk.
+
+    ``unrounded`` is the schedule before its commands were rounded to ticks, where there is one; ``expected``: it was
+    planned on the motion with the disturbances.
+    """
+    end = schedule.end + spacecraft.inertial_period
+    judge = propagation.flown(spacecraft, schedule, end)
+    times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
+    reference = judge.motion(times)
+    methods = (
+        _closed_form(judge, end, times, reference),
+        Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
+        _by_dop853(judge, times, reference),
+        _by_basilisk(judge, end),
+    )
+    return Verification(methods, *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
+
+
+def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vector, Vector]) -> Method:
+    """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
+    spacecraft, schedule = judge.spacecraft, judge.schedule
+    arcs = propagation.by_impulses(spacecraft, schedule, end)
+    body, quaternion = arcs.motion(times)
+    inertia = spacecraft.inertia
+    if inertia.symmetric and not spacecraft.disturbances and spacecraft.growth == 0.0 and shed(spacecraft) is None:
+        omega, spin = response.impulse_sum(
+            times,
+            complex(spacecraft.omega0[0], spacecraft.omega0[1]),
+            spacecraft.spin,
+            inertia.A,
+            inertia.C,
+            np.array([pulse.t for pulse in schedule]),
+            propagation.effective_impulses(spacecraft, schedule),
+            np.array([pulse.impulse[2] for pulse in schedule]),
+        )
+        body = np.column_stack([omega.real, omega.imag, spin])
+    outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
+    between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
+    moments = judge.moments_at(times)
+    return _method("impulse sum (17), arcs", moments, arcs.residual, (body, quaternion), reference, between)
+
+
+def _by_dop853(judge: Flight, times: Vector, reference: tuple[Vector, Vector]) -> Method:
+    name = "DOP853, full tensor"
+    try:
+        motion = integrate(judge.spacecraft, judge.schedule, times)
+    except Infeasible as reason:
+        return Method(name, missing=str(reason), outside=True)
+    return _compared(name, judge, times, motion, reference)
+
+
+def _by_basilisk(judge: Flight, end: float) -> Method:
+    name = "Basilisk"
+    if shed(judge.spacecraft) is not None:
+        return Method(name, missing="it flies with constant moments, and those of the file fall", outside=True)
+    try:
+        flown = basilisk.fly(judge.spacecraft, judge.schedule, end)
+    except (MissingExtra, Infeasible) as reason:
+        return Method(name, missing=str(reason), outside=True)
+    return _compared(name, judge, flown.t, (flown.rates, flown.quaternion), judge.motion(flown.t))
+
+
+def _compared(
+    name: str, judge: Flight, times: Vector, motion: tuple[Vector, Vector], reference: tuple[Vector, Vector]
+) -> Method:
+    """A method that gives motion only: its residual is read at the first time after the last pulse."""
+    last = int(np.searchsorted(times, judge.schedule.end - 1e-9))
+    start = judge.spacecraft.initial
+    before = attitude.rotate(start.quaternion, start.rates * np.asarray(judge.moments))
+    after = attitude.rotate(motion[1][last], motion[0][last] * np.asarray(judge.last_moments))
+    shift = float(attitude.angle_between(before, after))
+    left = arc_cones(judge.last_moments, motion[0][last], math.copysign(1.0, judge.spacecraft.spin))
+    residual = Residual(left.nutation, left.body, left.space, shift, shift)
+    method = _method(name, judge.moments_at(times), residual, motion, reference, np.ones(len(times), dtype=bool))
+    return replace(method, outside=True)
+
+
+def _method(
+    name: str,
+    moments: Vector,
+    residual: Residual,
+    motion: tuple[Vector, Vector],
+    reference: tuple[Vector, Vector],
+    rows: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+) -> Method:
+    """Largest differences between two motions over the ``rows`` compared; ``moments`` (3,) or of each row (n, 3)."""
+    spin_axis = np.array([0.0, 0.0, 1.0])
+    (body, turn), (other_body, other_turn) = motion, reference
+    differences = (
+        attitude.angle_between(attitude.rotate(turn, spin_axis), attitude.rotate(other_turn, spin_axis)),
+        attitude.angle_between(
+            attitude.rotate(turn, body * moments), attitude.rotate(other_turn, other_body * moments)
+        ),
+        np.linalg.norm(body - other_body, axis=1) / np.linalg.norm(other_body, axis=1),
+    )
+    axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
+    return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)
+
+
+def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
+    """|H| and energy along each coast: torques from outside change both, dissipation within the body the energy."""
+    firing = [pulse.thrust for pulse in flown.schedule]
+    worst = [0.0, 0.0]
+    for leg in flown.legs:
+        if leg.end == leg.start or any(start <= leg.start and leg.end <= end for start, end in firing):
+            continue
+        turning, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
+        moments = flown.moments_at(np.array([leg.start])).ravel()
+        for index, value in enumerate((np.linalg.norm(turning * moments, axis=1), turning**2 @ moments)):
+            worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
+    body = flown.spacecraft
+    outside, inside = ("disturbances",) * bool(body.disturbances), ("dissipation",) * (body.growth != 0.0)
+    return Conservation("|H|", worst[0], outside), Conservation("energy", worst[1], (*outside, *inside))
+
+
+def _budget(
+    spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
+) -> tuple[Imperfection, ...]:
+    """Residual of the ideal flight, with each imperfection alone, with all of them; and without what plans include.
+
+    Plans include the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
+    with disturbances: these are part of the ideal flight, so that it leaves little.
+    """
+    exact = schedule if unrounded is None else unrounded
+    inertia = spacecraft.inertia
+    ideal = spacecraft if expected else replace(spacecraft, disturbances=())
+    sharp = _sharp(ideal, exact)
+    rows = [(IDEAL, ideal, sharp)]
+    if any(pulse.on_time for pulse in exact):
+        rows.append(("pulse width", ideal, exact))
+    if spacecraft.limits.tick is not None:
+        rounded = Schedule(supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in exact)))
+        rows.append(("command resolution", ideal, _sharp(ideal, rounded)))
+    if spacecraft.disturbances and not expected:
+        rows.append(("disturbances", spacecraft, sharp))
+    rows.append((AS_FLOWN, spacecraft, schedule))
+    if any(pulse.impulse[2] != 0.0 for pulse in exact):
+        rows.append((f"{WITHOUT}axial torque", ideal, _sharp(ideal, _transverse(exact))))
+    if not inertia.symmetric:
+        mean = replace(inertia, moments=(inertia.A, inertia.A, inertia.C))
+        rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
+    if spacecraft.growth != 0.0:
+        rows.append((f"{WITHOUT}dissipation", replace(ideal, dissipation=None), sharp))
+    rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in spacecraft.thrust_laws]
+    if spacecraft.disturbances and expected:
+        rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
+    return tuple(
+        Imperfection(name, left.nutation, left.momentum_shift, left.axis_error)
+        for name, body, pulses in rows
+        for left in (propagation.flown(body, pulses).residual,)
+    )
+
+
+def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
+    """Every pulse as an ideal impulse at its centre, as strong as it acts on ω."""
+    effective = propagation.effective_impulses(spacecraft, schedule)
+    return Schedule(
+        tuple(
+            Pulse(
+                pulse.t,
+                0.0,
+                pulse.channel,
+                np.array([impulse.real, impulse.imag, pulse.impulse[2]]),
+                propellant=pulse.propellant,
+            )
+            for pulse, impulse in zip(schedule, effective, strict=True)
+        )
+    )
+
+
+def _transverse(schedule: Schedule) -> Schedule:
+    """The schedule without the axial parts of its torques."""
+    flat = np.array([1.0, 1.0, 0.0])
+    return Schedule(
+        tuple(
+            replace(pulse, impulse=pulse.impulse * flat, torque=None if pulse.torque is None else pulse.torque * flat)
+            for pulse in schedule
+        )
+    )

@@ -1,0 +1,553 @@
+"""The dispersed cases: what body flies, how it moves at t = 0, and which impulses it really gets.
+
+The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
+rates, and in what each pulse does. Everything here is elementwise over cases (structure of arrays); a quantity that
+nothing disperses stays one number for all of them.
+
+Vectors and quotients elementwise over cases: one number for all cases, or an array.
+
+How strong pulses of cases are where cold nozzles and the tank are not as the file has them, and what they take.
+
+The directions that the spin axis keeps its distance from, as dispersed cases see them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.flight.propagation import shed
+from nutdamp.flight.propellant import Supply
+from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, Inputs, groups_of, list_inputs
+from nutdamp.physics import attitude
+from nutdamp.physics.batch import cos_sin
+from nutdamp.physics.energy_sink import TINY
+from nutdamp.physics.sky import AxisWatch
+from nutdamp.physics.thruster import Tank, possible, spread
+from nutdamp.spacecraft.equipment import Thruster
+from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Opened
+
+
+Cases = Any
+"""One number for all cases, or an array (n,): real, or complex where a derivative is taken by a complex step."""
+
+Triple = tuple[Cases, Cases, Cases]
+
+
+def plus(first: Cases, second: Cases) -> Cases:
+    """A sum that costs nothing where one side is exactly zero for all cases."""
+    if nothing(first):
+        return second
+    return first if nothing(second) else first + second
+
+
+def times(first: Cases, second: Cases) -> Cases:
+    """A product that costs nothing where one side is exactly zero for all cases."""
+    return 0.0 if nothing(first) or nothing(second) else first * second
+
+
+def nothing(value: Cases) -> bool:
+    """Whether it is exactly zero for all cases."""
+    return isinstance(value, float) and value == 0.0
+
+
+def cross(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
+    """Vector product by components."""
+    (a, b, c), (x, y, z) = first, second
+    return (
+        plus(times(b, z), times(-1.0, times(c, y))),
+        plus(times(c, x), times(-1.0, times(a, z))),
+        plus(times(a, y), times(-1.0, times(b, x))),
+    )
+
+
+def added(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
+    """Sum of vectors."""
+    return triple(map(plus, first, second))
+
+
+def scaled(vector: Sequence[Cases], factor: Cases) -> Triple:
+    """A vector times a factor."""
+    return triple(times(part, factor) for part in vector)
+
+
+def triple(parts: Iterable[Cases]) -> Triple:
+    """Three components, one for all cases or an array each."""
+    x, y, z = parts
+    return x, y, z
+
+
+def parts_of(vector: Vector) -> Triple:
+    """The components of one vector (3,)."""
+    return triple(vector.tolist())
+
+
+def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
+    """The two unit axes across a force about which it is tilted: ``a`` square to axis 3 (or 1) too, ``b`` to both."""
+    along = force / np.linalg.norm(force)
+    reference = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    first = np.cross(along, reference)
+    first /= np.linalg.norm(first)
+    return first, np.cross(along, first)
+
+
+def tilted(first: Cases, second: Cases) -> tuple[Cases, Cases]:
+    """cos φ and sin φ / φ of the rotation vector with these two components."""
+    angle = np.sqrt(first * first + second * second) + TINY
+    cosine, sine = cos_sin(angle)
+    return cosine, sine / angle
+
+
+def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
+    """``vector`` turned by the rotation vector (``tilt``, 0)."""
+    if all(map(nothing, tilt)):
+        return triple(vector)
+    first, second = tilt
+    cosine, ratio = tilted(first, second)
+    # Rodrigues: v cos φ + (u × v) sin φ + u (u·v)(1 - cos φ), with u = tilt/φ and (1 - cos φ)/φ² = ratio²/(1 + cos φ)
+    along = (first * vector[0] + second * vector[1]) * ratio * ratio / (1.0 + cosine)
+    turned = added(scaled(vector, cosine), scaled(cross((first, second, 0.0), vector), ratio))
+    return added(turned, (first * along, second * along, 0.0))
+
+
+def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
+    """Matrix times vector, elementwise over cases."""
+    rows = []
+    for row in matrix.tolist():
+        total: Cases = 0.0
+        for entry, part in zip(row, vector, strict=True):
+            total = plus(total, part if entry == 1.0 else times(entry, part))
+        rows.append(total)
+    return triple(rows)
+
+
+def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
+    """The tank as it is in the cases."""
+    if body.tank is None:
+        return None
+    names = ("propellant", "pressure", "final_pressure", "exponent")
+    return replace(
+        body.tank, **{name: plus(getattr(body.tank, name), draws.get(f"tank {name}", 0.0)) for name in names}
+    )
+
+
+class Fed(NamedTuple):
+    """How strong each pulse is over what it is as planned, and its propellant, kg, None where that is not known.
+
+    ``drained``: share of the propellant in the tank that all of them would take, 1 at most where it lasts; 0 without a
+    tank, or where it is not known what they take.
+    """
+
+    levels: list[Cases]
+    spent: tuple[Cases, ...] | None
+    drained: Cases = 0.0
+
+
+def supplied(body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]) -> Fed:
+    """How strong the pulses are in cases: none once the tank is empty, nor those that do not fire as planned.
+
+    ``flows``: what each takes of propellant over what it does as planned, at the same pressure and as warm.
+    """
+    cold, tank = body.cold, tank_of(body, draws)
+    known = all(pulse.propellant is not None for pulse in schedule)
+    planned = [pulse.propellant or 0.0 for pulse in schedule]
+    levels: list[Cases] = [1.0] * len(flows)
+    if tank is None and not ("cold" in draws or "cold_pulses" in draws):
+        return Fed(levels, tuple(used * flow for used, flow in zip(planned, flows, strict=True)) if known else None)
+    if cold is not None:
+        off = draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
+        cold = replace(cold, first=plus(cold.first, off[0]), pulses=plus(cold.pulses, off[1]))
+    nominal, case = Supply(body), Supply(replace(body, cold=cold, tank=tank))
+    channels = {channel.name: channel for channel in body.channels}
+    higher: Cases = 1.0  # the file gives the thrust at its own pressure
+    if tank is not None and body.tank is not None:
+        higher = (tank.pressure / body.tank.pressure) ** tank.exponent
+    taken: list[Cases] = list(planned)
+    for number in sorted(range(len(flows)), key=lambda at: schedule.pulses[at].loaded[0]):
+        pulse = schedule.pulses[number]
+        channel = channels.get(pulse.channel)
+        if channel is None or pulse.torque is None:
+            nominal.draw(planned[number])
+            levels[number] = case.draw(planned[number] * flows[number])
+            taken[number] = planned[number] * flows[number] * levels[number]
+            continue
+        before, _ = nominal.take(channel, pulse.on_time)
+        level, used = case.take(channel, pulse.on_time * flows[number] * higher)
+        levels[number], taken[number] = level * higher / (before or 1.0), 0.0 if used is None else used
+    drained = 0.0 if tank is None or not known else case.used / tank.propellant
+    return Fed(levels, tuple(taken) if known else None, drained)
+
+
+DISC = 1e-12
+"""Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
+
+NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg")
+"""Tolerances of what is never below zero: draws that make it so are drawn again."""
+
+ROUNDING = 1e-9
+"""A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
+
+
+class Thrusting(NamedTuple):
+    """What one thruster gives through a valve that is not as the file has it: times from the start of the command."""
+
+    opened: Opened
+    torque: Triple
+
+
+@dataclass(frozen=True, slots=True)
+class DispersedCases:
+    """Dispersed cases, in principal axes and SI.
+
+    ``moments`` (I1, I2, I3) kg m² and ``omega0`` rad/s at t = 0. Of each pulse: its ``starts`` s and ``widths`` s, of
+    the rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its
+    ``thrust`` where a valve is not as the file has it. ``tilt`` is the rotation vector (rad, about body axes 1 and 2)
+    by which the attitude at t = 0 is off; ``spent`` the propellant of each pulse, kg, None where that of one is not
+    known; ``drained`` as in `fed.Fed`; ``per_kg`` what each kg takes off the moments, m², None where they stay.
+    """
+
+    moments: Triple
+    omega0: Triple
+    starts: tuple[Cases, ...]
+    widths: tuple[Cases, ...]
+    leads: tuple[Cases, ...]
+    impulses: tuple[Triple, ...]
+    thrust: tuple[tuple[Thrusting, ...], ...]
+    tilt: tuple[Cases, Cases]
+    spent: tuple[Cases, ...] | None
+    drained: Cases = 0.0
+    per_kg: Triple | None = None
+
+    @property
+    def propellant(self) -> Cases | None:
+        """All of it, kg; None where it is not known."""
+        return None if self.spent is None else sum(self.spent, 0.0)
+
+    @property
+    def sheds(self) -> list[tuple[Cases, Cases]] | None:
+        """What each pulse takes off A and C, kg m²; None where they stay."""
+        if self.per_kg is None or self.spent is None:
+            return None
+        across, axial = 0.5 * (self.per_kg[0] + self.per_kg[1]), self.per_kg[2]
+        return [(kg * across, kg * axial) for kg in self.spent]
+
+    @property
+    def A(self) -> Cases:
+        """Transverse moment of the equivalent symmetric body, kg m²."""
+        first, second, _ = self.moments
+        return first if first is second else 0.5 * (first + second)
+
+    @property
+    def C(self) -> Cases:
+        """Moment about the spin axis, kg m²."""
+        return self.moments[2]
+
+
+@dataclass(frozen=True, slots=True)
+class _Actuation:
+    """How one pulse follows from what fires: nominal ``impulse``, and the part of it no thruster accounts for."""
+
+    pulse: Pulse
+    source: str | None
+    duration: float
+    remainder: Triple
+
+
+class _Fired(NamedTuple):
+    """What one pulse gives in each case at the thrust of the file, and its ``flow``; see `DispersedCases`."""
+
+    start: Cases
+    width: Cases
+    lead: Cases
+    impulse: Triple
+    thrust: tuple[Thrusting, ...]
+    flow: Cases
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A spacecraft and the schedule it flies, ready to be dispersed."""
+
+    spacecraft: Spacecraft
+    schedule: Schedule
+    inputs: Inputs = field(init=False)
+    _members: dict[str, tuple[Thruster, ...]] = field(init=False)
+    _actuations: tuple[_Actuation, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        body = self.spacecraft
+        members = {channel.name: channel.thrusters for channel in body.channels}
+        if STEERABLE not in members and body.torquer is not None:
+            members[STEERABLE] = ()
+        object.__setattr__(self, "inputs", list_inputs(body, self.schedule))
+        object.__setattr__(self, "_members", members)
+        object.__setattr__(self, "_actuations", tuple(map(self._actuation, self.schedule)))
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Inputs that are correlated; raises BadRequest where that cannot be."""
+        requested = self.spacecraft.dispersions
+        return () if requested is None else groups_of(requested.correlation)
+
+    @cached_property
+    def on_times(self) -> tuple[float, ...]:
+        """On-time of each pulse, s: commanded, so the same in every case.
+
+        Through a valve that of the rectangle which has the impulse, the centroid and the spread of the thrust.
+        """
+        return tuple(map(_width, self.schedule))
+
+    @property
+    def target(self) -> Vector:
+        """Where H shall point, as a unit vector (3,) in the estimated body axes at t = 0.
+
+        The goal of the spacecraft where it has one (an inertial axis), else H at t = 0 as the estimate has it.
+        """
+        body = self.spacecraft
+        axis = body.goal.axis
+        if axis is None:
+            axis = np.asarray(body.inertia.moments) * body.omega0
+        else:
+            axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(axis))
+        return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
+
+    def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
+        """Which cases can be: moments of a rigid body, thrust that pushes."""
+        moments = self._moments(draws)
+        good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
+        for entry in self.inputs.drawn:
+            if entry.tolerance in NOT_NEGATIVE and entry.name in draws:
+                good = good & (entry.nominal + draws[entry.name] >= 0.0)
+        tank = tank_of(self.spacecraft, draws)
+        if tank is not None and any(name.startswith("tank ") for name in draws):
+            good = good & possible(tank)
+        per_kg = self._per_kg(draws)
+        if tank is not None and per_kg is not None:  # with all of it used there must be a body left
+            shed = scaled(per_kg, -1.0 * tank.propellant)
+            good = good & _possible(*added(moments, shed))
+        return good  # type: ignore[no-any-return]
+
+    def _per_kg(self, draws: Draws) -> Triple | None:
+        """What each kg of propellant takes off the moments, m²; None where they stay."""
+        per_kg = shed(self.spacecraft)
+        return None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
+
+    def cases(self, draws: Draws) -> DispersedCases:
+        """The cases of the ``draws`` (deviations by input name)."""
+        turn = self.spacecraft.inertia.axes
+        omega0 = parts_of(self.spacecraft.omega0)
+        off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
+        torques = {source: self._torque(source, draws) for source in {one.source for one in self._actuations}}
+        fired = [self._fired(n, one, torques[one.source], draws) for n, one in enumerate(self._actuations)]
+        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, [one.flow for one in fired])
+        return DispersedCases(
+            moments=self._moments(draws),
+            omega0=added(omega0, turned(turn.T, off)),
+            starts=tuple(one.start for one in fired),
+            widths=tuple(one.width for one in fired),
+            leads=tuple(one.lead for one in fired),
+            impulses=tuple(
+                one.impulse if isinstance(level, float) and level == 1.0 else scaled(one.impulse, level)
+                for one, level in zip(fired, levels, strict=True)
+            ),
+            thrust=tuple(
+                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in one.thrust)
+                for one, level in zip(fired, levels, strict=True)
+            ),
+            tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
+            spent=spent,
+            drained=drained,
+            per_kg=self._per_kg(draws),
+        )
+
+    def _fired(self, index: int, one: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
+        """What the pulse ``index`` gives; ``nominal`` is the `_torque` of what fires it."""
+        opened, width, number = self._opened(one, draws), self.on_times[index], index + 1
+        late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
+        shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
+        start, lead = one.pulse.start, 0.0
+        if one.pulse.command is not None:
+            start = one.pulse.command.start
+            lead = one.pulse.t - 0.5 * width - start
+        longer: dict[str, Cases] = {}
+        if opened:
+            parts = {name: each.acts for name, each in opened.items()}
+            longer = {name: acts / one.pulse.on_time for name, (acts, _, _) in parts.items()}
+            centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
+            lead = centroid - 0.5 * width
+        factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
+        torque, mean, flow = nominal if not opened else self._torque(one.source, draws, longer)
+        if one.source == STEERABLE and not self._members[STEERABLE]:
+            impulse = self._steered(one.pulse.impulse, mean, draws)
+        else:
+            impulse = added(scaled(torque, one.duration), scaled(one.remainder, mean))
+        strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
+        return _Fired(
+            start=plus(start if nothing(shift) else _not_before(start + shift), lead),
+            width=width,
+            lead=lead,
+            impulse=impulse if isinstance(factor, float) and factor == 1.0 else scaled(impulse, factor),
+            thrust=tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()),
+            flow=flow * factor,
+        )
+
+    def _moments(self, draws: Draws) -> Triple:
+        """A scales both transverse moments, C is the axial one."""
+        inertia = self.spacecraft.inertia
+        first, second, third = inertia.moments
+        transverse = plus(1.0, times(draws.get("A", 0.0), 1.0 / inertia.A))
+        wider = first * transverse
+        return wider, wider if first == second else second * transverse, plus(third, draws.get("C", 0.0))
+
+    def _actuation(self, pulse: Pulse) -> _Actuation:
+        thrusters = self._members.get(pulse.channel)
+        source = None if thrusters is None else pulse.channel
+        if not thrusters:
+            return _Actuation(pulse, source, pulse.on_time, parts_of(pulse.impulse))
+        torque = np.sum([thruster.torque for thruster in thrusters], axis=0)
+        duration = pulse.on_time or float(np.linalg.norm(pulse.impulse) / np.linalg.norm(torque))
+        if pulse.torque is not None and self.spacecraft.thrust_laws:  # weaker where it is cold or the pressure falls
+            duration *= float(torque @ pulse.torque) / float(torque @ torque)
+        remainder = pulse.impulse - duration * torque
+        if np.linalg.norm(remainder) <= ROUNDING * np.linalg.norm(pulse.impulse):
+            # What is left is rounding; a single thruster takes it, so that its direction is exactly the schedule's.
+            remainder = np.zeros(3)
+        return _Actuation(pulse, source, duration, parts_of(remainder))
+
+    def _opened(self, one: _Actuation, draws: Draws) -> dict[str, Opened]:
+        """What the valves of a pulse give, by thruster, where any of them is not as the file has it."""
+        if one.pulse.command is None or one.source is None or not one.pulse.command.ramps:
+            return {}
+        from nutdamp.physics.thruster import Measured, Trapezoid  # few spacecraft have any
+
+        members, on_time = self._members[one.source], one.pulse.command.on_time
+        if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
+            return {}
+        found = {}
+        for thruster in members:
+            off = [draws.get(f"{key} {thruster.name}", 0.0) for key in BY_VALVE]
+            if isinstance(thruster.valve, Trapezoid):
+                found[thruster.name] = thruster.valve.opened(on_time, *off[:-1])
+            elif isinstance(thruster.valve, Measured):
+                found[thruster.name] = thruster.valve.opened(on_time, plus(1.0, off[-1]))
+        return found
+
+    def _thrusting(self, one: _Actuation, name: str, opened: Opened, strength: Cases, draws: Draws) -> Thrusting:
+        """What a thruster gives whose torque is ``strength`` times that of the file."""
+        (thruster,) = (each for each in self._members[one.source or ""] if each.name == name)
+        strength = strength * plus(1.0, draws.get(f"thrust {name}", 0.0))
+        return Thrusting(opened, scaled(self.thruster_torque(thruster, draws), strength))
+
+    def _torque(
+        self, source: str | None, draws: Draws, longer: Mapping[str, Cases] | None = None
+    ) -> tuple[Triple, Cases, Cases]:
+        """Torque of a channel (N m), the mean thrust factor of its thrusters, and that of their propellant flow."""
+        thrusters = self._members.get(source, ()) if source is not None else ()
+        if not thrusters:
+            factor = 1.0 if source is None else plus(1.0, draws.get(f"thrust {STEERABLE}", 0.0))
+            return (0.0, 0.0, 0.0), factor, factor
+        torque: Triple = (0.0, 0.0, 0.0)
+        factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
+        if longer is not None:
+            factors = [one * longer.get(thruster.name, 1.0) for one, thruster in zip(factors, thrusters, strict=True)]
+        for thruster, factor in zip(thrusters, factors, strict=True):
+            turned = self.thruster_torque(thruster, draws)
+            torque = added(torque, turned if isinstance(factor, float) and factor == 1.0 else scaled(turned, factor))
+        flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
+        flow = sum(weight * factor for weight, factor in zip(flows, factors, strict=True)) / math.fsum(flows)
+        return torque, sum(factors) / len(factors), flow
+
+    def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
+        """Torque at nominal thrust, with the force tilted and its point of attack moved, N m."""
+        tilts = [draws.get(f"direction {thruster.name} {axis}", 0.0) for axis in "ab"]
+        moves = [draws.get(f"position {thruster.name} {axis}", 0.0) for axis in "xyz"]
+        leans, moved = not all(map(nothing, tilts)), not all(map(nothing, moves))
+        torque = parts_of(thruster.torque)
+        if thruster.force is None or not (leans or moved):
+            return torque
+        force = parts_of(thruster.force)
+        if leans and thruster.position is not None:
+            cosine, sine_ratio = tilted(*tilts)
+            leant = [times(tilt, sine_ratio) for tilt in tilts]
+            arm = parts_of(thruster.position)
+            torque, nominal = scaled(torque, cosine), thruster.force
+            force = scaled(force, cosine)
+            for axis, lean in zip(tilt_axes(nominal), leant, strict=True):
+                more = parts_of(np.cross(axis, nominal))
+                torque = added(torque, scaled(cross(arm, more), lean))
+                force = added(force, scaled(more, lean))
+        if moved:
+            torque = added(torque, cross(turned(self.spacecraft.inertia.axes.T, moves), force))
+        return torque
+
+    def _steered(self, impulse: Vector, factor: Cases, draws: Draws) -> Triple:
+        """Impulse of the steerable torquer, its axis turned in the 1-2 plane."""
+        x, y, z = scaled(parts_of(impulse), factor) if not isinstance(factor, float) else parts_of(impulse * factor)
+        angle = draws.get(f"direction {STEERABLE}", 0.0)
+        if nothing(angle):
+            return x, y, z
+        cosine, sine = cos_sin(angle)
+        return x * cosine - y * sine, x * sine + y * cosine, z
+
+
+def _possible(first: Cases, second: Cases, third: Cases) -> Any:
+    """Which moments a rigid body can have."""
+    slack = 1.0 + DISC
+    good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
+    return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
+
+
+def _width(pulse: Pulse) -> float:
+    """Length (s) of the rectangle that a pulse counts as."""
+    if pulse.command is None or not pulse.command.ramps:
+        return pulse.on_time
+
+    return spread(pulse.command.ramps, pulse.t)
+
+
+def _not_before(start: Cases) -> Cases:
+    """A pulse shifted before t = 0 fires at 0; there its derivative is the mean of both sides, one half."""
+    if not np.iscomplexobj(start):
+        return np.maximum(start, 0.0)
+    return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
+
+
+Tilt = tuple[Any, Any]
+
+
+def watch_of(model: Model, cases: DispersedCases) -> AxisWatch:
+    """What sees the angles from the spin axis to the directions of the cones, in each of the ``cases``."""
+    return watch_over(model.spacecraft, cases.tilt, number_of(cases))
+
+
+def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
+    """The same in so many cases of a ``body`` that begin with their axes off by a ``tilt``, rad, about its 1 and 2."""
+    directions = np.array([in_body(body, tilt, count, one.direction) for one in body.keep])
+    return AxisWatch.of(directions.reshape(-1, 3, count), math.copysign(1.0, body.spin))
+
+
+def in_body(body: Spacecraft, tilt: Tilt, count: int, direction: Vector) -> NDArray[np.float64]:
+    """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3, n)."""
+    x, y, z = attitude.rotate(attitude.conjugate(body.initial.quaternion), direction).tolist()
+    return np.array([np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))])
+
+
+def cones_used(keep: Sequence[Keep], aspects: NDArray[np.float64]) -> NDArray[np.float64]:
+    """By cone and case (m, n): what is used up of a cone, see `Keep.used`, by angles (m, 2, n) on the way."""
+    return np.array([one.used(*angles) for one, angles in zip(keep, aspects, strict=True)]).reshape(aspects[:, 0].shape)
+
+
+def number_of(cases: DispersedCases) -> int:
+    """How many cases there are."""
+    parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt, *(cases.spent or ()), *(cases.per_kg or ()))
+    return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))

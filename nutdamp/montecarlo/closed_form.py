@@ -1,0 +1,264 @@
+"""The closed form of cases, for derivatives: impulse sum Magnus 1970 (17) with exact attitude arcs, in arrays.
+
+Between pulses a symmetric body is free, and two facts make the arcs cheap. Seen in the frame that turns with the
+nutation, by the phase aα with α = ∫ω3 dt, the angular momentum does not move: its transverse part is
+AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A)
+R(0) Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; no angle is taken before the end. Energy
+dissipation draws H away from axis 3 in that frame, along an arc that `energy_sink` knows.
+
+Nothing here takes an absolute value or compares: the same code runs on complex arrays, which gives derivatives to
+rounding (`nutdamp.montecarlo.statistics`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, plus, rotated, times
+from nutdamp.physics import attitude, energy_sink
+from nutdamp.physics.batch import cos_sin
+from nutdamp.physics.energy_sink import TINY
+
+FAR = 8.0
+"""Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
+
+MOST_NODES = 128
+"""Of that quadrature: enough for pulses of 20 nutation periods."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """How cases end.
+
+    ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
+    H at t = 0 and at the end in the true body axes of t = 0, which are fixed in space; ``pointed``: the end in the
+    estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
+    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
+    rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
+    ``drained`` as in `fed.Fed`.
+    """
+
+    momentum: Triple
+    before: Triple
+    after: Triple
+    pointed: Triple
+    spin: Cases
+    spin_change: Cases
+    propellant: Cases | None
+    nutation: Cases | None = None
+    aspects: NDArray[np.float64] | None = None
+    drained: Cases = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """Flies cases of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
+
+    Dissipation acts as the estimate has it, whatever the moments of a case are.
+    """
+
+    model: Model
+
+    def __call__(self, cases: DispersedCases) -> Ends:
+        """How the ``cases`` end, whose pulses all come in the order of the first of them."""
+        return _fly(*_in_order(cases, self._nodes), self.model.spacecraft.growth)
+
+    @cached_property
+    def _nodes(self) -> tuple[int, ...]:
+        """Quadrature nodes that each pulse needs, from the largest phase it may span."""
+        body = self.model.spacecraft
+        A, C, spin = body.inertia.A, body.inertia.C, abs(body.spin)
+        off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
+        off_A, off_C = off.get("A", 0.0), off.get("C", 0.0)
+        ratio = max(abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A)))
+        added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
+        rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
+        return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
+
+
+def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
+    """How cases end whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
+    # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
+    A, C = cases.A, cases.C
+    a, per_A = 1.0 - C / A, 1.0 / A
+    sheds = cases.sheds
+    x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
+    spin = cases.omega0[2]
+    z = C * spin
+    before = (x, y, z)
+    phase: Cases = 0.0
+    now: Cases = 0.0
+    turn: tuple[Cases, ...] | None = None
+    for number, (start, impulse) in enumerate(zip(cases.starts, cases.impulses, strict=True)):
+        on_time = cases.widths[number]
+        centre = start + 0.5 * on_time
+        coast = centre - now
+        turn = _turned_on(turn, (x, y, z), coast * per_A)
+        if growth == 0.0:
+            phase = phase + a * spin * coast
+        else:
+            found, turn = _slipped(turn, (x, y, z), growth, coast)
+            phase = phase + a * spin * found.turned
+            x, y, spin = x * found.transverse, y * found.transverse, spin * found.axial
+            z = C * spin
+        if sheds is not None:  # half before the pulse and half after it, the rates as they are
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
+            a, z = 1.0 - C / A, C * spin
+        along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number], growth)
+        cosine, sine = cos_sin(phase)
+        x = x + along * cosine - across * sine
+        y = y + along * sine + across * cosine
+        if not (isinstance(gained, float) and gained == 0.0):
+            spin = spin + gained / C
+            z = C * spin
+        if sheds is not None:
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
+            a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin
+        now = centre
+    after = (x, y, z) if turn is None else carried(turn, (x, y, z))
+    return Ends(
+        momentum=(x, y, z),
+        before=before,
+        after=after,
+        pointed=rotated(after, cases.tilt),
+        spin=spin,
+        spin_change=spin - cases.omega0[2],
+        propellant=cases.propellant,
+        drained=cases.drained,
+    )
+
+
+def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]) -> tuple[Cases, Cases, Cases, Cases]:
+    """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
+    less = A - 0.5 * sheds[0]
+    return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
+
+
+def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
+    """The quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by |H|·``time``."""
+    x, y, z = momentum
+    size = np.sqrt(x * x + y * y + z * z) + TINY
+    half = np.tan(0.5 * size * time)
+    w = 1.0 / np.sqrt(1.0 + half * half)
+    scale = half * w / size
+    x, y, z = scale * x, scale * y, scale * z
+    return (w, x, y, z) if turn is None else attitude.product(turn, (w, x, y, z))
+
+
+def _slipped(
+    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
+) -> tuple[energy_sink.Course, tuple[Cases, ...]]:
+    """What dissipation does in ``time`` s, and ``turn`` with the slip against ``momentum``, of the course's start."""
+    x, y, z = momentum
+    across = x * x + y * y
+    size = np.sqrt(across + z * z) + TINY
+    found = energy_sink.courses(growth, z / size, across / (size * size), time)
+    w, i, j = found.cosine, found.sine * y / size, -found.sine * x / size
+    p, a, b, c = turn
+    return found, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
+
+
+def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
+    """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit length."""
+    w, a, b, c = turn
+    x, y, z = vector
+    scale = 2.0 / (w * w + a * a + b * b + c * c)
+    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
+    return (
+        x + scale * (w * i + b * k - c * j),
+        y + scale * (w * j + c * i - a * k),
+        z + scale * (w * k + a * j - b * i),
+    )
+
+
+def _effective(
+    impulse: Triple, a: Cases, spin: Cases, C: Cases, on_time: Cases, nodes: int, growth: float
+) -> tuple[Cases, Cases, Cases]:
+    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `rates.width_factor`.
+
+    The spin runs through the pulse, and the factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ =
+    a(ω3 + J3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(aω3τ/2) without J3 and κ.
+    """
+    along, across, axial = impulse
+    if isinstance(on_time, float) and on_time == 0.0:
+        return impulse
+    half = 0.5 * on_time
+    if isinstance(axial, float) and axial == 0.0:
+        angle = a * spin * half + TINY
+        if growth == 0.0:
+            tangent = np.tan(0.5 * angle)
+            factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
+            return times(along, factor), times(across, factor), 0.0
+        (cosine, sine), grown = cos_sin(angle), growth * half
+        level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
+        scale = 1.0 / (angle * angle + grown * grown)
+        return _turned(
+            along, across, (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale, 0.0
+        )
+    gained = axial / C
+    slope, bend = a * (spin + 0.5 * gained) * half, 0.25 * a * gained * half
+    real: Cases = 0.0
+    imaginary: Cases = 0.0
+    for node, weight in _legendre(nodes):
+        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
+        level, slant = cos_sin(slope * node)
+        grown = np.exp(growth * half * node)
+        level, slant = 0.5 * weight * level * (grown + 1.0 / grown), 0.5 * weight * slant * (grown - 1.0 / grown)
+        cosine, sine = cos_sin(bend * (1.0 + node * node))
+        real = real + level * cosine + slant * sine
+        imaginary = imaginary + level * sine - slant * cosine
+    return _turned(along, across, real, imaginary, axial)
+
+
+def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
+    """The complex number ``along``, ``across`` times another, and ``axial``."""
+    return (
+        plus(times(along, real), times(-1.0, times(across, imaginary))),
+        plus(times(along, imaginary), times(across, real)),
+        axial,
+    )
+
+
+def nodes_for(phase: float) -> int:
+    """Fewest Gauss-Legendre nodes (even) that integrate cos(``phase``·x) over |x| <= 1 to rounding.
+
+    By the error of the n-point rule, φ^{2n} 2^{2n+1} (n!)^4 / ((2n+1) ((2n)!)^3).
+    """
+    phase = max(phase, 1e-3)
+    for nodes in range(2, MOST_NODES, 2):
+        error = (
+            2 * nodes * math.log(2.0 * phase)
+            + 4.0 * math.lgamma(nodes + 1)
+            - math.log(2 * nodes + 1)
+            - 3.0 * math.lgamma(2 * nodes + 1)
+        )
+        if error < math.log(1e-17):
+            return nodes
+    return MOST_NODES
+
+
+@cache
+def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
+    """The nodes above zero of an even Gauss-Legendre rule, with weights for the mean of an even function."""
+    places, weights = np.polynomial.legendre.leggauss(nodes)
+    half = nodes // 2
+    return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
+
+
+def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedCases, tuple[int, ...]]:
+    """The ``cases``, and the ``nodes``, with the pulses in the order of their centres in the first case."""
+    centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
+    order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable").tolist()
+    if order == sorted(order):
+        return cases, nodes
+    starts, widths, impulses = (
+        tuple(each[number] for number in order) for each in (cases.starts, cases.widths, cases.impulses)
+    )
+    spent = None if cases.spent is None else tuple(cases.spent[number] for number in order)
+    placed = replace(cases, starts=starts, widths=widths, impulses=impulses, spent=spent)
+    return placed, tuple(nodes[number] for number in order)

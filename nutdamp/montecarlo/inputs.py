@@ -1,0 +1,537 @@
+"""Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
+
+Every drawn quantity is one `Input` with a name of its own. A tolerance that cannot touch the outcome is not dropped
+in silence: it becomes an `Unused` with its reason.
+
+Inputs that vary together: a Gaussian copula over the draws of each.
+
+Each input of a group is a monotonic function of a standard normal number, and the correlation given is that of these
+numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform ones theirs is (6/π) asin(ρ/2).
+
+Draws: the same numbers for the same seed, whatever the number of threads or of cases.
+
+Cases come in fixed blocks of `BLOCK`. Every input has a stream of its own in every block: the counter-based Philox
+generator with the seed and the input's name in the key, the block in the counter. So case 1234 is the same in a study
+of any size, and a tolerance that is tightened or dropped leaves the draws of all others as they were. Inputs that are
+correlated are mixed of the streams of their group.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import BadRequest, Unsuitable
+from nutdamp.flight.propagation import shed
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Thruster
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+
+SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
+"""Standard deviation of each kind for a size of one."""
+
+BY_VALVE = ("open_delay", "close_delay", "rise_time", "fall_time", "impulse_bit")
+"""Tolerances of a valve, or in the last place of a table."""
+
+KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force acts is not known"
+
+SCHEDULE_IDLE = "the schedule does not fire"
+
+
+class Input(NamedTuple):
+    """One drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
+
+    ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
+    `nutdamp.spacecraft.tolerances.KINDS`, in ``unit`` (a bare number for factors).
+    """
+
+    name: str
+    tolerance: str
+    kind: str
+    size: float
+    nominal: float
+    unit: str
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation, in ``unit``; zero for a bias."""
+        return abs(self.size) * SPREAD[self.kind]
+
+
+class Unused(NamedTuple):
+    """A tolerance of the file that touches nothing, and why."""
+
+    name: str
+    reason: str
+
+
+class Inputs(NamedTuple):
+    """What a study draws, in a fixed order, and what it leaves."""
+
+    drawn: tuple[Input, ...]
+    unused: tuple[Unused, ...]
+
+
+def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
+    """The inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
+    drawn: list[Input] = []
+    unused: list[Unused] = []
+    for entry in _entries(spacecraft, schedule):
+        if isinstance(entry, Unused):
+            unused.append(entry)
+        elif entry.size == 0.0:
+            unused.append(Unused(entry.name, _no_size(entry)))
+        else:
+            drawn.append(entry)
+    return Inputs(tuple(drawn), tuple(unused))
+
+
+def reachable(spacecraft: Spacecraft) -> Inputs:
+    """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
+
+    What each pulse draws is there once.
+    """
+    pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
+    if spacecraft.torquer is not None:
+        pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
+    drawn, unused = list_inputs(spacecraft, Schedule(tuple(pulses)))
+    once = (entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1"))
+    sensor = of_sensor(spacecraft)
+    rest = (entry for entry in unused if not entry.name.startswith("sensor "))
+    return Inputs(
+        (*(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once), *sensor.drawn),
+        (
+            *(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in rest),
+            *sensor.unused,
+        ),
+    )
+
+
+def of_sensor(spacecraft: Spacecraft) -> Inputs:
+    """What a loop draws of its sensor: bias and scale of each gyro on its own; nothing for a spacecraft without one."""
+    requested, loop = spacecraft.dispersions, spacecraft.loop
+    if requested is None or loop is None:
+        return Inputs((), ())
+    sensor = loop.sensor
+    single = sensor.kind == ACCELEROMETER
+    axes, unit = ([""], "m/s²") if single else ([" 1", " 2"], "rad/s")
+    known = {
+        **{f"sensor bias{axis}": ("sensor_bias", sensor.bias, unit) for axis in axes},
+        **{f"sensor scale{axis}": ("sensor_scale", 1.0, "") for axis in axes},
+        "sensor noise": ("sensor_noise", 1.0, ""),
+        "sensor delay": ("sensor_delay", sensor.delay, "s"),
+    }
+    drawn, unused = [], []
+    for name, (key, nominal, of) in known.items():
+        tolerance: Tolerance | None = getattr(requested, key)
+        if tolerance is None:
+            continue
+        idle = "the sensor has no noise" if key == "sensor_noise" and sensor.noise == 0.0 else ""
+        if idle or tolerance.size == 0.0:
+            unused.append(Unused(name, idle or "its size is zero"))
+        else:
+            drawn.append(_input(name, key, tolerance, nominal, of))
+    return Inputs(tuple(drawn), tuple(unused))
+
+
+def _no_size(entry: Input) -> str:
+    if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
+        return "given in % of a value that is zero"
+    return "its size is zero"
+
+
+def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unused]:
+    requested = spacecraft.dispersions
+    if requested is None:
+        return
+    moments = (("A", spacecraft.inertia.A, requested.A), ("C", spacecraft.inertia.C, requested.C))
+    rates = spacecraft.inertia.axes @ spacecraft.omega0
+    for name, nominal, tolerance in moments:
+        if tolerance is not None:
+            yield _input(name, name, tolerance, nominal, "kg m²")
+    for number, (tolerance, rate) in enumerate(zip(requested.omega0, rates.tolist(), strict=True), start=1):
+        if tolerance is not None:
+            yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")
+    members = fired(spacecraft, schedule)
+    kinds = [("thrust", _thrust), ("thrust_direction", _direction), ("position", _position)]
+    kinds += [(key, partial(_valve, key)) for key in BY_VALVE]
+    for key, of_thruster in kinds:
+        for name, tolerance in getattr(requested, key).items():
+            if name in members:
+                yield from of_thruster(name, tolerance, members[name])
+            else:
+                who = "the steerable torquer" if name == STEERABLE else name
+                yield Unused(f"{key.removeprefix('thrust_')} {name}", f"{SCHEDULE_IDLE} {who}")
+    yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
+    pulses = range(1, len(schedule) + 1)
+    if requested.thrust_per_pulse is not None:
+        named = [f"thrust pulse {number}" for number in pulses]
+        yield from _of_pulses("thrust_per_pulse", named, requested.thrust_per_pulse, 1.0, "")
+    if requested.timing is not None:
+        yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], requested.timing, 0.0, "s")
+    if requested.timing_offset is not None:
+        yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), requested.timing_offset, 0.0, "s")
+    sensor = spacecraft.sun_sensor
+    if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
+        for number in pulses:
+            yield Input(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
+    if requested.attitude is not None:
+        for axis in "xy":
+            yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
+    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
+        if getattr(requested, key) is not None:
+            yield Unused(key.replace("_", " "), "a schedule is fired whatever a sensor shows: --loop flies the loop")
+
+
+def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:
+    """Sizes of relative tolerances become absolute; a factor (nominal one) stays what it is."""
+    size = tolerance.size * (nominal if tolerance.relative else 1.0)
+    return Input(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
+
+
+def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
+    """The thrusters that the schedule fires, by name; the steerable torquer has None."""
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    members: dict[str, Thruster | None] = {}
+    for pulse in schedule:
+        if pulse.channel in channels:
+            members |= {thruster.name: thruster for thruster in channels[pulse.channel].thrusters}
+        elif pulse.channel == STEERABLE and spacecraft.torquer is not None:
+            members[STEERABLE] = None
+    return members
+
+
+def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[Input | Unused]:
+    yield Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
+
+
+def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+    if thruster is None:
+        yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
+    elif thruster.force is None or thruster.position is None:
+        yield Unused(f"direction {name}", KNOWN_BY_TORQUE)
+    else:
+        for axis in "ab":
+            yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
+
+
+def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+    if thruster is None:
+        yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
+    elif thruster.force is None:
+        yield Unused(f"position {name}", KNOWN_BY_TORQUE)
+    else:
+        for axis in "xyz":
+            yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
+
+
+def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
+    """Tolerances of cold nozzles and of the tank; ``fires``: whether any thruster does."""
+    cold, tank = spacecraft.cold, spacecraft.tank
+    first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
+    of_cold = {"cold": (first, ""), "cold_pulses": (count, "")}
+    units = {"propellant": "kg", "pressure": "Pa", "final_pressure": "Pa", "exponent": ""}
+    of_tank = {f"tank_{name}": (0.0 if tank is None else getattr(tank, name), unit) for name, unit in units.items()}
+    for key, (nominal, unit) in (of_cold | of_tank | {"inertia_per_kg": (1.0, "")}).items():
+        tolerance: Tolerance | None = getattr(requested, key)
+        if tolerance is None:
+            continue
+        name = key.replace("tank_", "tank ")
+        if (cold if key in of_cold else tank) is None:
+            yield Unused(name, f"the file has no {'cold nozzles' if key in of_cold else 'tank'}")
+        elif key == "inertia_per_kg" and shed(spacecraft) is None:
+            yield Unused(name, "the tank has no inertia_per_kg")
+        elif not fires:
+            yield Unused(name, "the schedule fires no thruster")
+        else:
+            yield _input(name, key, tolerance, nominal, unit)
+
+
+def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+    """A tolerance of a valve, or of a table in its place."""
+    called, valve = f"{key} {name}", None if thruster is None else thruster.valve
+    delay = getattr(valve, key, None)
+    if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
+        yield Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
+    elif key == "impulse_bit" or delay is None:
+        yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
+    else:
+        yield _input(called, key, tolerance, delay, "s")
+
+
+def _of_pulses(
+    key: str, names: Iterable[str], tolerance: Tolerance, nominal: float, unit: str
+) -> Iterator[Input | Unused]:
+    named = list(names)
+    if not named:
+        yield Unused(key.replace("_", " "), "the schedule has no pulses")
+    for name in named:
+        yield Input(name, key, tolerance.kind, tolerance.size, nominal, unit)
+
+
+Array = NDArray[np.float64]
+Pair = tuple[str, str, float]
+"""Names of two inputs, and their correlation."""
+
+NODES = 96
+"""Of the quadrature by which the correlation of values that are not normal is worked out."""
+
+
+class Group(NamedTuple):
+    """Inputs that are correlated with one another, directly or through others: ``matrix`` (m, m) of their normals."""
+
+    names: tuple[str, ...]
+    matrix: Array
+
+    @property
+    def factor(self) -> Array:
+        """L (m, m), lower: L times independent standard normals has this correlation. The first stays as it is."""
+        return np.asarray(np.linalg.cholesky(self.matrix))
+
+    def among(self, names: Iterable[str]) -> Group:
+        """Those of them that are among ``names``."""
+        rows = [row for row, name in enumerate(self.names) if name in set(names)]
+        return Group(tuple(self.names[row] for row in rows), self.matrix[np.ix_(rows, rows)])
+
+    def mixed(self, independent: Sequence[Array]) -> list[Array]:
+        """Correlated standard normals (m, n) of independent ones; each sum is taken in the same order for any n."""
+        return [
+            sum((entry * independent[at] for at, entry in enumerate(row[: index + 1])), np.zeros(()))
+            for index, row in enumerate(self.factor.tolist())
+        ]
+
+
+def positive_definite(group: Group) -> bool:
+    """Whether there are numbers with these correlations, none of which follows from the others."""
+    try:
+        return bool(np.all(np.isfinite(group.factor)))
+    except np.linalg.LinAlgError:
+        return False
+
+
+def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
+    """The groups that ``pairs`` connect, names in the order of their first pair."""
+    pairs = list(pairs)
+    members: list[list[str]] = []
+    for first, second, _ in pairs:
+        touched = [one for one in members if first in one or second in one]
+        members = [one for one in members if one not in touched]
+        members.append(list(dict.fromkeys([*(name for one in touched for name in one), first, second])))
+    groups = []
+    for names in members:
+        matrix = np.eye(len(names))
+        for first, second, size in pairs:
+            if first in names:
+                row, column = names.index(first), names.index(second)
+                matrix[row, column] = matrix[column, row] = size
+        groups.append(Group(tuple(names), matrix))
+    return tuple(groups)
+
+
+def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
+    """The same; raises BadRequest where they are not positive definite."""
+    found = grouped(pairs)
+    for group in found:
+        if not positive_definite(group):
+            raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
+    return found
+
+
+def value_of(entry: Input, normal: Array) -> Array:
+    """The deviation that belongs to a standard ``normal`` number, at the same level of its distribution."""
+    if entry.kind == "normal":
+        return entry.size * normal
+    from scipy.special import ndtr  # few files have correlated inputs that are not normal
+
+    if entry.kind == "uniform":
+        return np.asarray(entry.size * (2.0 * ndtr(normal) - 1.0))
+    return np.asarray(entry.size * np.sign(normal) * (1.0 - np.sqrt(2.0 * ndtr(-np.abs(normal)))))
+
+
+def normal_of(entry: Input, value: Array) -> Array:
+    """The inverse of `value_of`."""
+    if entry.kind == "normal":
+        return value / entry.size
+    from scipy.special import ndtri  # as above
+
+    share = value / entry.size
+    below = 0.5 * (1.0 - np.abs(share)) if entry.kind == "uniform" else 0.5 * (1.0 - np.abs(share)) ** 2
+    return np.asarray(-np.sign(share) * ndtri(np.maximum(below, np.finfo(float).tiny)))
+
+
+def mixing(inputs: Sequence[Input], groups: Iterable[Group]) -> Array:
+    """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; the unit matrix where none is correlated.
+
+    In a group, column k is what input k adds to those before it.
+    """
+    found, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
+    for group in groups:
+        present = group.among(rows)
+        members = [inputs[rows[name]] for name in present.names]
+        if len(members) < 2:
+            continue
+        matrix = [
+            [_of_values(one, other, rho) for other, rho in zip(members, line, strict=True)]
+            for one, line in zip(members, present.matrix.tolist(), strict=True)
+        ]
+        at = [rows[name] for name in present.names]
+        found[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
+    return found
+
+
+def independent(draws: Mapping[str, Array], inputs: Iterable[Input], groups: Iterable[Group]) -> dict[str, Array]:
+    """The draws, where those of a group are the independent normals behind them: what each adds to those before it."""
+    named, found = {entry.name: entry for entry in inputs}, dict(draws)
+    for group in groups:
+        present = group.among(draws)
+        if len(present.names) < 2:
+            continue
+        normals = np.array([normal_of(named[name], draws[name]) for name in present.names])
+        found.update(zip(present.names, np.linalg.solve(present.factor, normals), strict=True))
+    return found
+
+
+def together(inputs: Sequence[Input], groups: Iterable[Group]) -> list[list[int]]:
+    """Rows of ``inputs``, those of a group in one list, in order."""
+    rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
+    found = [[rows[name] for name in group.among(rows).names] for group in groups]
+    taken = {row for one in found for row in one}
+    return sorted([one for one in found if one] + [[row] for row in range(len(inputs)) if row not in taken], key=min)
+
+
+def _of_values(first: Input, second: Input, rho: float) -> float:
+    """Correlation of the values of two inputs whose normals have ``rho``, by Gauss-Hermite quadrature."""
+    if first.name == second.name:
+        return 1.0
+    if first.kind == second.kind == "normal":
+        return rho
+    if first.kind == second.kind == "uniform":
+        return 6.0 / math.pi * math.asin(0.5 * rho)
+    nodes, weights = _nodes()
+    other = rho * nodes[:, None] + math.sqrt(1.0 - rho * rho) * nodes
+    mean = weights @ (value_of(first, nodes)[:, None] * value_of(second, other)) @ weights
+    return float(mean / (first.sigma * second.sigma))
+
+
+@cache
+def _nodes() -> tuple[Array, Array]:
+    """Of the standard normal distribution."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    return nodes, weights / math.sqrt(2.0 * math.pi)
+
+
+Draws = Mapping[str, "Array | float"]
+"""Deviations from nominal by the name of the input, (n,) or one for all cases."""
+
+BLOCK = 16_384
+"""Cases that share a substream of each input."""
+
+MOST_ATTEMPTS = 1_000
+"""How often a case may be drawn again before the dispersions count as impossible."""
+
+
+class Source:
+    """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
+
+    ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
+    are correlated, those too that are not drawn: which others are makes no difference to a draw.
+    """
+
+    def __init__(
+        self,
+        inputs: Sequence[Input],
+        seed: int,
+        physical: Callable[[Draws], NDArray[np.bool_] | bool],
+        groups: Iterable[Group] = (),
+    ):
+        self._random = [entry for entry in inputs if entry.kind != "bias"]
+        self._fixed = {entry.name: entry.size for entry in inputs if entry.kind == "bias"}
+        self._rows = {entry.name: row for row, entry in enumerate(self._random)}
+        self._groups = [group for group in groups if any(name in self._rows for name in group.names)]
+        grouped = {name for group in self._groups for name in group.names}
+        self._alone = [entry for entry in self._random if entry.name not in grouped]
+        self._keys = {
+            name: np.array([seed, _number(name)], dtype=np.uint64)
+            for name in dict.fromkeys([*self._rows, *sorted(grouped)])
+        }
+        self._bits = np.random.Philox(key=0)
+        self._generator = np.random.Generator(self._bits)
+        self._table = np.empty((len(self._random), BLOCK))
+        self._physical = physical
+
+    def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
+        """Deviations of the cases of block ``number`` (from 0), and which rows were drawn again (as often as it was).
+
+        The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
+        """
+        self._fill(self._table, number, 0)
+        draws = self._named(self._table)
+        redrawn = []
+        rows = _bad_rows(self._physical(draws), BLOCK)
+        attempt = 0
+        while len(rows):
+            attempt += 1
+            if attempt > MOST_ATTEMPTS:
+                problem = "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)"
+                raise Unsuitable(("dispersions",), problem)
+            redrawn.append(rows)
+            again = np.empty((len(self._random), len(rows)))
+            self._fill(again, number, attempt)
+            self._table[:, rows] = again
+            rows = rows[_bad_rows(self._physical(self._named(again)), len(rows))]
+        return draws, np.concatenate(redrawn) if redrawn else np.empty(0, dtype=np.intp)
+
+    def _named(self, table: Array) -> dict[str, Array | float]:
+        rows = zip(self._random, table, strict=True)
+        return {**self._fixed, **{entry.name: row for entry, row in rows}}
+
+    def _fill(self, table: Array, block: int, attempt: int) -> None:
+        """Deviations of one block into ``table`` (inputs, cases); each ``attempt`` has a stream of its own."""
+        for entry in self._alone:
+            row, generator = table[self._rows[entry.name]], self._stream(entry.name, block, attempt)
+            if entry.kind == "normal":
+                generator.standard_normal(out=row)
+                row *= entry.size
+            else:
+                generator.random(out=row)
+                if entry.kind == "triangular":
+                    row += generator.random(len(row))
+                    row -= 1.0
+                else:
+                    row *= 2.0
+                    row -= 1.0
+                row *= entry.size
+        for group in self._groups:
+            count = (table.shape[1],)
+            normals = [self._stream(name, block, attempt).standard_normal(count) for name in group.names]
+            for name, normal in zip(group.names, group.mixed(normals), strict=True):
+                if name in self._rows:
+                    table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
+
+    def _stream(self, name: str, block: int, attempt: int) -> np.random.Generator:
+        """The generator, at the begin of what one input draws."""
+        self._bits.state = {
+            "bit_generator": "Philox",
+            "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": self._keys[name]},
+            "buffer": np.zeros(4, dtype=np.uint64),
+            "buffer_pos": 4,  # empty: begin with the counter
+            "has_uint32": 0,
+            "uinteger": 0,
+        }
+        return self._generator
+
+
+def _bad_rows(good: NDArray[np.bool_] | bool, count: int) -> NDArray[np.intp]:
+    return np.flatnonzero(~np.broadcast_to(np.asarray(good), count))
+
+
+def _number(name: str) -> int:
+    """A number of 64 bits for a name, the same everywhere."""
+    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")

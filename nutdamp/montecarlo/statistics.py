@@ -1,0 +1,455 @@
+"""Which tolerance matters: first-order sensitivities of the outcome, and the shares that the drawn cases show.
+
+First order is analytic: the kernel itself runs on numbers with an infinitesimal imaginary part (complex-step
+differentiation, Squire & Trapp 1998), which carries each input's derivative through every operation to rounding,
+without differences of nearby numbers. The shares from the cases are first-order Sobol indices, from the means of the
+outcome over equally likely intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
+
+Distributions of an output over many cases: exact while they fit, in constant memory beyond.
+
+Everything here is the same in whatever order or portions the cases come: exact values have their places, and the
+sketch only counts.
+
+The exact interval for a probability of which so many of so many cases were seen; by the standard library alone.
+
+What a study reports of each case: five numbers, and the small vectors of which two are the lengths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, parts_of
+from nutdamp.montecarlo.closed_form import ClosedForm, Ends
+from nutdamp.montecarlo.inputs import Input, mixing
+
+STEPS = 200
+"""Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly."""
+
+ACCURACY = 4e-16
+"""Relative change of a quantile, or of a continued fraction, that is rounding."""
+
+TINY = 1e-300
+"""In place of a denominator of zero."""
+
+LARGE = 20.0
+"""Argument from which Stirling's series of the logarithm of Γ is exact to rounding."""
+
+
+def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """The exact interval for a probability of which ``successes`` of ``trials`` were seen, Clopper & Pearson 1934.
+
+    It holds the true probability at least as often as ``confidence`` says, whatever that probability is.
+    """
+    tail = 0.5 * (1.0 - confidence)
+    failures = trials - successes
+    low = 0.0 if successes == 0 else _quantile(successes, failures + 1, tail, upper=False)
+    high = 1.0 if failures == 0 else _quantile(successes + 1, failures, tail, upper=True)
+    return low, high
+
+
+def cases_to_show(probability: float, confidence: float = 0.95) -> int:
+    """Fewest cases, all good, after which the lower end of `binomial_interval` reaches ``probability``."""
+    return math.ceil(math.log(0.5 * (1.0 - confidence)) / math.log(probability))
+
+
+def _quantile(a: float, b: float, tail: float, *, upper: bool) -> float:
+    """Where a beta distribution has ``tail`` below (``upper``: above): by Newton's steps, halving where they fail."""
+    low, high, x = 0.0, 1.0, a / (a + b)
+    for _ in range(STEPS):
+        below, above, density = _beta(a, b, x)
+        excess = tail - above if upper else below - tail
+        low, high = (low, x) if excess > 0.0 else (x, high)
+        new = x - excess / density if density > 0.0 else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - x) <= ACCURACY * x:
+            return new
+        x = new
+    return x
+
+
+def _beta(a: float, b: float, x: float) -> tuple[float, float, float]:
+    """Shares of a beta distribution below and above ``x``, and its density (Abramowitz & Stegun 26.5.1, 26.5.8)."""
+    n = a + b
+    off = x * n - a
+    power = a * _logarithm(off / a, x * n / a) + b * _logarithm(-off / b, (1.0 - x) * n / b)
+    kernel = math.exp(power + 0.5 * math.log(a * b / (2.0 * math.pi * n)) + _rest(n) - _rest(a) - _rest(b))
+    if x * (n + 2.0) < a + 1.0:
+        below = kernel / a * _fraction(a, b, x)
+        return below, 1.0 - below, kernel / (x * (1.0 - x))
+    above = kernel / b * _fraction(b, a, 1.0 - x)
+    return 1.0 - above, above, kernel / (x * (1.0 - x))
+
+
+def _logarithm(more: float, ratio: float) -> float:
+    """The logarithm of a ``ratio`` that is 1 + ``more``, whichever of the two is the more exact."""
+    return math.log1p(more) if abs(more) < 0.5 else math.log(ratio)
+
+
+def _rest(z: float) -> float:
+    """What Stirling's formula lacks: ln Γ(z) - (z - 1/2) ln z + z - ln(2π)/2."""
+    if z < LARGE:
+        return math.lgamma(z) - (z - 0.5) * math.log(z) + z - 0.5 * math.log(2.0 * math.pi)
+    square = 1.0 / (z * z)
+    return (1 / 12 - square * (1 / 360 - square * (1 / 1260 - square * (1 / 1680 - square / 1188)))) / z
+
+
+def _fraction(a: float, b: float, x: float) -> float:
+    """The continued fraction of the incomplete beta function, by Lentz's method; it takes some √(a + b) terms."""
+    c, d = 1.0, 1.0 / _not_zero(1.0 - (a + b) * x / (a + 1.0))
+    value = d
+    for m in range(1, 100 + 20 * math.isqrt(int(a + b))):
+        for term in (
+            m * (b - m) * x / ((a + 2 * m - 1.0) * (a + 2 * m)),
+            -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1.0)),
+        ):
+            c, d = _not_zero(1.0 + term / c), 1.0 / _not_zero(1.0 + term * d)
+            value *= c * d
+        if abs(c * d - 1.0) <= ACCURACY:
+            break
+    return value
+
+
+def _not_zero(value: float) -> float:
+    return value if abs(value) > TINY else TINY
+
+
+Array = NDArray[np.float64]
+
+OUTPUTS = ("nutation", "momentum_shift", "axis_error", "spin_change", "propellant")
+"""In rad, rad, rad, rad/s and kg; the angles are called as the values of `nutdamp.spacecraft.requirements.Part`."""
+
+
+VECTORS = {
+    "nutation": slice(0, 2),
+    "momentum_shift": slice(2, 5),
+    "axis_error": slice(5, 8),
+    "spin_change": slice(8, 9),
+    "propellant": slice(9, 10),
+}
+"""Which rows of `vectors` belong to each output."""
+
+ROWS = 10
+"""Rows of `vectors`."""
+
+
+def measure(model: Model, ends: Ends, out: Array) -> None:
+    """The `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where it is not known."""
+    x, y, z = ends.momentum
+    sense = math.copysign(1.0, model.spacecraft.spin)
+    out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
+    out[1] = angle(ends.before, ends.after)
+    out[2] = angle(parts_of(model.target), ends.pointed)
+    out[3] = ends.spin_change
+    out[4] = np.nan if ends.propellant is None else ends.propellant
+
+
+def vectors(model: Model, ends: Ends, out: NDArray[Any]) -> None:
+    """What varies linearly for small dispersions, into ``out`` (10, n); `VECTORS` names the rows.
+
+    Nutation is the length of the transverse momentum over the axial one, the shift of H that of the change of its
+    direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
+    nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
+    """
+    x, y, z = ends.momentum
+    sense = math.copysign(1.0, model.spacecraft.spin)
+    out[0], out[1] = x * sense / z, y * sense / z
+    before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
+    for row in range(3):
+        out[2 + row] = after[row] - before[row]
+        out[5 + row] = pointed[row] - model.target[row]
+    out[8] = ends.spin_change
+    out[9] = 0.0 if ends.propellant is None else ends.propellant
+
+
+def _unit(vector: Triple) -> Triple:
+    x, y, z = vector
+    size = 1.0 / np.sqrt(x * x + y * y + z * z)
+    return x * size, y * size, z * size
+
+
+def angle(first: Triple, second: Triple) -> Cases:
+    """Angle between vectors, exact to rounding from 0 to π."""
+    (a, b, c), (x, y, z) = first, second
+    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
+    return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
+
+
+EXACT_CASES = 10_000_000
+"""Up to so many cases every value is kept, and percentiles are exact."""
+
+SHARPNESS = 10
+"""Leading bits of the mantissa that the sketch tells apart: bins 0.1 % wide, so their middles are 0.05 % off."""
+
+OCTAVES = 64
+"""The sketch tells sizes from 2^-64 to 2^64 apart; what is smaller counts as zero."""
+
+PORTION = 16_384
+"""Values that are counted at once, so that they stay in the cache."""
+
+_SIZES = 2 * OCTAVES << SHARPNESS
+_SHIFT = 52 - SHARPNESS
+_LOWEST = (1023 - OCTAVES) << SHARPNESS
+
+
+class Exact:
+    """All values, in the order of the cases."""
+
+    def __init__(self, values: Array) -> None:
+        self.values = values
+
+    @property
+    def minimum(self) -> float:
+        """Smallest value."""
+        return float(self.values.min())
+
+    @property
+    def maximum(self) -> float:
+        """Largest value."""
+        return float(self.values.max())
+
+    def quantiles(self, probabilities: Array) -> Array:
+        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`.
+
+        Each divides what lies above the last one.
+        """
+        places = np.asarray(probabilities) * (len(self.values) - 1)
+        found = np.empty(len(places))
+        rest, first = self.values.copy(), 0  # what lies above the last quantile, and its rank
+        for index in np.argsort(places).tolist():
+            rank = int(places[index])
+            rest.partition(rank - first)
+            rest, first = rest[rank - first :], rank
+            share = places[index] - rank
+            low, high = rest[0], rest[1:].min() if share else rest[0]
+            found[index] = low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)
+        return found
+
+    def histogram(self, edges: Array) -> Array:
+        """Cases between each two of ``edges``."""
+        return np.histogram(self.values, edges)[0].astype(float)
+
+
+class Sketch:
+    """Counts of values by sign, power of two and leading bits of the mantissa: 2 MiB whatever the number of cases.
+
+    Quantiles are right to 0.05 % of their value; minimum and maximum are exact.
+    """
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(2 * _SIZES, dtype=np.int64)
+        self.minimum, self.maximum = math.inf, -math.inf
+
+    def add(self, values: Array) -> None:
+        """Count more ``values`` (n,)."""
+        for begin in range(0, len(values), PORTION):
+            part = values[begin : begin + PORTION]
+            bins = (np.abs(part).view(np.int64) >> _SHIFT) - _LOWEST
+            np.clip(bins, 0, _SIZES - 1, out=bins)
+            least, most = float(part.min()), float(part.max())
+            if least < 0.0:
+                # Negative values lie below the middle, mirrored, so that bins ascend with the value.
+                np.copyto(bins, -1 - bins, where=part < 0.0)
+            bins += _SIZES
+            lowest = int(bins.min())
+            found = np.bincount(bins - lowest)  # values lie close together: few bins to count
+            self.counts[lowest : lowest + len(found)] += found
+            self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
+
+    def quantiles(self, probabilities: Array) -> Array:
+        """Quantiles to 0.05 %."""
+        below = np.cumsum(self.counts)
+        ranks = np.floor(np.asarray(probabilities) * (below[-1] - 1)).astype(np.int64)
+        values = _middles()[np.searchsorted(below, ranks, side="right")]
+        values = np.where(ranks == below[-1] - 1, self.maximum, np.where(ranks == 0, self.minimum, values))
+        return np.asarray(np.clip(values, self.minimum, self.maximum))
+
+    def histogram(self, edges: Array) -> Array:
+        """Cases between each two of ``edges``."""
+        return np.histogram(_middles(), edges, weights=self.counts.astype(float))[0]
+
+
+Distribution = Exact | Sketch
+"""An output over all cases so far."""
+
+
+def _middles() -> Array:
+    """The value that represents each bin of a sketch."""
+    low = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)
+    sizes = low * (1.0 + 0.5 ** (SHARPNESS + 1))
+    sizes[0] = 0.0
+    return np.concatenate([-sizes[::-1], sizes])
+
+
+class Worst:
+    """The cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
+
+    def __init__(self, keep: int) -> None:
+        self.keep = keep
+        self.cases = np.empty(0, dtype=np.int64)
+        self.severities = np.empty(0)
+
+    def add(self, first: int, severities: Array) -> None:
+        """Consider the cases from number ``first`` on."""
+        if len(self.cases) == self.keep:
+            rows = np.flatnonzero(severities > self.severities[-1])
+        elif len(severities) > self.keep:
+            least = np.partition(severities, len(severities) - self.keep)[len(severities) - self.keep]
+            rows = np.flatnonzero(severities >= least)
+        else:
+            rows = np.arange(len(severities))
+        cases = np.concatenate([self.cases, first + rows])
+        severities = np.concatenate([self.severities, severities[rows]])
+        order = np.lexsort((cases, -severities))[: self.keep]
+        self.cases, self.severities = cases[order], severities[order]
+
+
+STEP = 1e-30
+"""Imaginary step, as a share of an input's size: nothing is subtracted, so nothing is lost however small it is."""
+
+SHARE = 1e-3
+"""Of an input's size, by which it is changed to either side where differences are taken."""
+
+CLASSES = 128
+"""Intervals of an input over which the cases are averaged, at most."""
+
+CLASS_SIZE = 32
+"""Cases in each of them, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrder:
+    """The outcome to first order about nominal values (and biases).
+
+    ``jacobian`` (10, d): derivative of each row of `nutdamp.montecarlo.statistics.vectors` by each drawn input, in its
+    unit; ``sigmas`` (d,) standard deviations of the inputs. ``mixing`` (d, d), times its transpose, is their
+    correlation; None where they are independent.
+    """
+
+    inputs: tuple[Input, ...]
+    jacobian: Array
+    mixing: Array | None = None
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations of the inputs, (d,)."""
+        return np.array([entry.sigma for entry in self.inputs])
+
+    def covariance(self, output: str) -> Array:
+        """Covariance of the vector behind ``output``."""
+        scaled = self.independent(output)
+        return np.asarray(scaled @ scaled.T)
+
+    def independent(self, output: str) -> Array:
+        """What one sigma of each input adds to that vector, (m, d); of correlated ones beyond those before it."""
+        scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
+        return scaled if self.mixing is None else np.asarray(scaled @ self.mixing)
+
+    def sigma(self, output: str) -> float:
+        """Root mean square of that vector about its mean, rad (rad/s, kg)."""
+        return float(np.sqrt(np.trace(self.covariance(output))))
+
+    def effects(self, output: str) -> Array:
+        """What each input alone does to ``output``, (d,): one sigma of it, or all of a bias."""
+        sizes = np.array([entry.sigma or abs(entry.size) for entry in self.inputs])
+        return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
+
+    def shares(self, output: str) -> Array:
+        """Share of each input in the variance of ``output``, (d,); all zero where nothing varies.
+
+        Of inputs that are correlated each has what it adds to those before it; the sum over them is the group's.
+        """
+        squares = (self.independent(output) ** 2).sum(axis=0)
+        total = squares.sum()
+        return np.asarray(squares / total if total > 0.0 else squares)
+
+
+ALIKE = 0.01
+"""Share by which the derivatives of the closed form may differ from those of what is flown, and be used for them."""
+
+
+def as_flown(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+    """The derivatives of what ``fly`` flies: those of the closed form where they agree, for they have no rounding.
+
+    By output and input; else central differences.
+    """
+    flown = by_differences(model, fly)
+    if model.schedule.blocks or not flown.inputs:
+        return flown
+    closed, jacobian = first_order(model).jacobian, flown.jacobian.copy()
+    for rows in VECTORS.values():
+        apart, size = (np.linalg.norm(one[rows], axis=0) for one in (closed - jacobian, jacobian))
+        alike = apart <= ALIKE * size
+        jacobian[rows, alike] = closed[rows, alike]
+    return FirstOrder(flown.inputs, jacobian, flown.mixing)
+
+
+def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+    """The same by central differences of what ``fly`` flies, which no closed form has: blocks fired by Sun pulses."""
+    inputs = model.inputs.drawn
+    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
+    draws: dict[str, Array | float] = {}
+    for index, entry in enumerate(inputs):
+        draw = np.full(2 * len(inputs), entry.size if entry.kind == "bias" else 0.0)
+        draw[2 * index : 2 * index + 2] += steps[index], -steps[index]
+        draws[entry.name] = draw
+    out = np.empty((ROWS, 2 * len(inputs)))
+    if inputs:
+        vectors(model, fly(model.cases(draws)), out)
+    return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
+
+
+def first_order(model: Model) -> FirstOrder:
+    """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
+    inputs = model.inputs.drawn
+    jacobian = np.zeros((ROWS, len(inputs)))
+    if inputs:
+        steps = np.array([STEP * abs(entry.size) for entry in inputs])
+        draws: dict[str, NDArray[np.complex128]] = {}
+        for index, entry in enumerate(inputs):
+            draws[entry.name] = np.full(len(inputs), entry.size if entry.kind == "bias" else 0.0, dtype=complex)
+            draws[entry.name][index] += 1j * steps[index]
+        out = np.empty((ROWS, len(inputs)), dtype=complex)
+        vectors(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
+        jacobian = out.imag / steps
+    return FirstOrder(inputs, jacobian, _mixing(model))
+
+
+def _mixing(model: Model) -> Array | None:
+    return mixing(model.inputs.drawn, model.groups) if model.groups else None
+
+
+def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:
+    """First-order Sobol index of each input, by output, from n cases.
+
+    ``draws`` (n,) by input; ``outcome`` (10, n) as `outputs.vectors` gives it. What the averaging over few cases adds
+    by chance, (classes - 1)/n of the variance, is taken off; nothing is below zero.
+    """
+    count = outcome.shape[1]
+    centred = outcome - outcome.mean(axis=1, keepdims=True)
+    variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
+    found: dict[str, dict[str, float]] = {}
+    classes = min(CLASSES, max(count // CLASS_SIZE, 1))
+    ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
+    for name, draw in draws.items():
+        order = np.argsort(draw)
+        sorted_ = draw[order]
+        starts = np.append(0, np.searchsorted(sorted_, sorted_[ranks]))
+        starts = starts[np.diff(starts, append=count) > 0]  # equal draws are of one class
+        sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
+        between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
+        chance = (len(starts) - 1) / count
+        found[name] = {
+            output: max(0.0, (float(between[VECTORS[output]].sum()) / variances[output] - chance) / (1.0 - chance))
+            if variances[output] > 0.0 and chance < 1.0
+            else 0.0
+            for output in OUTPUTS
+        }
+    return found

@@ -1,0 +1,433 @@
+"""Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped.
+
+Some cases of a study flown by several threads, that take one portion after the other.
+
+Dispersion studies: many dispersed cases fly one schedule.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import BadRequest
+from nutdamp.flight import propagation
+from nutdamp.flight.end_state import aspects
+from nutdamp.flight.propagation import Flight, shed
+from nutdamp.montecarlo.cases import Model, cones_used
+from nutdamp.montecarlo.closed_form import Ends
+from nutdamp.montecarlo.inputs import BLOCK, Draws, Source, independent
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.statistics import (
+    EXACT_CASES,
+    OUTPUTS,
+    ROWS,
+    Distribution,
+    Exact,
+    FirstOrder,
+    Sketch,
+    Worst,
+    as_flown,
+    binomial_interval,
+    measure,
+    sampled_shares,
+    vectors,
+)
+from nutdamp.physics import batch
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Spacecraft, required_share
+from nutdamp.spacecraft.requirements import Left, Part
+from nutdamp.spacecraft.schedule import Schedule
+
+Array = NDArray[np.float64]
+
+STRIDE = batch.BLOCK
+"""Cases that are always flown together, as real widths need it."""
+
+PORTION = 2 * STRIDE
+"""Cases that a thread takes at once; blocks are multiples of it."""
+
+
+class Round:
+    """Some cases of a study, flown by several threads that take one portion after the other.
+
+    A portion is a part of a block of draws: flying takes much longer than drawing, and few cases too are shared by the
+    threads.
+    """
+
+    def __init__(self, results: Results, first: int, last: int, out: Array) -> None:
+        self.results, self.first, self.last, self.out = results, first, last, out
+        self.severity = np.empty(last - first)
+        self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
+        self.emptied = np.zeros(last - first, dtype=bool)
+        self.portions = range(first // PORTION, math.ceil(last / PORTION))
+        self.taken = 0
+        self.finished = 0
+        self.redrawn = 0
+        self.failures: list[BaseException] = []
+        self.lock = threading.Lock()
+
+    def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
+        """How many cases were flown, always the first ones, and how many draws were made again."""
+        count = min(threads, len(self.portions))
+        # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses then.
+        workers = [threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)]
+        for worker in workers:
+            worker.start()
+        try:
+            for worker in workers:
+                while worker.is_alive():
+                    worker.join(0.1)
+                    if worker.is_alive():
+                        watch(max(self._flown, self.first))
+        except BaseException:
+            self.taken = len(self.portions)  # nothing more is begun
+            raise
+        if self.failures:
+            raise self.failures[0]
+        return max(self._flown - self.first, 0), self.redrawn
+
+    @property
+    def _flown(self) -> int:
+        """Where the cases end that are flown; below ``first`` where none is."""
+        return min(self.last, (self.portions[0] + self.finished) * PORTION)
+
+    def _work(self, stopped: Callable[[], bool]) -> None:
+        try:
+            source = self.results.study.source()
+            drawn, block = None, -1
+            while not stopped():
+                with self.lock:
+                    if self.taken >= len(self.portions):
+                        return
+                    portion = self.portions[self.taken]
+                    self.taken += 1
+                begin = max(self.first, portion * PORTION)
+                end = min(self.last, (portion + 1) * PORTION)
+                if drawn is None or begin // BLOCK != block:
+                    block = begin // BLOCK
+                    drawn = source.block(block)
+                redrawn = self._fly(drawn, block * BLOCK, begin, end)
+                with self.lock:
+                    self.finished += 1
+                    self.redrawn += redrawn
+        except BaseException as failure:  # handed to the thread that waits
+            with self.lock:
+                self.failures.append(failure)
+                self.taken = len(self.portions)
+
+    def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
+        """Fly the cases from ``begin`` to ``end`` of the block that starts at ``start``; returns how often they were
+        drawn again.
+        """
+        study, early = self.results.study, self.results.early
+        draws, redrawn = drawn
+        # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
+        low, high = begin - begin % STRIDE, end + -end % STRIDE
+        rows = slice(low - start, high - start)
+        ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
+        inner = slice(begin - low, end - low)
+        outputs = np.empty((len(OUTPUTS), high - low))
+        measure(study.model, ends, outputs)
+        place = slice(begin - self.first, end - self.first)
+        self.out[: len(OUTPUTS), place] = outputs[:, inner]
+        self.severity[place] = study.severity(outputs, ends)[inner]
+        self.emptied[place] = np.broadcast_to(np.real(ends.drained) > 1.0, high - low)[inner]
+        if ends.aspects is not None:
+            self.aspects[:, :, place] = ends.aspects[:, :, inner]
+        if low < early.shape[1]:
+            outcome = np.empty((ROWS, high - low))
+            vectors(study.model, ends, outcome)
+            early[:, begin:end] = outcome[:, inner]
+        return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
+
+
+ROUND = 64 * BLOCK
+"""Cases between two looks at the results."""
+
+EARLY = 2 * BLOCK
+"""The first cases, whose outcome is kept whole for `sampled_shares`."""
+
+KEPT_WORST = 1_000
+"""Worst cases that are kept."""
+
+CONFIDENCE = 0.95
+"""Of the interval about the fraction that meets it."""
+
+WORTH_SAYING = math.radians(1e-4)
+"""rad by which cases of falling moments must err for that to be said."""
+
+Collect = Callable[[int, Array], None]
+"""Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
+
+
+def threads_here() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is studied: cases of ``model`` drawn from ``seed``.
+
+    Cases count from 0 here; people see them count from 1.
+    """
+
+    model: Model
+    seed: int = 1
+
+    @cached_property
+    def flies(self) -> RealWidths:
+        """What flies the cases."""
+        return RealWidths(self.model)
+
+    @cached_property
+    def first_order(self) -> FirstOrder:
+        """Sensitivities of what is flown."""
+        return as_flown(self.model, self.flies)
+
+    def source(self) -> Source:
+        """Draws for one thread."""
+        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+
+    def draws_of(self, case: int) -> dict[str, float]:
+        """Deviations of one case (from 0), by input."""
+        draws, _ = self.source().block(case // BLOCK)
+        return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
+
+    def ends_of(self, draws: Draws) -> Ends:
+        """How one case with these deviations ends; none: the estimate itself."""
+        return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))
+
+    def outputs_of(self, draws: Draws) -> Array:
+        """The outputs (5,) of one case with these deviations; none: of the estimate itself."""
+        out = np.empty((len(OUTPUTS), 1))
+        measure(self.model, self.ends_of(draws), out)
+        return out[:, 0]
+
+    @property
+    def nominal(self) -> Flight:
+        """The estimate itself, flown alone as the cases are."""
+        return propagation.flown(self.model.spacecraft, self.model.schedule)
+
+    @property
+    def nominal_aspects(self) -> Array:
+        """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone in that flight."""
+        seen = aspects(self.nominal)[: len(self.model.spacecraft.keep)]
+        return np.array([(one.least, one.largest) for one in seen])
+
+    def severity(self, values: Array, ends: Ends) -> Array:
+        """How bad cases are, (n,), by `compliance.severity`, of the outputs (5, n) and ``ends`` of cases.
+
+        Where the axis breaks a cone on the way, or the tank runs empty, no better than the share of its bound, or of
+        the propellant, that is used up.
+        """
+        body, aim = self.model.spacecraft, OUTPUTS.index(requirements.aim(self.model.spacecraft).value)
+        shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
+        return np.asarray(requirements.severity(body, Left(values[0], values[aim], ends.spin), shares))
+
+    def aspects_of(self, draws: Draws) -> Array | None:
+        """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
+        found = self.ends_of(draws).aspects
+        return None if found is None else found[:, :, 0]
+
+    @property
+    def lightening_error(self) -> str:
+        """By how much cases of falling moments err, as the nominal one shows; empty where that is nothing to speak of.
+
+        They fall half as each pulse begins and half as it ends, which errs in second order; `flight.flown` lets them
+        fall as the thrust goes.
+        """
+        body = self.model.spacecraft
+        if shed(body) is None:
+            return ""
+        found, exact = self.outputs_of({}), self.nominal.residual
+        part = requirements.aim(body)
+        aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
+        errors = {Part.NUTATION: found[0] - exact.nutation, part: found[OUTPUTS.index(part.value)] - aim}
+        if max(map(abs, errors.values())) < WORTH_SAYING:
+            return ""
+        said = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {one.label}" for one, error in errors.items())
+        return f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {said}"
+
+
+class Counted:
+    """The ``done`` cases of a ``study``, of which ``met`` comply."""
+
+    study: Any
+    done: int
+    met: int
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of cases that comply; None where nothing is required, and there are no cones."""
+        return self.met / self.done if self.done and requirements.judged(self.study.model.spacecraft) else None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Exact interval about `met_fraction`."""
+        return self.interval_about(self.met)
+
+    def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
+        """Exact interval about the share of so many of the cases, or of so many ``of`` them."""
+        return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
+
+    @property
+    def probability(self) -> float:
+        """Share of cases that must comply."""
+        return required_share(self.study.model.spacecraft.requirement)
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether as many cases comply as must; None where nothing is required."""
+        fraction = self.met_fraction
+        return None if fraction is None else fraction >= self.probability
+
+
+@dataclass(eq=False)
+class Results(Counted):
+    """What has been found of a study so far: the cases from 0 to ``done``.
+
+    ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
+    are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
+    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
+    in all cases. ``emptied`` counts those whose tank runs empty.
+    """
+
+    study: Study
+    requested: int
+    done: int = 0
+    redrawn: int = 0
+    met: int = 0
+    emptied: int = 0
+    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
+    values: Array | None = field(init=False)
+    sketches: list[Sketch] | None = field(init=False)
+    broken: NDArray[np.int64] = field(init=False)
+    aspects: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        cones = len(self.study.model.spacecraft.keep)
+        self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
+        exact = self.requested <= EXACT_CASES
+        self.values = np.empty((self.rows, self.requested)) if exact else None
+        self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
+
+    @property
+    def rows(self) -> int:
+        """Rows of ``values``."""
+        return len(OUTPUTS) + 2 * len(self.study.model.spacecraft.keep)
+
+    @property
+    def exact(self) -> bool:
+        """Whether percentiles are exact."""
+        return self.sketches is None
+
+    def distribution(self, output: str) -> Distribution | None:
+        """The distribution of an output; None where it is not known (propellant)."""
+        row = OUTPUTS.index(output)
+        if self.sketches is not None:
+            found = self.sketches[row]
+            return None if math.isinf(found.minimum) or math.isnan(found.minimum) else found
+        assert self.values is not None
+        values = self.values[row, : self.done]
+        return None if not len(values) or math.isnan(values[0]) else Exact(values)
+
+    @cached_property
+    def shares(self) -> dict[str, dict[str, float]]:
+        """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call it at the end."""
+        count = min(self.done, EARLY)
+        model, source = self.study.model, self.study.source()
+        rows: dict[str, list[Array]] = {entry.name: [] for entry in model.inputs.drawn if entry.kind != "bias"}
+        for block in range(math.ceil(count / BLOCK)):
+            draws, _ = source.block(block)
+            for name, parts in rows.items():
+                parts.append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
+        drawn = {name: np.concatenate(parts) for name, parts in rows.items()}
+        return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
+
+    def take(
+        self, first: int, values: Array, severity: Array, aspects: Array, emptied: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones.
+
+        ``emptied`` (n,): whose tank runs empty; None for none.
+        """
+        broken = cones_used(self.study.model.spacecraft.keep, aspects) > 1.0
+        missed = (severity > 1.0) & bool(requirements.required(self.study.model.spacecraft))
+        emptied = np.zeros(len(severity), dtype=bool) if emptied is None else emptied
+        self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed | emptied)))
+        self.emptied += int(np.count_nonzero(emptied))
+        self.broken += broken.sum(axis=1)
+        self.aspects[:, 0] = np.minimum(self.aspects[:, 0], aspects[:, 0].min(axis=1))
+        self.aspects[:, 1] = np.maximum(self.aspects[:, 1], aspects[:, 1].max(axis=1))
+        self.worst.add(first, severity)
+        for sketch, row in zip(self.sketches or (), values, strict=False):
+            sketch.add(row)
+        self.done = first + values.shape[1]
+
+    def extended(self, requested: int) -> Results:
+        """The same, with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
+        done = self.done, self.redrawn, self.met, self.emptied, self.worst
+        more = Results(self.study, requested, *done, self.early)
+        more.broken, more.aspects = self.broken, self.aspects
+        assert self.values is not None
+        assert more.values is not None
+        more.values[:, : self.done] = self.values[:, : self.done]
+        return more
+
+
+def run(
+    results: Results,
+    *,
+    threads: int = 1,
+    watch: Callable[[int], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+    collect: Collect | None = None,
+) -> Results:
+    """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
+
+    ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
+    the first ones, are kept. ``collect`` is given their outputs in order.
+    """
+    while results.done < results.requested and not stopped():
+        first = results.done
+        last = min(results.requested, first - first % ROUND + ROUND)
+        out = np.empty((results.rows, last - first)) if results.values is None else results.values[:, first:last]
+        flights = Round(results, first, last, out)
+        done, redrawn = flights.fly(threads, watch, stopped)
+        if done == 0:
+            break
+        results.redrawn += redrawn
+        results.take(
+            first, out[:, :done], flights.severity[:done], flights.aspects[:, :, :done], flights.emptied[:done]
+        )
+        if collect is not None:
+            collect(first, out[:, :done])
+        watch(results.done)
+    return results
+
+
+__all__ = ["SAMPLES", "SEED", "study_of"]
+
+SAMPLES = 20_000
+"""Cases that are flown where nothing else is said."""
+
+SEED = 1
+"""Of their draws, likewise."""
+
+
+def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
+    """The study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
+    if spacecraft.dispersions is None:
+        raise BadRequest("the spacecraft has no dispersions")
+    return Study(Model(spacecraft, schedule), seed)

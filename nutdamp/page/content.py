@@ -1,0 +1,288 @@
+"""The contents of the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, NamedTuple
+
+from rich.console import Group
+
+from nutdamp import __version__
+from nutdamp.errors import listed, printable
+from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.verification import verify
+from nutdamp.page.craft import ends_note, ends_sheet, spacecraft_blocks
+from nutdamp.page.document import (
+    UNCONTROLLED,
+    Block,
+    Control,
+    Facts,
+    Figure,
+    Listing,
+    Page,
+    Prose,
+    Remarks,
+    Section,
+    blocks_of,
+    sheet_of,
+)
+from nutdamp.page.manoeuvre import manoeuvre_section
+from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
+from nutdamp.page.moving import moving_of
+from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
+from nutdamp.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
+from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, said
+from nutdamp.planning.plan import Plan, unrounded
+from nutdamp.planning.recommendation import Gain, Standing
+from nutdamp.planning.tradeoff import Front
+from nutdamp.schemes import catalogue
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views import decisions, verdicts
+from nutdamp.views.end_tables import bounds_text, direction_text, lasting, spin_text, target_text
+from nutdamp.views.text import degrees, sentence
+from nutdamp.views.trade_tables import apart, beats, front_parts, outdone
+from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
+
+if TYPE_CHECKING:
+    from nutdamp.montecarlo.study import Results
+
+
+class Repeat(NamedTuple):
+    """What it takes to make the page again: the command, and the input file by name and text.
+
+    ``settings``: keys that the command sets in place of what the file says, and their values.
+    """
+
+    command: str
+    name: str
+    text: str
+    settings: tuple[tuple[str, str], ...] = ()
+
+
+def report_page(
+    compared: Comparison,
+    repeat: Repeat,
+    *,
+    traded: Sequence[Front] = (),
+    control: Control = UNCONTROLLED,
+) -> Page:
+    """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
+    body, decided = compared.spacecraft, decide(compared)
+    sections = [
+        Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
+        Section("method", "Method", tuple(method_blocks(compared))),
+        _schemes(compared, decided),
+    ]
+    if traded:
+        sections.append(_trade(compared, traded))
+    dispersed: Results | None = None
+    if decided is not None:
+        chosen = decided.plan
+        sections.append(_schedule(chosen))
+        dispersed = compared.results(chosen)
+        sections.append(manoeuvre_section(chosen, dispersed))
+        sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
+        sections.append(_verification(chosen))
+        if dispersed is not None:
+            sections.append(_dispersion(chosen, dispersed))
+    sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
+    return Page(
+        title=control.title or _title(body),
+        control=control,
+        verdict=_verdict(compared, decided, traded),
+        met=None if decided is None else decided.met,
+        good=decided is not None
+        and decided.met is not False
+        and decided.plan.standing is Standing.COMPLIES
+        and decided.plan.commandable
+        and not _broken(decided.plan),
+        decision=() if decided is None else tuple(_decision(decided)),
+        figures=tuple(_unplanned(body) if decided is None else _figures(decided)),
+        sections=(*sections, _repeat(repeat, dispersed)),
+        made_by=f"Made by nutdamp {__version__}.",
+    )
+
+
+def _title(body: Spacecraft) -> str:
+    """What is to be done."""
+    turn = "" if body.goal.axis is None else f" and turning the spin axis by {degrees(body.to_turn)}"
+    return f"{body.name}: damping {degrees(body.tilt)} of nutation{turn}"
+
+
+def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Front]) -> str:
+    reason = verdicts.reason(compared)
+    if decided is None:
+        return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
+    recommended = f"Recommended: {decided.plan.scheme} – {reason}."
+    schedule = f"Schedule of the file {decided.plan.scheme}, as it is."
+    said = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
+    needless = verdicts.needless(compared)
+    nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
+    others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
+    fired = [verdicts.hint(compared, one) for one in dict.fromkeys(others) if one is not None]
+    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
+    notes += map(sentence, _broken(decided.plan))
+    notes += filter(None, [outdone(traded, decided.plan)])
+    return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
+
+
+def _decision(decided: Decision) -> Iterator[Block]:
+    """The parts of the requirement with their margins, and the directions that are watched."""
+    cases = decided.cases
+    how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
+    when = lasting(decided.flight)
+    title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin{when and f' ({when})'}"
+    yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
+    if decided.aspects:
+        yield aspects_sheet(decided)
+
+
+def _figures(decided: Decision) -> Iterator[Figure]:
+    """The numbers to read first: the verdict, where it points at the end, what it costs; all but the first nominal."""
+    body, final = decided.plan.spacecraft, decided.final
+    yield Figure("requirement", decisions.verdict(decided))
+    nominal = "" if decided.cases is None else ", nominal"
+    for name, end in (("spin axis ends at", final.axis), ("H ends at", final.momentum)):
+        yield Figure(f"{name}{nominal}", direction_text(body, end), target_text(body, end))
+    goal = "" if body.goal.spin is None else f"target: {spin_text(body.goal.spin)}"
+    yield Figure(f"final spin{nominal}", spin_text(final.spin), goal)
+    for one in decided.aspects:
+        yield Figure(f"axis from {one.keep.name}", f"{degrees(one.least)} to {degrees(one.largest)}", _keeping(one))
+    for name, value in decisions.cost(decided):
+        yield Figure(name, value)
+
+
+def _keeping(one: Aspect) -> str:
+    """What the spin axis has to keep to a direction, and whether it does; empty where it is only watched."""
+    bounds = bounds_text(one.keep)
+    return f"{bounds}: {decisions.KEPT[one.kept]}" if bounds else ""
+
+
+def _unplanned(body: Spacecraft) -> Iterator[Figure]:
+    """The numbers to read first where there is no plan: what was required."""
+    yield Figure("requirement", "NOT met: no scheme is feasible", verdicts.required(body))
+    if body.goal.axis is not None:
+        way = f"{degrees(body.to_turn)} from H at t = 0"
+        yield Figure("target", direction_text(body, body.goal.axis), way)
+    yield Figure("nutation at t = 0", degrees(body.tilt))
+
+
+def _schemes(compared: Comparison, decided: Decision | None) -> Section:
+    """The comparison, why a scheme is infeasible, and the remarks of the others."""
+    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*said(plan), *_broken(plan)))
+    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
+    blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
+    if remarks:
+        blocks.append(Remarks(remarks))
+    if decided is not None and len(compared) > 1:
+        blocks.append(schemes_picture_of(compared, decided))
+    return Section("schemes", "Schemes compared", tuple(blocks))
+
+
+def _broken(plan: Plan) -> list[str]:
+    """The limits that the schedule of a file breaks; schemes keep them."""
+    return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
+
+
+def _reading(compared: Comparison) -> Iterator[str]:
+    """What names and numbers of the comparison do not say by themselves."""
+    feasible = [plan for plan in compared.plans if plan.feasible]
+    if any(COUNTS.get(plan.scheme, len(plan.pulses)) != len(plan.pulses) for plan in feasible):
+        yield (
+            "A scheme fires more pulses than its name says where the thrusters cannot give its impulse in so many, "
+            "and fewer where fewer take out the nutation."
+        )
+    commanded = [plan.scheme for plan in feasible if plan.scheme in catalogue.COMMANDED]
+    if commanded and len(commanded) < len(feasible):
+        yield (
+            f"Command blocks can fire the plan of {listed(commanded)} only; the pulses of the others have to be timed "
+            "one by one."
+        )
+
+
+COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
+"""Pulses by the names of schemes."""
+
+
+def _trade(compared: Comparison, traded: Sequence[Front]) -> Section:
+    """What an earlier end costs, as ``trade`` has it."""
+    tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
+    chosen = compared.recommended
+    notes = [] if chosen is None else [said for say in (beats, apart) if (said := say(traded, chosen))]
+    tables += [Remarks((("Note", said),)) for said in notes]
+    drawn = any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
+    pictures = (trade_picture_of(compared, traded),) if drawn else ()
+    return Section("trade", "Time against cost", (*tables, *pictures))
+
+
+def _schedule(chosen: Plan) -> Section:
+    title = f"Recommended schedule: {chosen.scheme}"
+    ends = (ends_sheet(chosen.flight), ends_note(chosen.flight))
+    if not len(chosen.pulses):
+        return Section("schedule", title, (Prose("No pulse is needed."), *ends))
+    note = Prose(
+        "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
+        "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse"
+        f"{', the largest of the free motion then' * (not chosen.spacecraft.inertia.symmetric)}."
+    )
+    return Section("schedule", title, (pulse_sheet(chosen), note, *ends))
+
+
+def _verification(chosen: Plan) -> Section:
+    expected = chosen.options.with_disturbances
+    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
+    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
+    blocks: list[Block] = [
+        Prose(f"{verdict(verified)} {conservation(verified)}"),
+        checks_sheet(chosen, verified),
+        sheet_of(
+            "The schedule flown by independent means; differences are the largest on the way", methods_table(verified)
+        ),
+        *([Remarks(missing)] if missing else []),
+        sheet_of(
+            BUDGET,
+            budget_table(chosen.spacecraft, verified),
+        ),
+        *[Prose(note) for note in (budget_note(verified, aimed=chosen.spacecraft.goal.axis is not None),) if note],
+    ]
+    return Section("budget", "Verification and error budget", tuple(blocks))
+
+
+def _dispersion(chosen: Plan, dispersed: Results) -> Section:
+    from nutdamp.views.dispersion_tables import dispersion_screen
+
+    blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
+    if note := dispersed.study.lightening_error:
+        blocks.append(Prose(f"Note: {note}."))
+    blocks += dispersion_pictures_of(dispersed, chosen.scheme)
+    return Section("dispersion", "Dispersion", tuple(blocks))
+
+
+def _repeat(repeat: Repeat, dispersed: Results | None) -> Section:
+    blocks: list[Block] = [Listing("Command", printable(repeat.command)), Facts("Versions", tuple(_versions()))]
+    facts = [] if dispersed is None else [("seed of the dispersed cases", str(dispersed.study.seed))]
+    if repeat.text:
+        facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
+    if facts:
+        blocks.append(Facts("Input", tuple(facts)))
+    if repeat.text:
+        blocks.append(Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n")))
+    if repeat.settings:
+        blocks.append(Facts("Set in place of what the file says", repeat.settings))
+    return Section("repeat", "To repeat it", tuple(blocks))
+
+
+def _versions() -> Iterator[tuple[str, str]]:
+    """What the numbers and pictures depend on."""
+    yield "nutdamp", __version__
+    yield "Python", platform.python_version()
+    packages = {"numpy": "numpy", "scipy": "scipy", "highspy": "highspy", "matplotlib": "matplotlib", "bsk": "Basilisk"}
+    for package, name in packages.items():
+        try:
+            yield name, version(package)
+        except PackageNotFoundError:
+            yield name, "not installed"

@@ -1,0 +1,214 @@
+"""What a report says, apart from how it looks: a page of sections, made of a few kinds of blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.page.moving import Moving
+
+
+class Column(NamedTuple):
+    """One column of a table; ``number``: flush right, and sorted by value."""
+
+    name: str
+    unit: str = ""
+    number: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A table with one row for each thing compared; the first column names it.
+
+    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit. ``stacked``: where there is
+    little room each row becomes a block, so that nothing has to be scrolled.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    mark: int | None = None
+    sortable: bool = True
+    stacked: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Names and what they are."""
+
+    title: str
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Prose:
+    """A paragraph."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """Remarks, each with the name of what it is about."""
+
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """A list of short paragraphs."""
+
+    rows: tuple[str, ...]
+
+
+LONG = 550.0
+"""Units of a drawing of which text of 7.5 units is 9 px high on a page of 720 px."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An ``<svg>`` element, its title, a caption, and what it shows in words for those who do not see it.
+
+    For narrow screens there is another drawing, ``narrow``, or ``views``: panels and entries of the legend as view
+    boxes on the group called ``name`` in it, which are shown as wide as they are at most, in px.
+    """
+
+    svg: str
+    title: str
+    caption: str
+    described: str
+    narrow: str = ""
+    name: str = ""
+    views: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def long(self) -> bool:
+        """Whether its text is too small to read where the page is little wider than a narrow screen."""
+        return float(self.svg.split('viewBox="', 1)[1].split()[2]) > LONG
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Text as it is in a file or on a command line."""
+
+    title: str
+    text: str
+
+
+Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing
+
+
+class Section(NamedTuple):
+    """A heading with what comes under it; ``name`` is where links lead to."""
+
+    name: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+class Figure(NamedTuple):
+    """One of the few numbers to read first; ``note``: what to compare it with."""
+
+    name: str
+    value: str
+    note: str = ""
+
+
+class Control(NamedTuple):
+    """What configuration control writes on a document; empty where nothing was given."""
+
+    title: str = ""
+    document: str = ""
+    issue: str = ""
+    author: str = ""
+    date: str = ""
+
+    @property
+    def named(self) -> tuple[tuple[str, str], ...]:
+        """Names and values of what was given, but for the title."""
+        pairs = zip(self._fields[1:], self[1:], strict=True)
+        return tuple((name, value) for name, value in pairs if value)
+
+
+UNCONTROLLED = Control()
+"""Of a page on which nobody writes anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A whole report: title, verdict, the decision, numbers to read first, sections.
+
+    ``met``: whether the requirement is, None where nothing is required; ``good``: nothing is missed at all.
+    """
+
+    title: str
+    control: Control
+    verdict: str
+    met: bool | None
+    good: bool
+    decision: tuple[Block, ...]
+    figures: tuple[Figure, ...]
+    sections: tuple[Section, ...]
+    made_by: str
+
+    @property
+    def footer(self) -> str:
+        """What is printed at the foot of each sheet of paper, beside its number."""
+        document, issue, date = self.control.document, self.control.issue, self.control.date
+        return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
+
+
+def sheet_of(title: str, table: Table) -> Sheet:
+    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
+
+    Where the first column has no heading, each row is a quantity of its own unit.
+    """
+    columns = []
+    for column in table.columns:
+        name, _, unit = plain(column.header).partition("\n")
+        columns.append(Column(name, unit, column.justify == "right"))
+    first = columns[0]
+    headed = (first._replace(name=first.name or "quantity"), *columns[1:])
+    return Sheet(title, headed, _rows(table), sortable=bool(first.name))
+
+
+def facts_of(title: str, table: Table) -> Facts:
+    """A screen's list of names and values as `Facts`; a row without a name continues the one before."""
+    rows: list[tuple[str, str]] = []
+    for name, value in _rows(table):
+        if name or not rows:
+            rows.append((name, value))
+        else:
+            rows[-1] = (rows[-1][0], f"{rows[-1][1]}; {value}")
+    return Facts(title, tuple(rows))
+
+
+def blocks_of(title: str, screen: Group) -> Iterator[Block]:
+    """What a screen shows, block by block: a line straight above a table is its title, else ``title`` is."""
+    above = ""
+    for part in screen.renderables:
+        if isinstance(part, Table):
+            made = sheet_of if part.show_header else facts_of
+            yield made(above or title, part)
+            above = ""
+            continue
+        if above:
+            yield Prose(above)
+        above = plain(part)
+    if above:
+        yield Prose(above)
+
+
+def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
+    cells: list[Iterable[str]] = [map(plain, column.cells) for column in table.columns]
+    return tuple(zip(*cells, strict=True))
+
+
+def plain(cell: object) -> str:
+    """The text of a cell, which in the tables of the screens is a text with or without a style."""
+    return cell.plain if isinstance(cell, Text) else str(cell)

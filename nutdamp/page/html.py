@@ -1,0 +1,125 @@
+"""A page as one HTML file that needs nothing else: style, script and pictures inside, no network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import pkgutil
+import re
+from functools import cache
+from html import escape
+from importlib.util import find_spec
+from itertools import cycle
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nutdamp.errors import BadRequest, MissingExtra
+from nutdamp.figures.style import require
+from nutdamp.page.document import Block, Page
+from nutdamp.page.moving import Moving
+from nutdamp.views.text import MISSING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+
+ENDINGS = (".html", ".htm")
+"""Of the files that a page is written to."""
+
+
+def expect_html(path: str) -> None:
+    """Say at once, not after the work, that a page cannot be made, or not in this form; ``-`` is standard output.
+
+    Raises BadRequest for an ending other than `ENDINGS`, MissingExtra without Jinja or matplotlib.
+    """
+    if path != "-" and Path(path).suffix.lower() not in ENDINGS:
+        raise BadRequest(f"--output {path}: a report is written as HTML (.html); a browser prints that as PDF")
+    _require_jinja()
+    require()
+
+
+def _require_jinja() -> None:
+    if find_spec("jinja2") is None:
+        raise MissingExtra("plot", "a page")
+
+
+def page_html(page: Page) -> str:
+    """The whole file. Whatever a spacecraft file says is escaped; the policy in its head allows no other script."""
+    moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
+    style, script = (
+        "\n".join(map(_part, (name, *[view] * moves)))
+        for name, view in (("page.css", "view.css"), ("sort.js", "view.js"))
+    )
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
+
+
+def block_html(block: Block) -> str:
+    """One block of a page, in a box of its own to scroll in where it may be wide."""
+    return _templates().from_string('{% from "blocks.html" import block %}{{ block(made) }}').render(made=block)
+
+
+@cache
+def _templates() -> Environment:
+    _require_jinja()
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(
+        loader=PackageLoader("nutdamp", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
+    made.filters["kind"] = lambda block: type(block).__name__
+    return made
+
+
+def _part(name: str) -> str:
+    data = pkgutil.get_data("nutdamp", f"page/{name}")
+    if data is None:
+        raise FileNotFoundError(f"nutdamp/page/{name} is not installed")
+    return data.decode("utf-8").strip()
+
+
+def _phrases(value: str) -> list[str]:
+    """The parts of a number to read first, which breaks at commas and arrows; never between a number and its unit."""
+    return re.split(r"(?<=[→,]) ", re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", value))
+
+
+WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
+"""What no line may break in: an option of a command, a relation with its number and unit."""
+
+
+def _whole(text: str) -> Markup:
+    """Text in which options of commands and relations stay in one line."""
+    from markupsafe import Markup
+
+    parts = (escape(part) for part in WHOLE.split(text))
+    spans = (f'<span class="whole-word">{part}</span>' if odd else part for odd, part in zip(cycle((0, 1)), parts))
+    return Markup("".join(spans))
+
+
+def _css(text: str) -> str:
+    """Text within a string of a style sheet: all but letters and digits by their numbers."""
+    return "".join(one if one.isascii() and one.isalnum() else f"\\{ord(one):x} " for one in text)
+
+
+def _labelled(svg: str, described: str) -> Markup:
+    """A picture with what it shows in words for those who do not see it."""
+    from markupsafe import Markup
+
+    return Markup(svg.replace("<svg ", f'<svg aria-label="{escape(described)}" ', 1))
+
+
+def number_in(text: str) -> float | None:
+    """The number in a cell; None where it is not known or a word."""
+    if text == MISSING:
+        return None
+    try:
+        return float(text.removeprefix("<").strip())
+    except ValueError:
+        return None

@@ -1,0 +1,298 @@
+"""The view of the motion that the script of a page moves: its rows as whole numbers.
+
+The script only reads rows and draws them: each number that it shows is one row of the track, rounded here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nutdamp.figures import geometry
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.page.scales import LEAD, Panel, Strip, panel, placed, strip_of
+from nutdamp.physics import attitude
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.views.end_tables import angle_names, angle_texts
+from nutdamp.views.plan_tables import channel_text
+from nutdamp.views.text import MISSING, most
+
+ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
+"""Even rows in the quickest nutation turn, where there are not less or more than so many altogether."""
+
+COARSE = 12
+"""Rows in a turn below which a line from row to row is no picture of the path, and dots are drawn."""
+
+STEEP = 25.0
+"""Turns of the nutation from which lines are thin."""
+
+SPHERE = 10_000
+"""Length of a unit vector of the globe as whole numbers: 0.006 deg."""
+
+ANGLE_DIGITS = 4
+"""Decimals of degrees; more where the largest nutation has not so many figures."""
+
+FAR = 4.0
+"""How far a target may lie from H(0) to be in the panel of the axis track, as a multiple of the track."""
+
+NONE = -(10**8)
+"""Entry of a row for an angle that does not exist."""
+
+QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
+"""Seconds that playing takes at the quickest, at first, and at the slowest."""
+
+
+class Circle(NamedTuple):
+    """A circle of ``radius`` rad on the globe; ``kind`` styles it."""
+
+    name: str
+    radius: float
+    kind: str
+
+
+class Named(NamedTuple):
+    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
+
+    ``watched``: the angle from it to the spin axis is shown.
+    """
+
+    name: str
+    axis: Vector
+    kind: str
+    circles: tuple[Circle, ...] = ()
+    watched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """What does not move in the view, and what moves as the JSON ``data``.
+
+    ``longitude``: what the numbers of the globe are; ``how``: the model that is flown; ``command``: what writes the
+    same rows.
+    """
+
+    panels: tuple[Panel, ...]
+    strip: Strip
+    speeds: tuple[tuple[float, str], ...]
+    speed: float
+    angles: tuple[str, str]
+    named: tuple[Named, ...]
+    dated: bool
+    longitude: str
+    steep: bool
+    how: str
+    command: tuple[str, ...]
+    data: str
+
+
+def moving_of(plan: Plan) -> Moving:
+    """The view of a plan flown through the real pulse widths."""
+    body, pulses = plan.spacecraft, plan.pulses
+    # To the millisecond, so that the same rows can be had from ``simulate`` by a short number.
+    until = math.ceil(1e3 * geometry.shown_until(body, pulses)) / 1e3
+    return moving(propagation.flown(body, pulses, until), until, plan.scheme, named_directions(body))
+
+
+def named_directions(body: Spacecraft) -> tuple[Named, ...]:
+    """What the globe shows besides the track: the target, the Sun, the cones that the spin axis keeps."""
+    found = []
+    if body.goal.axis is not None:
+        shift = None if body.requirement is None else body.requirement.momentum_shift
+        circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
+        found.append(Named("target", body.goal.axis, "target", circles))
+    for keep in body.watched:
+        bounds = []
+        if keep.least > 0.0:
+            bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))
+        if keep.most < math.pi:
+            bounds.append(Circle(f"axis at most {most(keep.most)} from {keep.name}", keep.most, "keep-in"))
+        found.append(Named(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
+    return tuple(found)
+
+
+def samples_for(flown: Flight, until: float) -> int:
+    """Even rows to ``until`` s: steep tracks need more."""
+    return min(max(math.ceil(ROWS_A_TURN * until / geometry.quickest(flown)), LEAST_ROWS), MOST_ROWS) + 1
+
+
+def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()) -> Moving:
+    """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
+    body, samples = flown.spacecraft, samples_for(flown, until)
+    track = flown.sampled(samples, until)
+    panels, columns, target = _panels(flown, track, named)
+    strip, span = strip_of(flown, track, until)
+    firing, texts = _firing(flown, track)
+    cone = _angle_digits(track)
+    clock = max(3, math.ceil(-math.log10(until / (samples - 1))) + 1)
+    columns |= {
+        "t": _whole(track.t, clock),
+        "theta": _whole(np.degrees(track.nutation), cone),
+        "mu": _whole(np.degrees(track.body_cone), cone),
+        "lambda": _whole(np.degrees(track.space_cone), cone),
+        **_named_columns("axis", _unit(track.axis)),
+        **_named_columns("H", _unit(track.momentum)),
+        **_named_columns("angle", _pointing(body, track.axis)),
+        "firing": firing,
+    }
+    for number, one in enumerate((one for one in named if one.watched), start=1):
+        columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, one.axis)), ANGLE_DIGITS)
+    utc = _dates(body, track, clock)
+    turns = until / geometry.quickest(flown)
+    data: dict[str, Any] = {
+        "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
+        "until": until,
+        "lead": LEAD,
+        "span": span,
+        "columns": {name: _steps(values) for name, values in columns.items()},
+        "none": NONE,
+        "firings": texts,
+        "utc": utc,
+        "target": target,
+        "named": [_mark(one) for one in named],
+        "look": _look(track, named),
+        "dots": turns * COARSE > samples,
+    }
+    speeds, speed = _speeds(until)
+    return Moving(
+        panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
+        "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
+        propagation.model_name([flown.schedule]),
+        ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
+         f"--samples {samples}", "--csv FILE"),
+        json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
+    )  # fmt: skip
+
+
+def _panels(
+    flown: Flight, track: Track, named: Sequence[Named]
+) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None]:
+    """Pole curve and axis track, the columns of their paths, and the place of the target in the latter."""
+    sky, momentum = geometry.sky_paths(flown, track)
+    target = _target(flown, track, named, np.vstack([sky, momentum]))
+    pole = geometry.pole_path(track)
+    pole_room = geometry.room(pole, 0.1, centre=True)
+    sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
+    body, names = flown.spacecraft, geometry.sky_names(flown)
+    sense = ", spin about −3" if body.spin < 0.0 else ""
+    axes = "" if body.inertia.aligned else ", principal axes"
+    panels = (
+        panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
+        panel("sky", "Axis track, H towards you", sky_room, (names.x, names.y)),
+    )
+    columns = {
+        **_named_columns("pole", placed(pole, *pole_room)),
+        **_named_columns("sky", placed(sky, *sky_room)),
+        **_named_columns("momentum", placed(momentum, *sky_room)),
+    }
+    return panels, columns, [column[0] for column in placed(target, *sky_room)] if len(target) else None
+
+
+def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
+    """Columns by a common name and their number, from 1."""
+    return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
+
+
+def _mark(one: Named) -> dict[str, Any]:
+    """A direction as the script takes it."""
+    return {
+        "name": one.name,
+        "kind": one.kind,
+        "axis": [round(part, 6) for part in one.axis.tolist()],
+        "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in one.circles],
+    }
+
+
+def _target(flown: Flight, track: Track, named: Sequence[Named], paths: Vector) -> Vector:
+    """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
+    found = geometry.sky_target(flown, track)
+    reach = FAR * float(np.hypot(*paths.T).max())
+    return found if named and len(found) and float(np.hypot(*found[0])) <= reach else np.empty((0, 2))
+
+
+def _angle_digits(track: Track) -> int:
+    """Decimals of degrees that show four figures of the largest nutation."""
+    largest = math.degrees(float(track.nutation.max()))
+    return ANGLE_DIGITS if largest < geometry.LEAST else max(ANGLE_DIGITS, 3 - math.floor(math.log10(largest)))
+
+
+def _whole(values: Vector, digits: int) -> list[int]:
+    """Numbers rounded to so many decimals, as whole numbers of the last one."""
+    return [round(round(value, digits) * 10**digits) for value in values.tolist()]
+
+
+def _steps(values: Sequence[int]) -> list[int]:
+    """The first number and how each differs from the one before: short where little changes."""
+    return [now - before for before, now in zip([0, *values], values, strict=False)]
+
+
+def _unit(vectors: Vector) -> list[list[int]]:
+    """Three columns of directions as parts of `SPHERE`."""
+    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return [column.tolist() for column in np.rint(SPHERE * unit.T).astype(int)]
+
+
+def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
+    """Two columns: the angles of directions (n, 3), as every table shows them, in units of their last decimal."""
+    texts = [angle_texts(body, axis) for axis in axes]
+    found = [
+        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in row]
+        for row in texts
+    ]
+    return [list(column) for column in zip(*found, strict=True)]
+
+
+def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
+    """UTC of each row: what all have in common, and the rest of each; None without an epoch."""
+    dates = [date for time in track.t.tolist() if (date := body.utc(time, digits)) is not None]
+    if len(dates) < len(track.t):
+        return None
+    # They are in order: what the first and the last have in common, all have.
+    pairs = enumerate(zip(dates[0], dates[-1], strict=False))
+    common = next((place for place, (one, other) in pairs if one != other), len(dates[0]))
+    return {"head": dates[0][:common], "tails": [date[common:] for date in dates]}
+
+
+def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
+    """For each row which of the texts says what fires; the first says that nothing does."""
+    texts, column = ["none"], []
+    pulses = list(zip(flown.schedule, flown.spans, strict=True))
+    for time in track.t.tolist():
+        on = [
+            f"{number}: {channel_text(pulse, flown.spacecraft)}"
+            for number, (pulse, (begins, ends)) in enumerate(pulses, start=1)
+            if begins <= time <= ends
+        ]
+        text = " and ".join(on) or texts[0]
+        if text not in texts:
+            texts.append(text)
+        column.append(texts.index(text))
+    return column, texts
+
+
+def _look(track: Track, named: Sequence[Named]) -> list[float]:
+    """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
+    middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
+    for one in named[:1]:
+        if float(middle @ one.axis) > -0.9:
+            middle = middle + one.axis
+    longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
+    turned = math.degrees(longitude or 0.0) - 20.0
+    shown = math.degrees(latitude)
+    return [round(turned, 1), round(shown - 25.0 if shown > 0.0 else shown + 25.0, 1)]
+
+
+def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
+    """Seconds of motion in a second of playing, as number and words; and the one to begin with."""
+    decades = range(math.floor(math.log10(until / SLOW)) - 1, math.ceil(math.log10(until / QUICK)) + 1)
+    every = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    found = sorted({1.0, *(round(one, 12) for one in every if QUICK <= until / one <= SLOW)})
+    first = min(found, key=lambda one: abs(math.log(until / one / UNHURRIED)))
+    return tuple((one, "real time" if one == 1.0 else f"× {one:g}") for one in found), first

@@ -1,0 +1,509 @@
+"""Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
+
+Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
+between two edges is an arc in closed form where the body is symmetric and no torque from outside acts, with energy
+dissipation too; else a Taylor series, as in `rigid`, of an order and a number of steps common to a block of cases that
+stays in the cache.
+
+Taylor series of Euler's equations and the attitude for many bodies at once, as `rigid_cases` sums them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics import attitude, energy_sink, taylor
+from nutdamp.physics.taylor import AT_REST, LONGEST, NOTHING, Forcing
+
+Array = NDArray[np.float64]
+
+LARGEST_ORDER = 30
+"""Of the series; what has not converged by then is done again in shorter steps."""
+
+REMAINDER = 1e-15
+"""Size of the last terms kept, relative to the scale of rates and quaternion."""
+
+
+class Series:
+    """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block.
+
+    ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products that Euler's equations need are one product
+    of two slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `rigid`.
+    """
+
+    def __init__(
+        self,
+        moments: Array,
+        forcing: Forcing,
+        rates: Array,
+        quaternion: Array,
+        now: Array,
+        step: Array,
+        acceleration: Array,
+        jerk: Array | None = None,
+    ) -> None:
+        first, second, third = moments
+        count = len(step)
+        self.step, self.acceleration, self.jerk, self.moments = step, acceleration, jerk, moments
+        self.coupling = np.stack([(second - third) / first, (third - first) / second, (first - second) / third])
+        self.coupled = bool(self.coupling[2].any())
+        self.rates = np.empty((LARGEST_ORDER + 1, 5, count))
+        self.turns = np.empty((LARGEST_ORDER + 1, 4, count))
+        self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
+        self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
+        self.sink = None if forcing.growth == 0.0 else _Sink(moments, forcing.growth, acceleration, rates, step)
+        # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
+        self.even_spin = not self.coupled and self.sink is None and jerk is None
+        self.order = 0
+
+    def converges(self) -> bool:
+        """Take in as many orders as it needs; whether that is no more than there may be."""
+        scale = REMAINDER * max(1.0, float(np.max(np.abs(self.rates[0] * self.step))))
+        small = 0
+        while self.order < LARGEST_ORDER and small < 2:
+            self._next()
+            small = small + 1 if self.order >= 3 and self._size(self.order) < scale else 0
+        return small == 2
+
+    def end(self) -> tuple[Array, Array]:
+        """Rates (3, n) and unit quaternions (4, n) at the end of the step."""
+        rates = self.rates[: self.order + 1, :3].sum(axis=0)
+        quaternion = self.turns[: self.order + 1].sum(axis=0)
+        return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
+
+    def _size(self, order: int) -> float:
+        """Size of the terms of one order."""
+        turned = self.rates[order, :3] * self.step
+        return max(float(np.max(np.abs(turned))), float(np.max(np.abs(self.turns[order]))))
+
+    def _next(self) -> None:
+        """The next order: products of series are sums over the orders so far."""
+        k, rates, turns = self.order, self.rates, self.turns
+        scale = self.step / (k + 1)
+        following = rates[k + 1, :3]
+        parts = 3 if self.coupled else 2
+        spins = min(k + 1, 2) if self.even_spin else k + 1
+        if self.even_spin:
+            latest = rates[k - spins + 1 : k + 1, 1::-1]  # ω2 and ω1
+            products = np.einsum("kn,kcn->cn", rates[spins - 1 :: -1, 2], latest)
+        else:
+            products = np.einsum("kcn,kcn->cn", rates[: k + 1, 1 : 1 + parts], rates[k::-1, 2 : 2 + parts])
+        np.multiply(self.coupling[:parts], products, out=following[:parts])
+        following[parts:] = 0.0
+        if k == 0:
+            following += self.acceleration
+        elif k == 1 and self.jerk is not None:
+            following += self.step * self.jerk
+        for index, (size, turn) in enumerate(self.turning):
+            following[0] += size.real / self.moments[0]
+            following[1] += size.imag / self.moments[1]
+            self.turning[index] = (size * turn / (k + 1), turn)
+        speeds = rates[:, :3]
+        if self.sink is not None:
+            following += self.sink.acceleration(rates[k, :3], k) / self.moments
+            speeds = rates[: k + 1, :3] + self.sink.slip[: k + 1]
+        following *= scale
+        rates[k + 1, 3:] = following[:2]
+        by_first, by_second = (np.einsum("kcn,kn->cn", turns[: k + 1], speeds[k::-1, axis]) for axis in (0, 1))
+        by_third = np.einsum("kcn,kn->cn", turns[k - spins + 1 : k + 1], speeds[spins - 1 :: -1, 2])
+        half = 0.5 * scale
+        turns[k + 1, 0] = half * -(by_first[1] + by_second[2] + by_third[3])
+        turns[k + 1, 1] = half * (by_first[0] + by_third[2] - by_second[3])
+        turns[k + 1, 2] = half * (by_second[0] + by_first[3] - by_third[1])
+        turns[k + 1, 3] = half * (by_third[0] + by_second[1] - by_first[2])
+        self.order = k + 1
+
+
+class _Sink:
+    """Energy dissipation as series, see `rigid._Sink`: what it does to H, and how the body slips against it."""
+
+    def __init__(self, moments: Array, growth: float, acceleration: Array, rates: Array, step: Array) -> None:
+        self.moments, self.growth = moments, growth
+        count = len(step)
+        self.momentum = np.zeros((LARGEST_ORDER, 3, count))
+        self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
+        self.quotient = np.zeros((LARGEST_ORDER, count))  # H3/|H|²
+        self.slip = np.zeros((LARGEST_ORDER, 3, count))
+        largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
+        self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
+
+    def acceleration(self, rates: Array, k: int) -> Array:
+        """Coefficient k of H × s, (3, n) N m; makes that of ``slip`` s on the way. ``rates`` (3, n): coefficient k."""
+        momentum, slip = self.momentum, self.slip
+        momentum[k] = rates * self.moments
+        self.squares[k] = np.einsum("kcn,kcn->n", momentum[: k + 1], momentum[k::-1])
+        if k == 0:
+            self.squares[0] += np.where(self.squares[0] + self.floor > 0.0, self.floor, 1.0)
+        before = np.einsum("kn,kn->n", self.squares[1 : k + 1], self.quotient[:k][::-1])
+        self.quotient[k] = (momentum[k, 2] - before) / self.squares[0]
+        slip[k, 0] = self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 1])
+        slip[k, 1] = -self.growth * np.einsum("kn,kn->n", self.quotient[k::-1], momentum[: k + 1, 0])
+        by_first, by_second = (np.einsum("kcn,kn->cn", momentum[: k + 1], slip[k::-1, axis]) for axis in (0, 1))
+        return np.stack([-by_second[2], by_first[2], by_second[0] - by_first[1]])
+
+
+BLOCK = 2048
+"""Cases that are flown together: many enough to hide the calls, few enough that their series stay in the cache."""
+
+STRIDE = 2.5
+"""Radians of one step, at most; there the work per radian is least."""
+
+FEW = 256
+"""Cases up to which many steps of symmetric bodies are summed at once: the calls then cost more than the sums."""
+
+TOO_FAST = "the motion of a dispersed case changes too fast to be integrated"
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """What flies: principal ``moments`` (3, n) kg m²; ``constant`` torque (3,) N m and ``forcing`` act on all."""
+
+    moments: Array
+    constant: Array
+    forcing: Forcing = NOTHING
+
+    @property
+    def free(self) -> bool:
+        """Whether a coast is an arc of a symmetric body without torque from outside for every case."""
+        alone = not self.constant.any() and not self.forcing.turning
+        return alone and bool(np.array_equal(self.moments[0], self.moments[1]))
+
+    def some(self, cases: Any) -> Bodies:
+        """Those of ``cases`` (an index of arrays)."""
+        return Bodies(self.moments[:, cases], self.constant, self.forcing)
+
+    def lighter(self, by: Array | None) -> Bodies:
+        """The same with moments smaller ``by`` (3, n) kg m²; None: as they are."""
+        return self if by is None else Bodies(self.moments - by, self.constant, self.forcing)
+
+
+@dataclass(frozen=True, slots=True)
+class Pulses:
+    """Rectangular pulses: ``starts`` (k, n) s, ``on_times`` (k,) s and ``impulses`` (k, 3, n) N m s, torque × on-time.
+
+    An on-time of 0 is an ideal impulse. With ``leans`` (k,) torques run evenly from 1 - lean times their mean to 1 +
+    lean times it. On-times and leans that differ are (k, n). The moments fall by ``sheds`` (k, 3, n) kg m², half as a
+    pulse begins and half as it ends, which errs in second order; None: they stay.
+    """
+
+    starts: Array
+    on_times: Array
+    impulses: Array
+    leans: Array | None = None
+    sheds: Array | None = None
+
+    def some(self, cases: Any) -> Pulses:
+        """Those of ``cases`` (an index of arrays)."""
+        on_times = self.on_times if self.on_times.ndim == 1 else self.on_times[:, cases]
+        leans = self.leans if self.leans is None or self.leans.ndim == 1 else self.leans[:, cases]
+        sheds = None if self.sheds is None else self.sheds[:, :, cases]
+        return Pulses(self.starts[:, cases], on_times, self.impulses[:, :, cases], leans, sheds)
+
+    @property
+    def slopes(self) -> Array | None:
+        """Slope of each torque, (k, 3, n) N m/s; None where all keep even."""
+        if self.leans is None or not self.leans.any():
+            return None
+        lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
+        return np.asarray(self.impulses * _of_each(2.0 * self.leans / lasts**2))
+
+    @property
+    def edges(self) -> Array:
+        """Starts and ends in turn, (2k, n) s."""
+        ends = self.starts + (self.on_times[:, None] if self.on_times.ndim == 1 else self.on_times)
+        return np.stack([self.starts, ends], axis=1).reshape(-1, self.starts.shape[1])
+
+    @property
+    def jumps(self) -> tuple[Array, Array]:
+        """What changes at each of the edges, (2k, 3, n) each: the torque in N m, and the momentum in N m s."""
+        ideal = _of_each(self.on_times == 0.0)
+        torque = np.where(ideal, 0.0, self.impulses / _of_each(np.where(self.on_times == 0.0, 1.0, self.on_times)))
+        kick = np.where(ideal, self.impulses, 0.0)
+        if self.leans is not None:  # what begins at its first value, less than its mean, ends at its last
+            first, last = _of_each(1.0 - self.leans) * torque, _of_each(1.0 + self.leans) * torque
+            return _edgewise(first, -last), _edgewise(kick, 0.0 * kick)
+        return _edgewise(torque, -torque), _edgewise(kick, 0.0 * kick)
+
+
+def _of_each(values: Any) -> Any:
+    """What pulses have, (k,) or (k, n), beside vectors (k, 3, n)."""
+    return values[:, None, None] if values.ndim == 1 else values[:, None, :]
+
+
+def _edgewise(begins: Array, ends: Array) -> Array:
+    """What is at begins and at ends (k, 3, n) in turn, (2k, 3, n)."""
+    return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
+
+
+class Stretch(NamedTuple):
+    """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
+
+    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
+    """
+
+    bodies: Bodies
+    since: Array
+    rates: Array
+    quaternion: Array
+    torque: Array | None = None
+    slope: Array | None = None
+
+    def some(self, cases: Any) -> Stretch:
+        """That of some of the cases (an index of arrays)."""
+        torque, slope = (None if one is None else one[:, cases] for one in self[4:])
+        motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
+        return Stretch(self.bodies.some(cases), *motion, torque, slope)
+
+    def moved(self, times: Array) -> Stretch:
+        """The same from ``times`` (n,) s on; this one stays as it is."""
+        gone, torque = times - self.since, self.torque
+        if torque is not None and self.slope is not None:
+            torque = torque + self.slope * gone
+        later = self._replace(rates=self.rates.copy(), quaternion=self.quaternion.copy())
+        advance(later, gone)
+        return later._replace(since=times, torque=torque)
+
+
+class Watch(Protocol):
+    """Sees the motion of cases on the way; see `axis_watch`."""
+
+    def some(self, cases: Any) -> Watch:
+        """That of some of the cases (an index of arrays)."""
+
+    def motion(self, here: Stretch, duration: Array) -> None:
+        """The motion that `advance` is about to make with the same arguments."""
+
+
+def fly(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None = None
+) -> tuple[Array, Array]:
+    """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
+
+    ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad
+    for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
+    for motions over more than `rigid.LONGEST` rad.
+    """
+    rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
+    for begin in range(0, rates.shape[1], BLOCK):
+        cases = slice(begin, begin + BLOCK)
+        seen = None if watch is None else watch.some(cases)
+        _fly_block(bodies.some(cases), rates[:, cases], quaternion[:, cases], pulses.some(cases), seen)
+    return rates, quaternion
+
+
+def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
+    """Fly one block, in place."""
+    edges = pulses.edges
+    if not len(edges):
+        return
+    usual = np.argsort(edges.mean(axis=1), kind="stable")
+    sorted_alike = np.all(np.diff(edges[usual], axis=0) >= 0.0, axis=0)
+    if sorted_alike.all():
+        _fly_alike(bodies, rates, quaternion, pulses, watch, usual)
+        return
+    for cases, alike in ((np.flatnonzero(sorted_alike), True), (np.flatnonzero(~sorted_alike), False)):
+        if len(cases):
+            flown, turned = rates[:, cases], quaternion[:, cases]
+            chosen = bodies.some(cases), flown, turned, pulses.some(cases), watch and watch.some(cases)
+            if alike:
+                _fly_alike(*chosen, usual)
+            else:
+                _fly_each(*chosen)
+            rates[:, cases], quaternion[:, cases] = flown, turned
+
+
+def _fly_alike(
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None, order: NDArray[np.intp]
+) -> None:
+    """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
+    edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
+    half = None if pulses.sheds is None else 0.5 * pulses.sheds
+    now = np.zeros(rates.shape[1])
+    on: set[int] = set()
+    for edge in order.tolist():
+        torque = np.sum(turns[sorted(on)], axis=0) if on else None
+        slope = None
+        if torque is not None and slopes is not None:
+            rising = [first // 2 for first in sorted(on)]
+            slope = np.sum(slopes[rising], axis=0)
+            torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
+        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
+        now = edges[edge]
+        number, ends = divmod(edge, 2)
+        bodies = bodies.lighter(None if half is None else half[number])
+        if not np.any(pulses.on_times[number]):
+            rates += kicks[edge] / bodies.moments
+        elif ends:
+            on.remove(edge - 1)
+        else:
+            on.add(edge)
+
+
+def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
+    """Fly cases whose edges come in orders of their own, in place."""
+    edges = pulses.edges
+    order = np.argsort(edges, axis=0, kind="stable")
+    edges = np.take_along_axis(edges, order, axis=0)
+    turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
+    slopes, slope = pulses.slopes, None
+    half = (
+        None
+        if pulses.sheds is None
+        else np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), order[:, None, :], axis=0)
+    )
+    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), order[:, None, :], axis=0)
+    now = np.zeros(rates.shape[1])
+    torque = np.zeros_like(rates)
+    for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
+        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
+        torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
+        now = edge
+        if bends is not None:
+            slope = bends[number] if slope is None else slope + bends[number]
+        bodies = bodies.lighter(None if half is None else half[number])
+        rates += kick / bodies.moments
+
+
+def _pass(here: Stretch, duration: Array, watch: Watch | None) -> None:
+    """`advance`, seen by a ``watch``."""
+    if watch is not None:
+        watch.motion(here, duration)
+    advance(here, duration)
+
+
+def advance(here: Stretch, duration: Array) -> None:
+    """Move rates and quaternion on by ``duration`` (n,) s, in place."""
+    bodies, torque, slope = here.bodies, here.torque, here.slope
+    if not duration.any():
+        return
+    if torque is None and bodies.free:
+        _arc(bodies.moments, bodies.forcing.growth, here.rates, here.quaternion, duration)
+        return
+    acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
+    jerk = None if slope is None or not slope.any() else slope / bodies.moments
+    _integrate(here, duration, acceleration, jerk)
+
+
+def cos_sin(angle: Any) -> tuple[Any, Any]:
+    """Cosine and sine (of real or complex arrays or numbers) by the tangent of the half-angle.
+
+    As exact as numpy's, and several times as fast.
+    """
+    half = np.tan(0.5 * angle)
+    scale = 1.0 / (1.0 + half * half)
+    return 2.0 * scale - 1.0, 2.0 * half * scale
+
+
+def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duration: Array) -> None:
+    """The exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` where ``growth`` is not 0.
+
+    R(t) = R(0) Rot(H(0)/A t) Rot3(aω3 t), with H in body axes: the body turns about H at |H|/A and about its own axis
+    at aω3.
+    """
+    A, _, C = moments
+    x, y = rates[0], rates[1]
+    axial = C / A * rates[2]
+    size = np.sqrt(x * x + y * y + axial * axial)
+    cosine, sine = cos_sin(0.5 * size * duration)
+    sine /= np.where(size > 0.0, size, 1.0)
+    turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
+    angle = (1.0 - C / A) * rates[2] * duration
+    cosine, sine = cos_sin(0.5 * angle)
+    p, a, b, c = turned
+    quaternion[0], quaternion[3] = p * cosine - c * sine, c * cosine + p * sine
+    quaternion[1], quaternion[2] = a * cosine + b * sine, b * cosine - a * sine
+    quaternion /= np.sqrt(np.sum(quaternion * quaternion, axis=0))
+    # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
+    cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
+    rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
+    if growth != 0.0:
+        _slip(growth, (1.0 - C / A) * rates[2], size, axial, rates, quaternion, duration)
+
+
+def _slip(
+    growth: float, rate: Array, size: Array, axial: Array, rates: Array, quaternion: Array, duration: Array
+) -> None:
+    """What dissipation does to the ends of free arcs, in place; ``rate`` is aω3, ``size`` |H|/A, ``axial`` H3/A."""
+    moving = np.where(size > 0.0, size, 1.0)
+    cosine = np.where(size > 0.0, axial / moving, 1.0)
+    h1, h2 = rates[0] / moving, rates[1] / moving
+    found = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
+    behind = rate * (found.turned - duration)
+    quaternion[:] = attitude.product(quaternion, energy_sink.slip(found, h1, h2, behind, cos_sin))
+    cosine, sine = cos_sin(behind)
+    x, y = rates[0] * found.transverse, rates[1] * found.transverse
+    rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * found.axial
+
+
+def _integrate(here: Stretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
+    """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
+
+    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the begin.
+    """
+    forcing, moments = here.bodies.forcing, here.bodies.moments
+    if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
+        _integrate_symmetric(here, duration, acceleration)
+        return
+    strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
+    if jerk is not None:
+        last = acceleration + jerk * duration
+        strength = np.maximum(strength, np.sqrt(np.sum(last * last, axis=0)))
+    strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
+    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    pace = np.sqrt(np.sum(here.rates * here.rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
+    _expect_short(span := float(np.max(pace * duration)))
+    steps = max(1, math.ceil(span / STRIDE))
+    for number in range(steps):
+        gone = duration * (number / steps)
+        push = acceleration if jerk is None else acceleration + jerk * gone
+        _step(here._replace(since=here.since + gone), duration / steps, push, jerk)
+
+
+def _expect_short(span: float) -> None:
+    """Raise Infeasible for motions over too many radians."""
+    if not span <= LONGEST:
+        raise Infeasible(
+            f"the motion of a dispersed case runs over {span:.2g} rad, too many to be integrated; shorten the time, "
+            f"or look for a torque or rate that is too large"
+        )
+
+
+def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) -> None:
+    """`_integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+    bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
+    A, _, C = bodies.moments
+    drive = taylor.Drive(
+        1.0 - C / A,
+        acceleration[0] + 1j * acceleration[1],
+        acceleration[2],
+        tuple((size / A, rate) for size, rate in bodies.forcing.turning),
+    )
+    omega, spin = rates[0] + 1j * rates[1], rates[2]
+    _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))
+    turned = np.stack([quaternion[0] + 1j * quaternion[3], quaternion[1] + 1j * quaternion[2]])
+    try:
+        omega, rates[2], (first, second) = taylor.end(drive, omega, spin, turned, here.since, duration)
+    except taylor.NotConverged:
+        raise Infeasible(TOO_FAST) from None
+    rates[:2] = omega.real, omega.imag
+    quaternion[:] = first.real, second.real, second.imag, first.imag
+
+
+def _step(here: Stretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
+    """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
+    bodies, now, rates, quaternion = here[:4]
+    series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
+    if series.converges():
+        rates[:], quaternion[:] = series.end()
+        return
+    if halvings == 0:
+        raise Infeasible(TOO_FAST)
+    for begin in (0.0, 0.5):
+        push = acceleration if jerk is None else acceleration + jerk * (begin * step)
+        _step(here._replace(since=now + begin * step), 0.5 * step, push, jerk, halvings - 1)

@@ -1,0 +1,312 @@
+"""Body rates under torques that last: the general solution Magnus 1970 (8)-(10) and its special cases.
+
+Everything in time, ω̇ = -i a ω3(t) ω + M(t)/A and ω̇3 = M3/C, so that nothing is divided by ω3 (Magnus' m = M/(Aω3)
+breaks where the spin passes zero) or by a (a sphere is no exception). M = M1 + iM2 in N m, body-fixed unless said.
+
+Body rates under pulses, in closed form: ω = ω1 + iω2 turns in the body at -a ω3, and torques add to it.
+
+Equation of motion in time, Magnus 1970 (1) and (4)-(6) without the division by ω3:
+dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C.
+"""
+
+from __future__ import annotations
+
+import cmath
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.physics import energy_sink
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SERIES_REACH = 2.0
+"""Largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel."""
+
+MANY_PANELS = 12
+"""Panels from which on all are summed at once."""
+
+SERIES_ORDERS = 60
+"""Orders of that power series: it has converged long before."""
+
+OUTWARDS = 2000
+"""Steps of a tenth outwards, at most, in which an on-time is sought: over more decades than there are in a number."""
+
+MOST_PANELS = 20_000
+"""A pulse over more phase than these span keeps less than 1e-4 of its impulse; it counts as keeping none."""
+
+
+def impulse_sum(
+    times: Array,
+    omega0: complex,
+    spin0: float,
+    A: float,
+    C: float,
+    pulse_times: Array,
+    transverse: ComplexArray,
+    axial: Array,
+) -> tuple[ComplexArray, Array]:
+    """Rates after a sum of impulses, Magnus 1970 (17), exact at any angle for symmetric bodies.
+
+    ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
+    an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. With
+    energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`flight.by_impulses`).
+
+    ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.
+    Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
+    """
+    a = (A - C) / A
+    spins = spin0 + np.concatenate([[0.0], np.cumsum(axial)]) / C
+    knots = np.concatenate([[0.0], pulse_times])
+    turned = np.concatenate([[0.0], np.cumsum(spins[:-1] * np.diff(knots))])
+    before = np.exp(1j * a * turned[1:])
+    sums = omega0 + np.concatenate([[0.0], np.cumsum(transverse * before)]) / A
+    given = np.searchsorted(pulse_times, times, side="right")
+    alpha = turned[given] + spins[given] * (times - knots[given])
+    return sums[given] * np.exp(-1j * a * alpha), spins[given]
+
+
+def width_factor(
+    a: float, spin: float, spin_rate: float, on_time: float, growth: float = 0.0, drift: float = 0.0
+) -> complex:
+    """What a rectangular pulse loses on ω by its width, as a factor on its impulse at the centre.
+
+    For a constant body torque with axial part, ω3 = spin + spin_rate·(time since start) with spin_rate = M3/C, the
+    pulse acts on ω exactly as an impulse M τ F at its centre, when ω3 jumps there by spin_rate·τ:
+    F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial part this is
+    sinc(a ω3 τ/2), sinc x = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns a ω3 into
+    a ω3 + iκ, by its small-angle part: during the pulse alone, where what is neglected is of order κτ a ω3 τ θ²/12.
+    ``drift`` (rad/s²) is a spin acceleration that goes on after the pulse.
+    """
+    half = 0.5 * on_time
+    growth = math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
+    if spin_rate == 0.0 and drift == 0.0:
+        angle = (a * spin + 1j * growth) * half
+        return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
+    offset = 0.5 * a * spin_rate * half * half
+    slope, bend = a * (spin + (spin_rate + drift) * half) + 1j * growth, 0.5 * a * (spin_rate + drift)
+    turned = (abs(slope) + abs(bend) * half) * half
+    if not turned <= MOST_PANELS * SERIES_REACH:
+        return 0.0 + 0.0j
+    panels = math.ceil(turned / SERIES_REACH) or 1
+    width = half / panels
+    if panels >= MANY_PANELS:
+        middles = (2 * np.arange(panels) + 1 - panels) * width
+        turns = np.exp(1j * (offset + (slope + bend * middles) * middles))
+        return complex(np.mean(turns * _mean_of_phase(slope + 2 * bend * middles, bend, width)))
+    total = 0.0 + 0.0j
+    for panel in range(panels):
+        middle = (2 * panel + 1 - panels) * width
+        phase = offset + (slope + bend * middle) * middle
+        total += cmath.exp(1j * phase) * _mean_of_phase(slope + 2 * bend * middle, bend, width)
+    return total / panels
+
+
+def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
+    """Mean of exp(i(slope s + bend s²)) over |s| <= half, for one ``slope`` or many, by its power series."""
+    before, term = 0.0 * slope, 1.0 + 0.0 * slope  # terms c_k half^k of the series of the integrand
+    total = term
+    for order in range(SERIES_ORDERS):
+        if order >= 4 and _largest(abs(term) + abs(before)) <= 1e-18:
+            break
+        after = 1j * half * (slope * term + 2 * bend * half * before) / (order + 1)
+        before, term = term, after
+        if order % 2 == 1:
+            total = total + term / (order + 2)
+    return total
+
+
+def _largest(sizes: float | Array) -> float:
+    return sizes if isinstance(sizes, float) else float(sizes.max())
+
+
+def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate: float, longest: float) -> float | None:
+    """On-time in s of the rectangular pulse that acts on ω like ``impulse`` N m s; None if none up to ``longest``.
+
+    ``torque`` is |M1 + iM2| > 0 in N m. Without axial torque τ = (2/(aω3)) asin(aω3 J/(2M)), with the limit J/M
+    for a -> 0 (US patent 4504032 fires by the same formula); a torque that holds longer than half a nutation
+    period works against itself, so 2M/|aω3| is the most that one pulse can do.
+    """
+    rate = abs(a * spin)
+    sine = 0.5 * rate * impulse / torque
+    if sine > 1.0 and spin_rate == 0.0:
+        return None
+    plain = impulse / torque * (math.asin(min(sine, 1.0)) / sine if sine > 0.0 else 1.0)
+    if spin_rate == 0.0:
+        return plain if plain <= longest else None
+
+    def excess(on_time: float) -> float:
+        return torque * on_time * abs(width_factor(a, spin, spin_rate, on_time)) - impulse
+
+    # From the pulse without axial torque outwards: the first on-time that does enough lies in the last step.
+    low, high = 0.0, min(plain, longest)
+    for _ in range(OUTWARDS):
+        if excess(high) >= 0.0:
+            return _crossing(excess, low, high)
+        if high >= longest or abs(a) * (abs(spin) + 0.5 * abs(spin_rate) * high) * high > 2.0 * math.pi:
+            return None
+        low, high = high, min(1.1 * high, longest)
+    return None
+
+
+def _crossing(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Where ``excess`` rises through zero between ``low`` and ``high``: false position that halves a stale end."""
+    below, above = excess(low), excess(high)
+    for _ in range(100):
+        if above == 0.0 or high - low <= 2e-16 * high:
+            break
+        middle = high - above * (high - low) / (above - below)
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+        value = excess(middle)
+        if value < 0.0:
+            low, below, above = middle, value, 0.5 * above
+        else:
+            high, above, below = middle, value, 0.5 * below
+    return high
+
+
+PANEL = 2.0
+"""Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
+
+
+@functools.cache
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights of ten-point Gauss-Legendre quadrature, made when first used: numpy.polynomial loads slowly."""
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    return nodes, weights
+
+
+def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
+    """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by Gauss-Legendre panels.
+
+    Bödewadt writes it with Fresnel's integrals, which cancel as bend -> 0.
+    """
+    slope, bend, length = (np.asarray(part, dtype=float) for part in np.broadcast_arrays(slope, bend, length))
+    # The phase may turn back where slope + 2 bend s = 0; this bounds its total variation.
+    variation = np.abs(slope) * np.abs(length) + np.abs(bend) * np.square(length)
+    counts = np.maximum(np.ceil(variation / PANEL), 1.0).astype(int)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    number = np.arange(len(owner)) - firsts[owner]
+    width = length[owner] / counts[owner]
+    nodes, weights = _gauss()
+    s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
+    phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
+    panels = 0.5 * width * (np.exp(1j * phase) @ weights)
+    return np.asarray(np.add.reduceat(panels, firsts))
+
+
+def stepwise_torque(
+    times: Array, omega0: complex, spin0: float, A: float, C: float, edges: Array, torques: Array
+) -> tuple[ComplexArray, Array]:
+    """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
+
+    The form of these equations; schedules fly their pulses by `rates` and `rigid`. ``times`` (n,) s in [edges[0],
+    edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s) begins at edges[0];
+    ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
+    """
+    edges, torques = np.asarray(edges, dtype=float), np.asarray(torques, dtype=float)
+    times = np.asarray(times, dtype=float)
+    a = (A - C) / A
+    spin_rates = torques[:, 2] / C
+    lengths = np.diff(edges)
+    spins = spin0 + np.concatenate([[0.0], np.cumsum(spin_rates * lengths)])
+    alphas = np.concatenate([[0.0], np.cumsum((spins[:-1] + 0.5 * spin_rates * lengths) * lengths)])
+    transverse = (torques[:, 0] + 1j * torques[:, 1]) / A
+
+    def gained(step: NDArray[np.intp], since: Array) -> ComplexArray:
+        turned = phase_integral(a * spins[step], 0.5 * a * spin_rates[step], since)
+        return np.asarray(transverse[step] * np.exp(1j * a * alphas[step]) * turned)
+
+    sums = omega0 + np.concatenate([[0.0], np.cumsum(gained(np.arange(len(lengths)), lengths))])
+    step = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(lengths) - 1)
+    since = times - edges[step]
+    spin = spins[step] + spin_rates[step] * since
+    alpha = alphas[step] + 0.5 * (spins[step] + spin) * since
+    return (sums[step] + gained(step, since)) * np.exp(-1j * a * alpha), spin
+
+
+def rotating_torques(
+    times: Array, omega0: complex, spin: float, A: float, C: float, torques: ComplexArray, rates: Array
+) -> ComplexArray:
+    """ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
+
+    Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with ω(0) given it is
+    ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near resonance r_p = -aω3, which is (25):
+    ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2} sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3
+    the nearly space-fixed torque of (27), r_p = 0 the constant one of (11).
+
+    ``times`` (n,) s, ``torques`` (p,) N m, ``rates`` (p,) rad/s. Returns (n,) rad/s.
+    """
+    times = np.asarray(times, dtype=float)[:, None]
+    nutation = (A - C) / A * spin
+    half = 0.5 * (nutation + np.asarray(rates, dtype=float)) * times
+    # numpy.sinc(x) is sin(πx)/(πx)
+    forced = np.asarray(torques) * times * np.exp(1j * half) * np.sinc(half / math.pi) / A
+    return np.asarray((omega0 + forced.sum(axis=1)) * np.exp(-1j * nutation * times[:, 0]))
+
+
+def steady_response(A: float, C: float, spin: float, torque: complex, rate: float = 0.0) -> complex:
+    """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
+
+    For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11) and K(14), (M2 -
+    iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the despun frame is K(15), iM/(Cω3).
+    K(14) and K(15) hold without axial torque: the third component of K(15) is 0, and the last line of K(14) must read
+    M = ω_P × ω_z (J_z - J_xy). Infinite at resonance, r = -aω3, and for r = 0 on a sphere.
+    """
+    detuning = (A - C) / A * spin + rate
+    if detuning == 0.0:
+        return complex(math.inf)
+    return -1j * torque / (A * detuning)
+
+
+class PermanentRotation(NamedTuple):
+    """Rotation that stays constant in body and space: ω (rad/s), its rate ψ̇0 = |ω_i|, Euler angles ϑ0, φ0 (rad)."""
+
+    omega: complex
+    rate: float
+    theta: float
+    phi: float
+
+
+def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> PermanentRotation:
+    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), and its Euler angles (14).
+
+    tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
+    ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
+    need no more than `steady_response`.
+    """
+    omega = steady_response(A, C, spin, torque)
+    rate = math.hypot(abs(omega), spin)
+    return PermanentRotation(omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag))
+
+
+def beat(A: float, C: float, spin: float, torque: complex, rate: float) -> tuple[float, float]:
+    """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling, Magnus 1970 (27).
+
+    ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at resonance.
+    """
+    detuning = abs((A - C) / A * spin + rate)
+    if detuning == 0.0:
+        return math.inf, math.inf
+    return 2.0 * abs(torque) / (A * detuning), 2.0 * math.pi / detuning
+
+
+def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: complex, nutation: float) -> float:
+    """When a resonant torque (r = -aω3) has driven the nutation angle to ``nutation`` rad, s; Magnus 1970 (25).
+
+    |ω0 + M t/A| = C|ω3| tan θ/A: the later root, since the pole curve may first run inwards; 0 if it is there already.
+    """
+    needed = C * abs(spin) * math.tan(nutation) / A
+    speed = torque / A
+    if abs(omega0) >= needed:
+        return 0.0
+    along = (omega0 * speed.conjugate()).real / abs(speed)
+    across = abs((omega0 * speed.conjugate()).imag) / abs(speed)
+    return (math.sqrt(needed * needed - across * across) - along) / abs(speed)

@@ -1,0 +1,381 @@
+"""How near the spin axis comes to directions in space, and how far from them, in many cases at once.
+
+On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
+axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
+those turns that count are followed in steps, and any other motion all the way. Arrays carry the case last, as in
+`rigid_cases`.
+
+Sun pulses of nutating bodies and what fires from them, many at once: each pulse moves the Sun pulses after it.
+
+A Sun pulse comes when the Sun passes the azimuth of the sensor in the body: as the body moves, not as it would without
+nutation. Arrays carry the case last, as in `rigid_cases`, by which everything moves.
+
+Where the Sun is seen, to 0.01 deg between 1972 and 2100: enough for the phase of a Sun pulse and for cones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.physics.batch import Stretch
+
+OBLIQUITY = math.radians(23.43928)
+"""Of the ecliptic at J2000.0."""
+
+ABERRATION = 20.4898 / 3600.0
+"""deg by which the Sun is seen behind where it is, at its mean distance (Meeus, 25.10)."""
+
+TILTING, NODE = math.radians(0.013056), math.radians(174.876)
+"""How far the ecliptic tilts in a century, and the longitude about which it does."""
+
+
+def direction(days: float) -> NDArray[np.float64]:
+    """Geocentric unit vector (3,) to the apparent Sun in the mean equator and equinox of J2000.0.
+
+    ``days`` since J2000.0 (2000-01-01T12:00 TT). Longitude by J. Meeus, Astronomical Algorithms, 2nd ed., chapter 25,
+    "low accuracy", with aberration, taken from ecliptic and equinox of date to those of J2000.0 (chapter 21).
+    """
+    centuries = days / 36525.0
+    mean_longitude = 280.46646 + centuries * (36000.76983 + centuries * 0.0003032)
+    anomaly = math.radians(357.52911 + centuries * (35999.05029 - centuries * 0.0001537))
+    eccentricity = 0.016708634 - centuries * (0.000042037 + centuries * 0.0000001267)
+    centre = (
+        (1.914602 - centuries * (0.004817 + centuries * 0.000014)) * math.sin(anomaly)
+        + (0.019993 - centuries * 0.000101) * math.sin(2.0 * anomaly)
+        + 0.000289 * math.sin(3.0 * anomaly)
+    )
+    seen = centre - ABERRATION * (1.0 + eccentricity * math.cos(anomaly + math.radians(centre)))
+    longitude = math.radians(mean_longitude + seen - centuries * (1.396971 + centuries * 0.0003086))
+    latitude = centuries * TILTING * math.sin(longitude - NODE)
+    x, y, z = math.cos(latitude) * math.cos(longitude), math.cos(latitude) * math.sin(longitude), math.sin(latitude)
+    cosine, sine = math.cos(OBLIQUITY), math.sin(OBLIQUITY)
+    return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
+
+
+Array = NDArray[np.float64]
+
+ROWS = 24
+"""Steps in each turn of the axis, where it is followed in steps."""
+
+SECANTS = 2
+"""Steps of the secant method to the moment between two steps at which the axis is nearest or farthest."""
+
+CIRCLE = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisWatch:
+    """The ``least`` and the ``largest`` angles (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
+
+    The directions are inertial unit vectors. ``sense`` is the sign of the spin; ``rows``: which of the n cases those
+    are that are given to it.
+    """
+
+    directions: Array
+    least: Array
+    largest: Array
+    sense: float
+    rows: Any = ...
+
+    @classmethod
+    def of(cls, directions: Array, sense: float) -> AxisWatch:
+        """One that has seen nothing yet."""
+        shape = len(directions), directions.shape[2]
+        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense)
+
+    @property
+    def angles(self) -> Array:
+        """Least and largest, (m, 2, n)."""
+        return np.stack([self.least, self.largest], axis=1)
+
+    def some(self, cases: Any) -> AxisWatch:
+        """That of some of the cases (an index of arrays), to which it adds what it sees of them."""
+        rows = np.arange(self.least.shape[1])[self.rows][cases]
+        return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
+
+    def motion(self, here: Stretch, duration: Array) -> None:
+        """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
+        bodies = here.bodies
+        if here.torque is not None or not bodies.free:
+            self._steps(here, duration)
+        elif bodies.forcing.growth == 0.0:
+            self._arc(bodies.moments, here.rates, here.quaternion, duration)
+        else:
+            self._slow(here, duration)
+
+    def turn(self, here: Stretch) -> None:
+        """Take one turn of the axis about H in a motion free of pulses."""
+        first, second, _ = here.bodies.moments
+        self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
+
+    def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
+        rows = np.arange(self.least.shape[1])[self.rows][cases]
+        self.least[number, rows] = np.minimum(self.least[number, rows], least)
+        self.largest[number, rows] = np.maximum(self.largest[number, rows], largest)
+
+    def _arc(self, moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
+        """Begin and inner extremes of arcs; their ends are where others begin."""
+        momentum, axis = _rotated(quaternion, moments * rates), self._axis(quaternion)
+        size = np.sqrt(np.sum(momentum * momentum, axis=0))
+        momentum, way = momentum / size, size / moments[0] * duration
+        theta = _angles(momentum, axis)
+        for number, direction in enumerate(self.directions[:, :, self.rows]):
+            begins, beta = _angles(axis, direction), _angles(momentum, direction)
+            along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
+            ahead = np.sum(np.cross(momentum, axis, axis=0) * direction, axis=0)
+            nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
+            farthest = (nearest + math.pi) % CIRCLE
+            least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
+            self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
+
+    def _slow(self, here: Stretch, duration: Array) -> None:
+        """Arcs with dissipation, of which the first turn and the last are followed in steps.
+
+        H stays and θ grows, or falls, all the way: between those turns so do |β - θ| and β + θ, unless θ passes β or
+        π - β, where all turns are followed.
+        """
+        turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
+        last = here.moved(here.since + np.maximum(duration - turn, 0.0))
+        momentum = _rotated(here.quaternion, here.bodies.moments * here.rates)
+        before, after = (_angles(momentum, self._axis(one.quaternion)) for one in (here, last))
+        betas = np.array([_angles(momentum, one) for one in self.directions[:, :, self.rows]])
+        passed = [(before - one) * (after - one) <= 0.0 for one in (*betas, *(math.pi - betas))]
+        whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
+        for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
+            if cases.any():
+                self.some(cases)._steps(begins.some(cases), lasts[cases])
+
+    def _steps(self, here: Stretch, duration: Array) -> None:
+        """Begin and end of each step, and extremes between them."""
+        first, second, _ = here.bodies.moments
+        pace = _momentum(here) / np.minimum(first, second)
+        if not np.array_equal(first, second):
+            pace = pace + np.abs(here.rates[2])
+        count = max(math.ceil(float(np.max(pace * duration)) * ROWS / CIRCLE), 1)
+        begin, step, nearing = here.since, duration / count, self._look(here, ...)
+        for index in range(count):
+            then, before, here = here, nearing, here.moved(begin + (index + 1) * step)
+            nearing = self._look(here, ...)
+            for number, (rise, fall) in enumerate(zip(before, nearing, strict=True)):
+                cases = np.flatnonzero(rise * fall < 0.0)  # in between the axis comes nearest, or goes farthest
+                if len(cases):
+                    self._between(then.some(cases), step[cases], (rise[cases], fall[cases]), number, cases)
+
+    def _between(self, then: Stretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
+        """Extremes between the ends of a step, by `SECANTS` from the rates (nearer, farther) there of one direction."""
+        begin, end, (rise, fall) = np.zeros_like(step), step, rates
+        for _ in range(SECANTS):
+            way = begin + (end - begin) * rise / (rise - fall)
+            here = self._look(then.moved(then.since + way), cases)[number]
+            before = here * rise > 0.0
+            begin, rise = np.where(before, way, begin), np.where(before, here, rise)
+            end, fall = np.where(before, end, way), np.where(before, fall, here)
+
+    def _look(self, here: Stretch, cases: Any) -> list[Array]:
+        """Take the angles of one moment; returns at what rate the axis comes nearer, in cosines by s."""
+        bodies, quaternion = here.bodies, here.quaternion
+        axis, (first, second, _) = self._axis(quaternion), here.rates
+        moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
+        if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
+            momentum = _rotated(quaternion, bodies.moments * here.rates)
+            momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
+            cosine = np.sum(momentum * axis, axis=0)
+            moving = moving + bodies.forcing.growth * cosine * (cosine * axis - momentum)
+        nearing = []
+        for number, directions in enumerate(self.directions[:, :, self.rows]):
+            direction = directions[:, cases]
+            angles = _angles(axis, direction)
+            self._take(number, angles, angles, cases)
+            nearing.append(np.asarray(np.sum(moving * direction, axis=0)))
+        return nearing
+
+    def _axis(self, quaternion: Array) -> Array:
+        w, x, y, z = quaternion
+        return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _momentum(here: Stretch) -> Array:
+    """Size (n,) of H, N m s."""
+    return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
+
+
+def _rotated(quaternion: Array, vector: Array) -> Array:
+    """Vectors (3, n) turned by unit quaternions (4, n)."""
+    w, axis = quaternion[0], quaternion[1:]
+    once = np.cross(axis, vector, axis=0)
+    return np.asarray(vector + 2.0 * (w * once + np.cross(axis, once, axis=0)))
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Angles (n,) between vectors (3, n), exact to rounding from 0 to π."""
+    across = np.cross(first, second, axis=0)
+    return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
+
+
+ITERATIONS = 40
+"""Newton steps by which a Sun pulse is found, at most; three or four are usual."""
+
+EXACT = 1e-13
+"""Share of a spin turn to which it is found."""
+
+AHEAD = 8
+"""Sun pulses after which the next one is looked for, at most: from there on it is foreseen by the mean rate."""
+
+
+class Push(NamedTuple):
+    """Torque that runs evenly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
+
+    begin: Any
+    end: Any
+    first: Array
+    last: Array
+
+
+class SunClock:
+    """Bodies on their way from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
+
+    ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
+    the sign of the spin. ``time`` (n,) s is that of the last Sun pulse looked for, ``lost`` (n,) where there was none:
+    the Sun is too near to the axis to go round in the body. ``over`` (n,) s: when the last pulse, command and
+    thrust, is over.
+    """
+
+    def __init__(self, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
+        self.sun, self.sense, self.azimuth = sun, sense, azimuth
+        self._stretches, self.over = [start], start.since
+        ahead, _ = self._ahead(start, sun)
+        self._number, self.time = 0, start.since + (ahead - CIRCLE) / self._pace  # as if one had come before t = 0
+        self.lost = np.zeros(len(start.since), dtype=bool)
+
+    @property
+    def here(self) -> Stretch:
+        """The motion since the last pulse was over."""
+        return self._stretches[-1]
+
+    @property
+    def passed(self) -> Iterator[tuple[Stretch, Array]]:
+        """The motion from the end of the last pulse but one to that of the last, each stretch with its end."""
+        return zip(self._stretches, (one.since for one in self._stretches[1:]), strict=False)
+
+    def fire(
+        self, found: Stretch, delay: Array, width: float, pushes: Sequence[Push], sheds: Array | None = None
+    ) -> Array:
+        """Fire a command of ``width`` s, the ``delay`` (n,) s after the Sun pulse ``found``, the last one.
+
+        ``pushes`` are the torques that follow it, s after its start; the moments fall by ``sheds`` (3, n) kg m², half
+        as the first begins. Returns the starts (n,) s of the commands: not before the pulse before is over.
+        """
+        before, half = self.here, None if sheds is None else 0.5 * sheds
+        starts = np.maximum(found.since + delay, self.over)
+        lasts: Any = width
+        for push in pushes:
+            lasts = np.maximum(lasts, push.end)
+        self.over = starts + lasts
+        if not pushes:
+            return starts
+        begun = found.moved(starts + pushes[0].begin)
+        late = np.flatnonzero(found.since < before.since)  # it came while the pulse before was on
+        if len(late):
+            again = before.some(late).moved(begun.since[late])
+            begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
+        begun = begun._replace(bodies=before.bodies.lighter(half))
+        self._stretches = [before]
+        for push in pushes:
+            length = np.where(push.end - push.begin == 0.0, 1.0, push.end - push.begin)
+            slope = None if np.array_equal(push.first, push.last) else (push.last - push.first) / length
+            firing = begun._replace(since=starts + push.begin, torque=push.first, slope=slope)
+            begun = firing.moved(starts + push.end)._replace(torque=None, slope=None)
+            self._stretches.append(firing)
+        self._stretches.append(begun._replace(bodies=begun.bodies.lighter(half)))
+        return starts
+
+    def sun_pulse(self, number: int) -> Stretch:
+        """The motion as the Sun pulse of this ``number`` comes, if nothing is fired before; none goes back."""
+        found = self.here
+        while self._number < number:
+            step = min(number - self._number, AHEAD)
+            pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
+            passed = np.rint((pace * (self.here.since - self.time) + ahead) / CIRCLE)
+            expected = self.here.since + (ahead + CIRCLE * (step - passed)) / pace
+            found = self._root(self.here.moved(expected), pace, self.sun)
+            self._look_back(found, expected, pace)
+            off, rate = self._off(found, self.sun)
+            astray = np.abs(found.since - expected) * pace > math.pi
+            self.lost |= astray | (rate <= 0.0) | ~(np.abs(off) < 1e-6)
+            self._number, self.time = self._number + step, found.since
+        return found
+
+    def angle(self, here: Stretch) -> Array:
+        """Between spin axis and Sun, (n,) rad."""
+        w, x, y, z = here.quaternion
+        axis = self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+        across = np.linalg.norm(np.cross(axis, self.sun, axis=0), axis=0)
+        return np.asarray(np.arctan2(across, np.sum(axis * self.sun, axis=0)))
+
+    @property
+    def _pace(self) -> Array:
+        """Mean rate (n,) rad/s at which the Sun goes round in the free body.
+
+        The body turns about H at |H|/A, and about its axis at aω3: together, and at small angles, at ω3.
+        """
+        first, second, C = self.here.bodies.moments
+        A, spin = 0.5 * (first + second), self.here.rates[2]
+        size = np.sqrt(np.sum((self.here.bodies.moments * self.here.rates) ** 2, axis=0))
+        return np.asarray(np.abs(self.sense * size / A + (1.0 - C / A) * spin))
+
+    def _look_back(self, found: Stretch, expected: Array, pace: Array) -> None:
+        """Where a Sun pulse came before the last pulse was over, look again in the motion then, in place."""
+        for stretch, over in zip(self._stretches[-2::-1], self._stretches[:0:-1], strict=True):
+            cases = np.flatnonzero(found.since < over.since)
+            if not len(cases):
+                return
+            start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
+            again = self._root(start, pace[cases], self.sun[:, cases])
+            for whole, part in zip(found[1:4], again[1:4], strict=True):
+                whole[..., cases] = part
+
+    def _root(self, start: Stretch, pace: Array, sun: Array) -> Stretch:
+        """The motion as the Sun passes the sensor, at the moment next to that of ``start``: by Newton's method."""
+        here = start
+        for _ in range(ITERATIONS):
+            off, rate = self._off(here, sun)
+            # Where the Sun is near the axis its azimuth may not change for a moment: then by the mean rate.
+            here = here.moved(here.since + off / np.where(rate > 0.1 * pace, rate, pace))
+            if np.all(np.abs(off) < CIRCLE * EXACT):
+                break
+        return here
+
+    def _off(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
+        """By what angle (n,) in [-π, π) the body has to turn until the Sun passes the sensor, and at what rate."""
+        ahead, rate = self._ahead(here, sun)
+        return (ahead + math.pi) % CIRCLE - math.pi, rate
+
+    def _ahead(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
+        """The same in [0, 2π)."""
+        return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
+
+
+def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
+    """By what angle (n,) in [0, 2π) bodies have to turn until the Sun passes the sensor, and at what rate, rad/s.
+
+    ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
+    rad and ``sense`` are those of a `SunClock`.
+    """
+    w, x, y, z = quaternion
+    s1, s2, s3 = sun
+    # The Sun as the body sees it: turned by the conjugate quaternion.
+    i, j, k = z * s2 - y * s3, x * s3 - z * s1, y * s1 - x * s2
+    s1, s2, s3 = (
+        s1 + 2.0 * (w * i + z * j - y * k),
+        s2 + 2.0 * (w * j + x * k - z * i),
+        s3 + 2.0 * (w * k + y * i - x * j),
+    )
+    first, second, third = rates
+    turning = s1 * (s3 * first - s1 * third) - s2 * (s2 * third - s3 * second)  # ds/dt = s × ω
+    return sense * (np.arctan2(s2, s1) - azimuth) % CIRCLE, -sense * turning / (s1 * s1 + s2 * s2)

@@ -1,0 +1,405 @@
+"""What a valve makes of a command: the thrust that a nozzle gives, its impulse and its centroid, and back.
+
+Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse is a time, the
+*effective on-time*: impulse over full thrust. A rectangular pulse of that length about the centroid has the same
+impulse and the same first moment.
+
+What thrust depends on besides commands: how cold the nozzle is, and the pressure in the tank.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+SMALL = 1e-9
+"""Share of a pressure by which the slope of a table is taken."""
+
+
+def possible(tank: Tank) -> Any:
+    """Whether there is such a tank: one number, or of arrays each."""
+    falls = (tank.final_pressure > 0.0) & (tank.final_pressure <= tank.pressure)
+    return falls & (tank.propellant > 0.0) & (tank.exponent >= 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Cold:
+    """The first pulse of each channel has ``first`` times the thrust; over ``pulses`` of them this decays to one.
+
+    ``fired``: pulses by channel before t = 0. The first two may be arrays, of cases.
+    """
+
+    first: Any
+    pulses: Any
+    fired: Mapping[str, int] = field(default_factory=dict)
+
+    def factor(self, before: int) -> Any:
+        """Of the pulse that comes after so many ``before`` it: 1 - (1 - first) exp(-k/pulses)."""
+        return 1.0 - (1.0 - self.first) * self.decay(before)
+
+    def decay(self, before: int) -> Any:
+        """What is left of the difference to a warm nozzle then, over that of the first pulse."""
+        return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
+
+
+@dataclass(frozen=True, slots=True)
+class Tank:
+    """A tank in blowdown: ``propellant`` kg, ``pressure`` when full and ``final_pressure`` Pa with nothing left.
+
+    Thrust goes with the pressure to the power ``exponent``. ``isp`` are rows of pressure, Pa, rising, and specific
+    impulse, s, between which it runs evenly; None leaves it to the thrusters. ``used`` kg were used before t = 0. The
+    principal moments (I1, I2, I3) of the spacecraft fall by ``inertia_per_kg`` kg m² for each kg that is used; None:
+    they stay. The first four may be arrays, of cases.
+    """
+
+    propellant: Any
+    pressure: Any
+    final_pressure: Any
+    exponent: Any
+    isp: tuple[tuple[float, float], ...] | None = None
+    used: float = 0.0
+    inertia_per_kg: tuple[float, float, float] | None = None
+
+    @property
+    def doubled(self) -> Tank:
+        """One with twice the propellant, in which the pressure falls as in this one, and on."""
+        low = self.pressure / (2.0 * self.pressure / self.final_pressure - 1.0)
+        return replace(self, propellant=2.0 * self.propellant, final_pressure=low)
+
+    def pressure_after(self, used: Any) -> Any:
+        """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it: one number or an array.
+
+        At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
+        V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
+        """
+        many = np.ndim(used) or np.ndim(self.propellant)
+        used = np.minimum(used, self.propellant) if many else min(used, self.propellant)
+        return self.pressure / (1.0 + (self.pressure / self.final_pressure - 1.0) * used / self.propellant)
+
+    def thrust_factor(self, used: Any) -> Any:
+        """Thrust over that of a full tank."""
+        return (self.pressure_after(used) / self.pressure) ** self.exponent
+
+    def share(self, used: Any, more: Any) -> Any:
+        """Share of a pulse that is fired which takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
+
+        A pulse during which the tank runs empty is as long as commanded, and that much weaker.
+        """
+        left, many = self.propellant - used, np.ndim(used) or np.ndim(more) or np.ndim(self.propellant)
+        if not many:
+            return 1.0 if more <= left or more == 0.0 else max(left, 0.0) / more
+        lasts = np.real(more) <= np.real(left)
+        return np.where(lasts, 1.0, np.where(np.real(left) > 0.0, left, 0.0) / np.where(lasts, 1.0, more))
+
+    def isp_after(self, used: Any) -> Any:
+        """Specific impulse, s; None where the thrusters have their own."""
+        if self.isp is None:
+            return None
+        pressures, values = zip(*self.isp, strict=True)
+        pressure = self.pressure_after(used)
+        found = np.interp(np.real(pressure), pressures, values)
+        if not np.iscomplexobj(pressure):
+            return found
+        rising = np.interp(np.real(pressure) * (1.0 + SMALL), pressures, values) - found
+        return found + 1j * np.imag(pressure) * rising / (SMALL * np.real(pressure))
+
+
+Array = NDArray[np.float64]
+
+NODES = 16
+"""Of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding."""
+
+REACH = 2.0
+
+
+class Ramp(NamedTuple):
+    """Thrust that runs evenly from the level ``first`` at ``begin`` s to ``last`` at ``end`` s; 1 is full thrust."""
+
+    begin: float
+    end: float
+    first: float
+    last: float
+
+    @property
+    def impulse(self) -> float:
+        """Of full thrust, s."""
+        return 0.5 * (self.first + self.last) * (self.end - self.begin)
+
+
+class Thrust(NamedTuple):
+    """What a command gives: the effective ``on_time`` s about the ``centroid`` s, by the ``ramps`` of the thrust."""
+
+    on_time: float
+    centroid: float
+    ramps: tuple[Ramp, ...]
+
+
+NOTHING = Thrust(0.0, 0.0, ())
+
+
+class Opened(NamedTuple):
+    """Thrust that rises, stays at a ``level`` and falls between four ``corners``, s: numbers, or arrays of cases."""
+
+    corners: tuple[Any, Any, Any, Any]
+    level: Any
+
+    @property
+    def pieces(self) -> tuple[tuple[Any, Any, Any, Any], ...]:
+        """Of rise, full thrust and fall the begin and the length, s, the mean level, and its lean to either side."""
+        first, second, third, last = self.corners
+        half = 0.5 * self.level
+        return (
+            (first, second - first, half, 1.0),
+            (second, third - second, self.level, 0.0),
+            (third, last - third, half, -1.0),
+        )
+
+    def within(self, middle: Any, time: Any) -> Any:
+        """Level at ``time`` s, an edge of a stretch about ``middle`` s without a corner in it."""
+        first, second, third, last = self.corners
+        rising = self.level * (time - first) / np.where(second == first, 1.0, second - first)
+        falling = self.level * (last - time) / np.where(last == third, 1.0, last - third)
+        inside = np.where(middle < second, rising, np.where(middle > third, falling, self.level))
+        return np.where((middle <= first) | (middle >= last), 0.0, inside)
+
+    @property
+    def acts(self) -> tuple[Any, Any, Any]:
+        """Effective on-time, centroid and spread (of the rectangle with the same second moment), s."""
+        first, second, third, last = self.corners
+        pieces = (  # area, centroid, variance
+            (0.5 * self.level * (second - first), (first + 2.0 * second) / 3.0, (second - first) ** 2 / 18.0),
+            (self.level * (third - second), 0.5 * (second + third), (third - second) ** 2 / 12.0),
+            (0.5 * self.level * (last - third), (2.0 * third + last) / 3.0, (last - third) ** 2 / 18.0),
+        )
+        total = sum(area for area, _, _ in pieces)
+        whole = np.where(total == 0.0, 1.0, total)
+        centroid = sum(area * middle for area, middle, _ in pieces) / whole
+        variance = sum(area * (own + (middle - centroid) ** 2) for area, middle, own in pieces) / whole
+        return total, np.where(total == 0.0, first, centroid), np.sqrt(12.0 * variance)
+
+
+@dataclass(frozen=True, slots=True)
+class Trapezoid:
+    """A valve that opens and closes with delays, s; the thrust then rises and falls evenly.
+
+    A command from 0 to τ lets the thrust rise from ``open_delay`` on, to full thrust within ``rise_time``, and fall
+    from τ + ``close_delay`` on, as fast as from full thrust to nothing within ``fall_time``. A valve that closes before
+    full thrust is reached gives a triangle. ``effective``: the on-times loaded are effective ones, which the
+    electronics of the valve turns into commands.
+    """
+
+    open_delay: float = 0.0
+    close_delay: float = 0.0
+    rise_time: float = 0.0
+    fall_time: float = 0.0
+    effective: bool = False
+
+    @property
+    def known(self) -> tuple[float, float]:
+        """Shortest and longest on-time (s) of which it is known what they give: any."""
+        return 0.0, math.inf
+
+    def thrust(self, on_time: float) -> Thrust:
+        """What a command of ``on_time`` s gives, from the areas and first moments of its pieces."""
+        command = self._command(on_time) if self.effective else on_time
+        opened = command + self.close_delay - self.open_delay  # from the first thrust to the beginning of its fall
+        if opened <= 0.0 or on_time <= 0.0:
+            return NOTHING
+        rise, fall = self.rise_time, self.fall_time
+        level = 1.0 if opened >= rise else opened / rise
+        flat = max(opened - rise, 0.0)
+        rising, falling = opened - flat, level * fall
+        areas = (0.5 * level * rising, flat, 0.5 * level * falling)
+        total = math.fsum(areas)
+        moment = math.fsum(
+            (
+                areas[0] * 2.0 * rising / 3.0,
+                areas[1] * (rising + 0.5 * flat),
+                areas[2] * (opened + falling / 3.0),
+            )
+        )
+        ramps, begin = [], self.open_delay
+        for length, first, last in ((rising, 0.0, level), (flat, 1.0, 1.0), (falling, level, 0.0)):
+            if begin + length > begin:
+                ramps.append(Ramp(begin, begin + length, first, last))
+                begin += length
+        return Thrust(total, self.open_delay + moment / total, tuple(ramps))
+
+    def opened(self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any) -> Opened:
+        """What a command gives where the four times are longer by so much, s, elementwise."""
+        command = self._command(on_time) if self.effective else on_time
+        opens, rise, fall = self.open_delay + open_delay, self.rise_time + rise_time, self.fall_time + fall_time
+        held = command + self.close_delay + close_delay - opens
+        held = np.where(np.real(held) > 0.0, held, 0.0)
+        level = np.where(np.real(held) < np.real(rise), held / np.where(rise == 0.0, 1.0, rise), 1.0)
+        level = np.where(held == 0.0, 0.0, level)
+        return Opened((opens, opens + level * rise, opens + held, opens + held + level * fall), level)
+
+    def on_time_for(self, effective: float) -> float:
+        """On-time (s) of the command that acts like full thrust for ``effective`` s."""
+        return effective if self.effective else self._command(effective)
+
+    def _command(self, effective: float) -> float:
+        """Length (s) of the command that gives full thrust for ``effective`` s.
+
+        With full thrust: effective = τ + close - open + (fall - rise)/2, else (rise + fall)/2 × level².
+        """
+        rise, fall = self.rise_time, self.fall_time
+        corner = 0.5 * (rise + fall)
+        if effective >= corner:
+            opened = effective - 0.5 * (fall - rise)
+        else:
+            opened = rise * math.sqrt(max(effective, 0.0) / corner)
+        return opened + self.open_delay - self.close_delay
+
+    def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
+        """Bounds (s) of lead and lag of commands that act from ``shortest`` to ``longest`` s of full thrust.
+
+        The lead is the time from the start of the command to that of the effective pulse, the lag that from the end of
+        the effective pulse until command and thrust are over.
+
+        With full thrust the lead is open + rise/2 + (fall² - rise²)/(24 × effective), the lag mirrors it; a triangle of
+        level h has open + h(2 rise + fall)/3 - h²(rise + fall)/4. Both are monotone but for one maximum.
+        """
+        rise, fall = self.rise_time, self.fall_time
+        corner = 0.5 * (rise + fall)
+        peaks = []
+        if corner > 0.0:
+            tops = (2.0 * (2.0 * rise + fall) / (6.0 * corner), 2.0 * (rise + 2.0 * fall) / (6.0 * corner))
+            peaks = [corner * min(top, 1.0) ** 2 for top in tops]
+        places = [shortest, longest, *(min(max(peak, shortest), longest) for peak in (corner, *peaks))]
+        leads, lags = [], []
+        for place in places:
+            if not 0.0 < place < math.inf:
+                leads.append(self.open_delay + (0.5 * rise if place else 0.0))
+                lags.append(0.5 * fall if place else 0.0)
+                continue
+            found = self.thrust(self.on_time_for(place))
+            if found.ramps:
+                leads.append(found.centroid - 0.5 * found.on_time)
+                lags.append(found.ramps[-1].end - found.centroid - 0.5 * found.on_time)
+        return max(leads, default=0.0), max(lags, default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Thrust by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each rising.
+
+    Between the rows all run evenly; outside nothing is known. The thrust is taken as full from half the effective
+    on-time before the centroid to half of it after.
+    """
+
+    rows: tuple[tuple[float, float, float], ...]
+
+    @property
+    def known(self) -> tuple[float, float]:
+        """First and last on-time of the table, s."""
+        return self.rows[0][0], self.rows[-1][0]
+
+    def thrust(self, on_time: float) -> Thrust:
+        """What a command of ``on_time`` s gives; outside the table, what its end gives."""
+        effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
+        begin = centroid - 0.5 * effective
+        return Thrust(effective, centroid, (Ramp(begin, begin + effective, 1.0, 1.0),))
+
+    def on_time_for(self, effective: float) -> float:
+        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest there is."""
+        return self._between(1, effective, 0)
+
+    def opened(self, on_time: float, factor: Any) -> Opened:
+        """What a command gives where all impulses of the table are ``factor`` times as large, elementwise.
+
+        It does not begin before the command does.
+        """
+        effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
+        begin = centroid - 0.5 * effective * factor
+        begin = np.where(np.real(begin) > 0.0, begin, 0.0)
+        end = begin + effective * factor
+        return Opened((begin, begin, end, end), 1.0)
+
+    def _between(self, known: int, value: float, sought: int) -> float:
+        """The value of the column ``sought`` where the column ``known`` has ``value``."""
+        places = [row[known] for row in self.rows]
+        value = min(max(value, places[0]), places[-1])
+        row = min(max(bisect_right(places, value) - 1, 0), len(places) - 2)
+        share = (value - places[row]) / (places[row + 1] - places[row])
+        low, high = self.rows[row][sought], self.rows[row + 1][sought]
+        return low + share * (high - low) if share < 1.0 else high
+
+    def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
+        """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both run evenly between the rows."""
+        places = [shortest, longest, *(row[1] for row in self.rows if shortest < row[1] < longest)]
+        leads, lags = [], []
+        for place in places:
+            on_time = self.on_time_for(place)
+            found = self.thrust(on_time)
+            leads.append(found.ramps[0].begin)
+            lags.append(max(on_time - found.ramps[0].end, 0.0))
+        return max(leads), max(lags)
+
+
+Valve = Trapezoid | Measured
+"""What leads from commands to thrust. Times of commands are on-times as they are loaded."""
+
+
+@functools.cache
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights on [-1, 1], made when first used."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return nodes, weights
+
+
+def shape_factor(
+    a: float,
+    spin: float,
+    spin_rate: float,
+    ramps: Sequence[Ramp],
+    centroid: float,
+    growth: float = 0.0,
+    drift: float = 0.0,
+) -> complex:
+    """What a pulse loses on ω by its shape, as a factor on its impulse at the ``centroid``: `rates.width_factor`.
+
+    F = (1/E) ∫ f(t) exp(i a (ω3 (t - t_c) + drift (t² - t_c²)/2 + spin_rate ∫∫ f) - κ (t - t_c)) dt with the thrust f
+    of the ``ramps``, their impulse E, and times from the beginning of the first: with the whole spin change at the
+    centroid ω3 turns the body by the end as far as it does. ``spin`` is ω3 as the first begins, rad/s.
+    """
+    nodes, weights = _gauss()
+    origin = ramps[0].begin
+    centre = centroid - origin
+    total, given, turned = 0.0 + 0.0j, 0.0, 0.0  # ∫ f exp, ∫ f, ∫∫ f up to here
+    for ramp in ramps:
+        length = ramp.end - ramp.begin
+        slope = (ramp.last - ramp.first) / length
+        pace = abs(a) * (abs(spin) + (abs(spin_rate) + abs(drift)) * (ramp.end - origin)) + abs(growth)
+        panels = min(max(math.ceil(pace * length / (2.0 * REACH)), 1), 20_000)
+        half = 0.5 * length / panels
+        s = ((2.0 * np.arange(panels)[:, None] + 1.0) * half + half * nodes).ravel()
+        time = ramp.begin - origin + s
+        level = ramp.first + slope * s
+        swept = turned + given * s + 0.5 * ramp.first * s**2 + slope * s**3 / 6.0
+        phase = a * (spin * (time - centre) + 0.5 * drift * (time**2 - centre**2) + spin_rate * swept)
+        total += half * complex(np.exp(1j * phase - growth * (time - centre)) * level @ np.tile(weights, panels))
+        turned += given * length + 0.5 * ramp.first * length**2 + slope * length**3 / 6.0
+        given += ramp.impulse
+    return total / given
+
+
+def spread(ramps: Sequence[Ramp], centroid: float) -> float:
+    """Length (s) of the rectangular pulse that has the same second moment about the ``centroid`` for its impulse."""
+    second, total = 0.0, 0.0
+    for ramp in ramps:
+        length = ramp.end - ramp.begin
+        begin, slope = ramp.begin - centroid, (ramp.last - ramp.first) / length
+        # ∫ (first + slope s) (begin + s)² ds
+        second += ramp.first * (begin * begin * length + begin * length**2 + length**3 / 3.0)
+        second += slope * (0.5 * begin * begin * length**2 + 2.0 * begin * length**3 / 3.0 + 0.25 * length**4)
+        total += ramp.impulse
+    return math.sqrt(12.0 * max(second, 0.0) / total) if total > 0.0 else 0.0

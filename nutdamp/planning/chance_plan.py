@@ -1,0 +1,412 @@
+"""The plan that meets a requirement most surely, or surely enough for the least propellant, by optimisation.
+
+`schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
+made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.
+
+Which tolerances have to shrink, and to what, so that a schedule meets its requirement in enough cases.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.flight import propagation
+from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.inputs import Input, mixing
+from nutdamp.montecarlo.statistics import cases_to_show
+from nutdamp.montecarlo.study import CONFIDENCE, SAMPLES, SEED, Results, Study, run, study_of, threads_here
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.schemes import catalogue, planner, valve_commands
+from nutdamp.schemes.catalogue import OptimalOptions, Options
+from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
+from nutdamp.schemes.optimal.linear_program import SLOTS
+from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
+from nutdamp.schemes.optimal.refinement import Equations, refine, small_angles
+from nutdamp.schemes.sequential import model_of
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import keeps_limits
+from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+
+MOST_TOLERANCES = 4
+"""Tolerances that may have to shrink together."""
+
+ALLOCATION_HALVINGS = 6
+"""Of what is between the size with which too few cases comply and the one with which enough do."""
+
+CASES = 8_192
+"""That each is tried in."""
+
+FRESH = 20_011
+"""Seed of the first draws in which what was found is checked, which nothing was chosen by; each check has its own."""
+
+CHECKS, SMALLER = 12, 0.96
+"""Checks at most, and by what the tolerances shrink after one that fails."""
+
+MOST_CASES = 100_000
+"""Of one check."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tightening:
+    """Inputs of the ``tolerances`` that are to be ``factor`` times as large; all others stay.
+
+    ``inputs``: one of each size that the file gives for them, and whether it gives it as a share of the nominal value.
+    In ``cases`` new ones of ``seed`` so many ``complied``; the share that complies is ``least`` at least, by the exact
+    interval of `CONFIDENCE`.
+    """
+
+    tolerances: tuple[str, ...]
+    factor: float
+    inputs: tuple[tuple[Input, bool], ...]
+    cases: int
+    seed: int
+    complied: float
+    least: float
+
+
+def tightening(plan: Plan, probability: float) -> Tightening | None:
+    """The fewest of the tolerances that count most, and how far they shrink, so that cases comply in that share.
+
+    None where enough do, or do not with the `MOST` of them exactly known.
+    """
+    body, given = plan.spacecraft, plan.spacecraft.dispersions
+    if given is None or not requirements.required(body):
+        return None
+    study = study_of(body, plan.pulses)
+
+    def tried(names: Iterable[str], factor: float, cases: int = CASES, seed: int = SEED) -> Results:
+        changed = replace(body, dispersions=scaled(given, names, factor))
+        return run(Results(study_of(changed, plan.pulses, seed=seed), cases), threads=threads_here())
+
+    def complying(names: Iterable[str], factor: float) -> bool:
+        return (tried(names, factor).met_fraction or 0.0) >= probability
+
+    ranked = _ranked(study, given)
+    fresh = min(max(SAMPLES, 2 * cases_to_show(probability, CONFIDENCE)), MOST_CASES) if probability < 1.0 else SAMPLES
+    for count in range(1, min(len(ranked), MOST_TOLERANCES) + 1):
+        names = tuple(ranked[:count])
+        if not complying(names, 0.0):
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(ALLOCATION_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if complying(names, middle) else (low, middle)
+        # The tries all had the same draws, and the largest size that passes passes by luck too.
+        for seed in range(FRESH, FRESH + CHECKS):
+            found = tried(names, low, fresh, seed)
+            if found.interval[0] >= probability:
+                share = found.met_fraction or 0.0
+                return Tightening(names, low, _stated(study, given, names), fresh, seed, share, found.interval[0])
+            low *= SMALLER
+    return None
+
+
+def _ranked(study: Study, given: Dispersions) -> list[str]:
+    """The tolerances by their share of what is required, the largest first."""
+    shares: dict[str, float] = {}
+    required = requirements.required(study.model.spacecraft)
+    parts = [bound.part.value for bound in required if bound.part is not Part.SPIN]
+    for output in parts or ["spin_change"]:
+        for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
+            shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
+    return [name for name in sorted(shares, key=lambda one: -shares[one]) if hasattr(given, name)]
+
+
+def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[Input, bool], ...]:
+    """An input of each size of the tolerances of some names, and whether that is relative."""
+    found: dict[tuple[str, str, float], tuple[Input, bool]] = {}
+    for name in names:
+        for one in study.model.inputs.drawn:
+            if one.tolerance == name and one.kind != "bias":
+                found.setdefault((name, one.kind, one.size), (one, _relative(getattr(given, name), one)))
+    return tuple(found.values())
+
+
+def _relative(value: Any, entry: Input) -> bool:
+    """Whether the size of an input is given as a share of its nominal value."""
+    if isinstance(value, Tolerance):
+        return value.relative
+    if isinstance(value, Mapping):
+        return any(one.relative for name, one in value.items() if name in entry.name.split())
+    tolerance = value[int(entry.name.rpartition("_")[2]) - 1]
+    return tolerance is not None and tolerance.relative
+
+
+def scaled(given: Dispersions, names: Iterable[str], factor: float) -> Dispersions:
+    """Dispersions of which those of some names are ``factor`` times as large; fixed offsets stay."""
+    return replace(given, **{name: _scaled(getattr(given, name), factor) for name in names})
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    if isinstance(value, Tolerance):
+        return value if value.kind == "bias" else replace(value, size=factor * value.size)
+    if isinstance(value, Mapping):
+        return {name: _scaled(one, factor) for name, one in value.items()}
+    return None if value is None else tuple(_scaled(one, factor) for one in value)
+
+
+SCHEME = "optimal"
+
+STEP = 1e-30
+"""Imaginary step of derivatives."""
+
+MARGINS = (1.0, 0.75, 0.5, 1.3)
+"""Over the sigmas of the probability required: margins that are tried first."""
+
+LESSER = (1.0, 0.8, 0.6)
+"""The same over the largest that can be kept, where that is not enough."""
+
+KEPT, HALVINGS = 1e-2, 6
+"""Share of a limit by which it may be passed while that is looked for, and steps of it."""
+
+TRIED = 4_096
+"""Cases in which a plan is tried while its margin is adapted, of a seed of its own."""
+
+TRYING = 101
+"""That seed."""
+
+ROUNDS = 4
+"""Times that the margin is adapted."""
+
+REPAIRS = 24
+"""Times that a burn which breaks a limit is moved elsewhere."""
+
+STRAIGHT = 0.3
+"""rad by which one sigma may turn what a pulse does: for later pulses first order is no good."""
+
+TURNS = 2.5
+"""Nutation periods that are looked at in any case."""
+
+MOST_BURNS = 8
+"""Burns that are kept, the longest: the program has very short ones besides."""
+
+LARGEST = 60_000
+"""Slots of all channels up to which a plan is looked for."""
+
+
+def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Input, ...]]:
+    """How the dispersions of a symmetric ``body`` act, to first order, with pulses of ``on_times`` (K,) s; the inputs.
+
+    Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
+    """
+    pulses = [
+        channel_pulse(one, 100.0 + 1e3 * at, on)
+        for at, (one, on) in enumerate(zip(body.channels, on_times, strict=True))
+    ]
+    model = Model(body, Schedule(tuple(pulses)))
+    drawn = [one for one in model.inputs.drawn if one.kind != "bias"]
+    biases: dict[str, np.ndarray | float] = {
+        one.name: np.full(len(drawn) + 1, one.size, dtype=complex) for one in model.inputs.drawn if one.kind == "bias"
+    }
+    draws = dict(biases)
+    for at, one in enumerate(drawn):
+        draws[one.name] = np.zeros(len(drawn) + 1, dtype=complex)
+        draws[one.name][at] = 1j * STEP * one.sigma  # type: ignore[index]
+    cases = model.cases(draws)
+
+    def parts(value: object) -> tuple[float, Vector]:
+        """Value and derivatives by one sigma."""
+        whole = np.broadcast_to(np.asarray(value, dtype=complex), len(drawn) + 1)
+        return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
+
+    (A, dA), (C, dC) = parts(cases.A), parts(cases.C)
+    rates = [parts(one) for one in cases.omega0]
+    spin, dspin = rates[2]
+    a = 1.0 - C / A
+    da = C / A**2 * dA - dC / A
+    start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
+    tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
+    pointed = start + C * spin * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
+    impulses = [[parts(part) for part in one] for one in cases.impulses]
+    begun = [parts(one) for one in cases.starts]
+    on = np.asarray(on_times)
+    torque = np.array([one[0][1] + 1j * one[1][1] for one in impulses]) / on[:, None]
+    axial = np.array([one[2][1] for one in impulses]) / on[:, None]
+    late = np.array([one[1] for one in begun])
+    delay = np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)])
+    mixed = mixing(drawn, model.groups)
+    found = Uncertain(
+        effect=np.asarray(np.array([complex(one[0][0], one[1][0]) for one in impulses]) / on, dtype=np.complex128),
+        axial=np.array([one[2][0] for one in impulses]) / on,
+        begin=np.asarray(np.array([start, pointed]) @ mixed, dtype=np.complex128),
+        rates=np.array([a * dspin + da * spin, dspin]) @ mixed,
+        torque=np.asarray(torque @ mixed, dtype=np.complex128),
+        axial_torque=axial @ mixed,
+        late=late @ mixed,
+        own=np.array([" pulse " in one.name for one in drawn], dtype=bool),
+        spin=C * dspin @ mixed,
+        delay=delay,
+        less=(dC / C + dspin / spin) @ mixed,
+    )
+    return found, tuple(drawn)
+
+
+def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
+    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required."""
+    body = planning.known(spacecraft, planner.options_of(catalogue.SCHEMES[SCHEME], options))
+    if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
+        return
+    try:
+        search = _Search(spacecraft, body)
+    except Infeasible:
+        return
+    yield from search.plans()
+
+
+class _Search:
+    """The search for one spacecraft."""
+
+    def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
+        self.spacecraft, self.body = spacecraft, body
+        plain = valve_commands.plain(body) if body.thrust_laws else body
+        self.model = model_of(plain)
+        bounds = requirements.required(spacecraft)
+        parts = {bound.part: bound.most for bound in bounds}
+        aimed = requirements.aim(spacecraft) in parts or body.goal.axis is not None
+        self.equations = Equations(shift=aimed, spin=body.goal.spin is not None)
+        self.options = OptimalOptions(free_axis=not aimed)
+        self.problem = Problem(self.model.body, self.options)
+        self.program = self.problem.program()
+        if self.program.forbidden.size > LARGEST:
+            raise Infeasible("too many slots")
+        flat = self.model.body
+        spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
+        self.limits = tuple(
+            Limit(kind, most)
+            for part, kind, most in (
+                (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
+                (
+                    requirements.aim(spacecraft),
+                    1,
+                    spin * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
+                ),
+                (Part.SPIN, 2, flat.inertia.C * parts.get(Part.SPIN, 0.0)),
+            )
+            if part in parts
+        )
+        first = self.program.solve()
+        longest = max((one.on_time for one in first.burns), default=0.1)
+        ons = np.array([min(max(longest, one.min_on_time, 1e-3), one.max_on_time) for one in self.program.channels])
+        flat = replace(flat, channels=self.program.channels, dispersions=body.dispersions)
+        dispersed, _ = uncertain(flat, ons)
+        drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
+        last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
+        self.program.forbid(None, last, math.inf)
+        every = Equations(True, True)
+        goal = np.zeros(5)
+        goal[every.chosen] = small_angles(flat, every).goal
+        self.chance = ChanceProgram(self.program, dispersed, self.limits, goal)
+        self.probability = required_share(spacecraft.requirement)
+
+    @property
+    def sigmas(self) -> float:
+        """Of a plane normal distribution, within which the share lies that is required."""
+        return math.sqrt(-2.0 * math.log(max(1.0 - self.probability, 1e-9)))
+
+    def plans(self) -> Iterator[tuple[str, Plan]]:
+        """Plans by the first margins, then by those between which the share required, or the largest, lies."""
+        seen: dict[float, float] = {}
+        first = self._first()
+        for number in range(len(first) + ROUNDS):
+            margin = first[number] if number < len(first) else self._next(seen)
+            seen[margin] = 0.0
+            for variant, plan, share in self.tried(margin):
+                seen[margin] = share
+                yield variant, plan
+
+    def _first(self) -> list[float]:
+        """The margins to begin with: about that of the probability, or up to the largest that can be kept."""
+        chance = self.chance
+        low, high = 0.0, max(MARGINS) * self.sigmas
+        if chance.solve(high).excess <= KEPT:
+            return [factor * self.sigmas for factor in MARGINS]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if chance.solve(middle).excess <= KEPT else (low, middle)
+        return [self.sigmas, *(factor * low for factor in LESSER if low > 0.0)]
+
+    def _next(self, seen: dict[float, float]) -> float:
+        """Another margin: towards the least with which as many cases comply as must, else beside the best."""
+        enough = [margin for margin, share in seen.items() if share >= self.probability]
+        if enough:
+            least = min(enough)
+            return 0.5 * (least + max((margin for margin in seen if margin < least), default=0.0))
+        best = max(seen, key=lambda margin: seen[margin])
+        below = max((margin for margin in seen if margin < best), default=0.5 * best)
+        above = min((margin for margin in seen if margin > best), default=1.5 * best)
+        return 0.5 * (best + (below if best - below > above - best else above))
+
+    def tried(self, margin: float) -> Iterator[tuple[str, Plan, float]]:
+        """The plan of a margin, if there is one, and its share of cases that comply."""
+        made = self.made(margin)
+        if made is None:
+            return
+        plan = planning.judged(self.spacecraft, SCHEME, made, self.options)
+        if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
+            results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
+            share = results.met_fraction or 0.0
+            yield f"against dispersions, {margin:.3g} σ", plan, share
+
+    def _few(self, found: Sure) -> None:
+        """Forbid all slots that are not about the longest burns."""
+        program, near = self.program, np.zeros_like(self.program.forbidden)
+        for burn in sorted(found.burns, key=lambda one: -one.impulse)[:MOST_BURNS]:
+            reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
+            near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
+        program.forbidden |= ~near
+
+    def _parted(self, found: Sure) -> bool:
+        """Whether burns overlapped, or were too near: each of the two has the time on its side of the middle then."""
+        program, gap, parted = self.program, self.program.spacecraft.limits.gap, False
+        for one, two in itertools.pairwise(found.burns):
+            end, begin = one.t + 0.5 * one.on_time, two.t - 0.5 * two.on_time
+            if begin >= end + gap - TOUCHING or one.channel is two.channel:
+                continue
+            middle = min(max(0.5 * (begin + end), one.t), two.t)
+            aside, half = 0.5 * (gap + program.width), 0.5 * two.on_time + program.width
+            before = program.forbidden.copy()
+            program.forbid(one.channel, middle - aside, max(two.t + half, end + program.width))
+            program.forbid(two.channel, min(one.t - 0.5 * one.on_time, begin) - program.width, middle + aside)
+            parted = parted or bool((before != program.forbidden).any())
+        return parted
+
+    def made(self, margin: float) -> Schedule | None:
+        """The schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
+        allowed = self.program.forbidden.copy()
+        chance = self.chance
+        found: Sure | None = None
+        try:
+            self._few(chance.solve(margin))
+            for _ in range(REPAIRS):
+                found = chance.solve(margin)
+                if not found.burns:
+                    return None
+                if self._parted(found):
+                    continue
+                broken = next(broken_by(self.program, found.burns), None)
+                if broken is None:
+                    break
+                self.program.forbid(*broken)
+            else:
+                return None
+        finally:
+            self.program.forbidden = allowed
+        made = self.model.translate(as_pulses(self.model.body, found.burns))
+        plain = valve_commands.plain(self.body) if self.body.thrust_laws else self.body
+        aside = found.left[self.equations.chosen]
+        made = refine(plain, made, self.equations, aside, self.program.width, lambda one: propagation.flown(plain, one))
+        try:
+            return planner.as_commands(SCHEME, self.body, made, self.options) if self.body.thrust_laws else made
+        except Infeasible:
+            return None

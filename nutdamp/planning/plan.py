@@ -1,0 +1,502 @@
+"""Plan by a scheme, fly what it gives, judge it against limits and requirement.
+
+Ways round the cones that the spin axis has to keep: a scheme that points is planned leg by leg over way points.
+
+A route is a row of great circles: straight to the target in shorter legs, which swing the axis less, or by one or two
+dog-legs round what is in the way. Routes are found on the sphere, with a margin for nutation; whether the
+axis keeps the cones is for the flight to say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from nutdamp import units
+from nutdamp.common import results, work
+from nutdamp.common.numerics import cleaned_change
+from nutdamp.errors import Infeasible, listed
+from nutdamp.flight import end_state, propagation
+from nutdamp.flight.end_state import Aspect, left_by, seen_at
+from nutdamp.flight.propagation import Flight, Residual
+from nutdamp.flight.propellant import Supply
+from nutdamp.physics import attitude, precession
+from nutdamp.planning.recommendation import Hindrance, Standing
+from nutdamp.schemes import catalogue, planner, valve_commands
+from nutdamp.schemes.block_model import fired, sun_pulses
+from nutdamp.schemes.correction import FlownBuilder
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import Breach, breaches
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Bound, Held, Left
+from nutdamp.spacecraft.schedule import Schedule
+
+MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
+"""rad by which a route keeps clear of the cones."""
+
+BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
+"""rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest first."""
+
+PLACES = ((0.5,), (0.25, 0.75))
+"""Where the way points of one and of two dog-legs lie, as shares of the way to the target."""
+
+PARTS = (1, 2, 4)
+"""Into how many each leg of a route is divided."""
+
+ROUTES = 16
+"""Routes that are tried, at most."""
+
+STEPS = 64
+"""Points of a leg at which the cones are looked at."""
+
+Route = tuple[Vector, ...]
+
+
+def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions) -> Iterator[Schedule]:
+    """Schedules of a ``scheme`` over routes that keep clear of the cones, the likeliest first.
+
+    Each is found when it is needed, as long as there is budget of `work`; routes that the scheme cannot fly are left
+    out.
+    """
+    as_it_is = not spacecraft.thrust_laws or catalogue.SCHEMES[scheme].on_true_body
+    body = spacecraft if as_it_is else valve_commands.plain(spacecraft)
+    for route in routes(spacecraft):
+        if work.exhausted():
+            return
+        try:
+            made = _over(body, scheme, options, route)
+            yield made if as_it_is else planner.as_commands(scheme, spacecraft, made, options)
+        except Infeasible:
+            continue
+
+
+def routes(spacecraft: Spacecraft) -> list[Route]:
+    """Way points from H at t = 0, the target last, at most `ROUTES`; the shortest first."""
+    start = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
+    found: dict[tuple[float, ...], Route] = {}
+    for parts in PARTS:
+        for margin in MARGINS:
+            for places in ((), *PLACES):
+                bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
+                if bent is not None and len(bent) * parts > 1:
+                    route = _divided(start, bent, parts)
+                    found.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
+    return sorted(found.values(), key=lambda route: (round(_length((start, *route)), 3), len(route)))[:ROUTES]
+
+
+def _length(corners: Route) -> float:
+    return math.fsum(float(attitude.angle_between(*leg)) for leg in pairwise(corners))
+
+
+def _bent(
+    start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
+) -> Route | None:
+    """The least bent route with way points at ``places`` that is clear by ``margin`` rad; None where there is none."""
+    if not places:
+        return (target,) if _clear((start, target), keeps, margin) else None
+    for bend in BENDS:
+        route = (*(_aside(start, target, place, bend) for place in places), target)
+        if _clear((start, *route), keeps, margin):
+            return route
+    return None
+
+
+def _aside(start: Vector, target: Vector, place: float, bend: float) -> Vector:
+    """The point at a share of the way, ``bend`` rad to the left of the great circle."""
+    on_the_way = _along(start, target, np.array([place]))[0]
+    normal = np.cross(start, target)
+    size = float(np.linalg.norm(normal))
+    left = normal / size if size > 0.0 else precession.square_to(start)
+    return np.asarray(math.cos(bend) * on_the_way + math.sin(bend) * left)
+
+
+def _along(start: Vector, end: Vector, shares: Vector) -> Vector:
+    """Points (n, 3) at ``shares`` (n,) of the great circle between two unit vectors that are not opposite."""
+    angle = float(attitude.angle_between(start, end))
+    if angle == 0.0:
+        return np.tile(end, (len(shares), 1))
+    weights = np.column_stack([np.sin((1.0 - shares) * angle), np.sin(shares * angle)]) / math.sin(angle)
+    return np.asarray(weights @ np.array([start, end]))
+
+
+def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
+    """Whether great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly as their ends."""
+    shares = np.linspace(0.0, 1.0, STEPS)
+    points = np.concatenate([_along(*leg, shares) for leg in pairwise(corners)])
+    for keep in keeps:
+        apart = attitude.angle_between(points, keep.direction)
+        room = np.minimum(apart - keep.least, keep.most - apart)
+        if min(room[0], room[-1]) < 0.0 or room.min() < min(margin, room[0], room[-1]):
+            return False
+    return True
+
+
+def _divided(start: Vector, route: Route, parts: int) -> Route:
+    """The ``route`` with each leg in ``parts``."""
+    shares = np.arange(1, parts + 1) / parts
+    return tuple(point for leg in pairwise((start, *route)) for point in _along(*leg, shares))
+
+
+def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
+    """The schedule of a ``scheme`` that goes by way of the points of a ``route``; raises Infeasible with the reason.
+
+    Each leg has the share of the horizon that it has of the way.
+    """
+    builder, goal, blocks, supply = FlownBuilder(spacecraft), spacecraft.goal, list[Block](), Supply(spacecraft)
+    for number, point in enumerate(route, start=1):
+        here = builder.here
+        to_go = _length((here.momentum, point, *route[number:]))
+        share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
+        spin = goal.spin if number == len(route) else None
+        leg = replace(
+            here,
+            goal=replace(goal, axis=point, spin=spin),
+            limits=replace(here.limits, horizon=share * here.horizon),
+        )
+        made = planner.schedule(scheme, supply.behind(leg), options)
+        passed = _sun_pulses(spacecraft, builder) if made.blocks else 0
+        blocks += [replace(block, first=block.first + passed) for block in made.blocks]
+        builder.fire(made)
+        supply.count(made)
+    names, count = listed([keep.name for keep in spacecraft.keep]), len(route) - 1
+    points = f"{count} way point{'s' * (count > 1)}"
+    note = f"goes by {points}, so that the spin axis keeps its distance from {names}"
+    return replace(fired(spacecraft, blocks), notes=(note,)) if blocks else builder.schedule(note)
+
+
+def _sun_pulses(spacecraft: Spacecraft, builder: FlownBuilder) -> int:
+    """How many Sun pulses came until the pulses of a ``builder`` are over: those of its next leg count from there."""
+    flown = propagation.flown(spacecraft, builder.schedule(), builder.now)
+    return len(sun_pulses(flown, builder.now)) if builder.now > 0.0 else 0
+
+
+NO_NUTATION = 1e-12
+"""Nutation angle in rad below which there is nothing to plan."""
+
+ROUNDING = 1e-11
+"""Share by which the nutation that is left may be less for rounding alone."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(results.Data, results.Tabled):
+    """A scheme's schedule for a spacecraft, and how it was judged.
+
+    Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
+    that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
+    that is ``worse`` than without pulses, at ``worse_at`` s. `nutdamp.planning.decision` has the words of all four.
+    ``failure``: the exception of a scheme that has a bug; ``from_file``: the pulses were read, no scheme planned them.
+    ``cut``: its search ended at its budget of `work`.
+    """
+
+    spacecraft: Spacecraft
+    scheme: str
+    schedule: Schedule | None
+    refusal: str | None = None
+    options: catalogue.SchemeOptions = field(default_factory=catalogue.SchemeOptions)
+    failure: Exception | None = None
+    breach: Breach | None = None
+    astray: Aspect | None = None
+    worse: float | None = None
+    worse_at: float = 0.0
+    from_file: bool = False
+    cut: bool = False
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the schedule keeps every limit and lowers the nutation."""
+        return self.schedule is not None
+
+    @property
+    def pulses(self) -> Schedule:
+        """The schedule; empty where the plan is infeasible."""
+        return Schedule() if self.schedule is None else self.schedule
+
+    @property
+    def why(self) -> str | None:
+        """Why there is no schedule; None where there is one."""
+        return None if self.feasible else results.reason(self)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader should know of it."""
+        return results.sentences(self)
+
+    @property
+    def total_impulse(self) -> float:
+        """Σ |J| in N m s."""
+        return self.pulses.total_impulse
+
+    @property
+    def propellant(self) -> float | None:
+        """kg; None where one pulse's is not known."""
+        return self.pulses.propellant
+
+    @property
+    def end(self) -> float:
+        """End of the last pulse, s."""
+        return self.pulses.end
+
+    def __len__(self) -> int:
+        return len(self.pulses)
+
+    def fly(self, until: float | None = None, *, samples: int = 1000, by_impulses: bool = False) -> Flight:
+        """Fly the schedule through its real pulse widths, or by the impulse sum (17), until ``until`` s.
+
+        Default end: one inertial nutation period after the last pulse. The track has ``samples`` even rows, and rows
+        just before and after each pulse. Raises Infeasible where there is no schedule, BadRequest where no track can
+        be made.
+        """
+        if self.schedule is None:
+            raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
+        end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
+        count = units.rows(samples)
+        fly = propagation.by_impulses if by_impulses else propagation.flown
+        return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
+
+    @cached_property
+    def residual(self) -> Residual | None:
+        """What remains by the impulse sum (17)."""
+        return None if self.schedule is None else propagation.by_impulses(self.spacecraft, self.schedule).residual
+
+    @cached_property
+    def flight(self) -> Flight:
+        """The schedule flown through its real pulse widths; free motion where the plan is infeasible."""
+        return propagation.flown(self.spacecraft, self.pulses)
+
+    @property
+    def flown(self) -> Residual | None:
+        """What remains when the real pulse widths are flown."""
+        return self.flight.residual if self.feasible else None
+
+    @property
+    def left(self) -> Left | None:
+        """What remains, flown, as `compliance` takes it."""
+        return left_by(self.flight) if self.feasible else None
+
+    @property
+    def commandable(self) -> bool:
+        """Whether the spacecraft can fire it: where it takes command blocks, only these, or nothing at all."""
+        return self.spacecraft.commands is None or bool(self.pulses.blocks) or not len(self.pulses)
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """Whether the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
+
+        None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
+        shift of H counts from there.
+        """
+        if self.left is None:
+            return None
+        return False if self.kept is False else self.ends_well
+
+    @property
+    def ends_well(self) -> bool | None:
+        """Whether the flown residual keeps what is required at the end; None where nothing is."""
+        if self.left is None or not requirements.required(self.spacecraft):
+            return None
+        return not any(bound.required for bound in self.shortfalls)
+
+    @property
+    def held(self) -> tuple[Held, ...]:
+        """The flown residual beside each of the `compliance.bounds`; nothing for an infeasible plan."""
+        return () if self.left is None else requirements.held(self.spacecraft, self.left)
+
+    @property
+    def shortfalls(self) -> tuple[Bound, ...]:
+        """The `compliance.bounds` that the flown residual does not keep."""
+        return tuple(one.bound for one in self.held if not one.met)
+
+    @property
+    def standing(self) -> Standing:
+        """What it reaches at the end, whatever cones it breaks on the way; an infeasible plan misses all."""
+        if self.left is None or self.ends_well is False:
+            return Standing.MISSES
+        if not self.shortfalls:
+            return Standing.COMPLIES
+        return Standing.MISSES if self.ends_well is None else Standing.MEETS
+
+    @property
+    def severity(self) -> float:
+        """See `compliance.severity`; infinite for an infeasible plan."""
+        return math.inf if self.left is None else float(requirements.severity(self.spacecraft, self.left))
+
+    @property
+    def spin_change(self) -> float | None:
+        """ω3 at the end minus at the start, rad/s, flown."""
+        before, after = self.spacecraft.spin, self.flight.settled.spin
+        return cleaned_change(after - before, before) if self.feasible else None
+
+    @cached_property
+    def delta_v(self) -> Vector | None:
+        """Velocity change in the inertial frame, (3,) m/s; None without mass or where a force is not known."""
+        mass = self.spacecraft.mass
+        if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
+            return None
+        return end_state.momentum_gained(_lightening(self.flight)) / mass
+
+    @cached_property
+    def left_if_symmetric(self) -> float | None:
+        """Nutation, rad, that the same pulses would leave if I1 and I2 were their mean; None where they are equal."""
+        inertia = self.spacecraft.inertia
+        if inertia.symmetric or not self.feasible:
+            return None
+        mean = replace(self.spacecraft, inertia=replace(inertia, moments=(inertia.A, inertia.A, inertia.C)))
+        return propagation.flown(mean, self.pulses).residual.nutation
+
+    @cached_property
+    def aspects(self) -> tuple[Aspect, ...]:
+        """How near the spin axis comes to each direction that is watched, flown; see `aspect.aspects`."""
+        return end_state.aspects(self.flight)
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether the spin axis keeps its cones, flown; None where the file names none."""
+        return all(one.kept for one in self.aspects) if self.spacecraft.keep else None
+
+    @property
+    def hindrance(self) -> Hindrance:
+        """What keeps the plan from leaving less nutation."""
+        left = self.flight.residual.nutation
+        return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
+
+
+def _lightening(flown: Flight) -> Flight:
+    """The flight with forces that grow as the mass at t = 0 falls with the propellant of a tank."""
+    body = flown.spacecraft
+    if body.tank is None or body.mass is None:
+        return flown
+    used, pulses = 0.0, []
+    for pulse in flown.schedule:
+        taken = pulse.propellant or 0.0
+        scale = body.mass / (body.mass - used - 0.5 * taken)
+        pulses.append(replace(pulse, force=None if pulse.force is None else pulse.force * scale))
+        used += taken
+    return replace(flown, schedule=Schedule(tuple(pulses)))
+
+
+def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
+    """Plan one scheme and judge it; an infeasible plan says why.
+
+    Raises KeyError for a name not in `schemes.NAMES`.
+    """
+    if scheme not in catalogue.NAMES:
+        raise KeyError(scheme)
+    spun = reaches_spin(spacecraft)
+    if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
+        return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
+    if not spun and scheme in catalogue.PLANNED and scheme not in catalogue.SPINNING:
+        able = " and ".join(spinning(spacecraft))
+        why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"
+        return Plan(spacecraft, scheme, None, why)
+    forbidden = end_state.at_target(spacecraft) if scheme in catalogue.PLANNED else None
+    if forbidden is not None:
+        return Plan(spacecraft, scheme, None, astray=forbidden)
+    chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
+    with work.budget(scheme, work.SCHEME) as spent:
+        try:
+            body = spacecraft if catalogue.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
+            made = judged(spacecraft, scheme, planner.schedule(scheme, body, chosen), chosen)
+        except Infeasible as reason:
+            made = Plan(spacecraft, scheme, None, str(reason))
+        if made.astray is not None and (catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands):
+            made = _routed(made, chosen)
+    return replace(made, cut=True) if spent.exhausted else made
+
+
+def _routed(astray: Plan, options: catalogue.SchemeOptions) -> Plan:
+    """A plan of the same scheme by another way, on which the spin axis keeps its cones; else the one that does not."""
+    pass  # MERGED
+
+    body = astray.spacecraft
+    for made in schedules(known(body, options), astray.scheme, options):
+        plan_ = judged(body, astray.scheme, made, options)
+        if plan_.feasible:
+            return plan_
+    return astray
+
+
+def reaches_spin(spacecraft: Spacecraft) -> bool:
+    """Whether the spin is that of the goal from the beginning."""
+    goal = spacecraft.goal.spin
+    return goal is None or abs(spacecraft.spin - goal) <= requirements.SPIN_TOLERANCE * abs(goal)
+
+
+def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
+    """The schemes that can set the spin: by command blocks only where there are commands."""
+    commanded = spacecraft.commands is not None
+    return tuple(one for one in catalogue.SPINNING if commanded or not catalogue.SCHEMES[one].reads_commands)
+
+
+def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
+    """Feasible plans by schedules that the scheme weighs against the one that `plan` gives; it may be among them.
+
+    Raises KeyError for a name not in `schemes.NAMES`.
+    """
+    chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
+    try:
+        made = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
+        plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in made]
+    except Infeasible:
+        return ()
+    return tuple(one for one in plans if one.feasible)
+
+
+def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
+    """The spacecraft as the schemes are to know it: with its disturbances only where they are requested.
+
+    A spin that nothing can change, and that is the one of the goal, is no goal for them.
+    """
+    body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
+    if body.goal.spin is None or not reaches_spin(body) or body.spin_drift or any(one.axial for one in body.channels):
+        return body
+    return replace(body, goal=replace(body.goal, spin=None))
+
+
+def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: catalogue.SchemeOptions) -> Plan:
+    """The plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
+    if spacecraft.disturbances:  # which the scheme need not have known
+        made = made.without_proof
+    flown = Plan(spacecraft, scheme, made, options=options)
+    left = flown.flown
+    breach = next(breaches(spacecraft, made), None)
+    if breach is not None:
+        return Plan(spacecraft, scheme, None, breach=breach)
+    if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
+        astray = end_state.broken(spacecraft, flown.flight)
+        if astray is not None:
+            return Plan(spacecraft, scheme, None, astray=astray)
+    if scheme in catalogue.PLANNED and left is not None and not _helps(flown, left):
+        return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
+    return flown
+
+
+def _helps(judged: Plan, left: Residual) -> bool:
+    """Whether nutation, distance from the target axis or from the final spin requested is less than without pulses.
+
+    Nutation that decays by itself must be less than what it has decayed to by the last pulse.
+    """
+    body = judged.spacecraft
+    if body.goal.spin is not None and abs(judged.flight.settled.spin - body.goal.spin) < abs(
+        body.spin - body.goal.spin
+    ):
+        return True
+    least = requirements.decayed(body, judged.end) * (1.0 - ROUNDING)
+    return left.nutation < least or left.axis_error < body.to_turn
+
+
+def unrounded(plan_: Plan) -> Schedule | None:
+    """The schedule as it would be with commands of any resolution.
+
+    None where there is no tick, no such schedule, or no scheme that planned it.
+    """
+    body = plan_.spacecraft
+    if body.limits.tick is None or plan_.from_file:
+        return None
+    smooth = plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options)
+    return smooth.schedule

@@ -1,0 +1,325 @@
+"""What time costs: schedules of the scheme optimal from the shortest that is found to the longest that still saves.
+
+The proof of a least cost, to be checked by others: the prices of a program of small angles, and its primer curve.
+
+q(t) of a channel is what a second of it is worth at t by the prices, over what it costs. Where q exceeds one nowhere,
+no schedule costs less than what the prices are worth at the goal (weak duality; Lawden 1963, the primer vector); the
+program fires where q is one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.common import work
+from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.planning import plan as planning
+from nutdamp.planning.decision import compare, infeasibility, usual
+from nutdamp.planning.plan import Plan, plan
+from nutdamp.planning.recommendation import by_propellant
+from nutdamp.schemes import catalogue, planner, valve_commands
+from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
+from nutdamp.schemes.optimal import bounds
+from nutdamp.schemes.optimal.bounds import Proof, SmallAngles
+from nutdamp.schemes.optimal.linear_program import Burn, Program
+from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
+from nutdamp.schemes.optimal.refinement import growth_from
+from nutdamp.schemes.sequential import model_of
+from nutdamp.spacecraft.constraints import free_windows
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import SAME_COST, Part
+from nutdamp.spacecraft.schedule import Bounds
+
+SCHEME = "optimal"
+
+ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
+"""What the equations are about."""
+
+SAME = 1e-9
+"""Relative difference up to which a bound is that of the plan."""
+
+LOOKS = 32
+"""Moments of the primer curve in a turn of the faster of its two parts."""
+
+MOST_LOOKS = 6_000
+"""Moments of the whole curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """The ``proof`` of what a plan of optimal costs at least, by a ``program`` of small angles and its ``burns``.
+
+    ``problem`` has the unit of the cost; its spacecraft is the symmetric body that the scheme plans on.
+    """
+
+    plan: Plan
+    problem: Problem
+    program: Program
+    burns: tuple[Burn, ...]
+    proof: Proof
+
+    @property
+    def bound(self) -> float:
+        """The least cost that is proved."""
+        return self.proof.bound
+
+    @property
+    def rows(self) -> list[str]:
+        """What each equation is about, see `ROWS`."""
+        return [ROWS[row] for row in self.problem.equations.chosen]
+
+    @property
+    def windows(self) -> list[tuple[float, float]]:
+        """When pulses may be on, (begin, end) s."""
+        return free_windows(self.spacecraft, self.program.end)
+
+    def primer(self, times: Vector) -> Vector:
+        """q at ``times`` (n,) s of each channel of the program, (n, channels)."""
+        return SmallAngles(self.program, self.proof.prices).at(times)
+
+    @property
+    def spacecraft(self) -> Spacecraft:
+        """The symmetric body that the program is of."""
+        return self.program.spacecraft
+
+    @property
+    def last(self) -> float:
+        """Moment, s, from which what a pulse does to decaying nutation counts in full; 0 where it grows or stays."""
+        return growth_from(self.spacecraft)
+
+    @property
+    def cost(self) -> float:
+        """Cost of the burns."""
+        price = dict(zip((one.name for one in self.program.channels), self.program.costs.tolist(), strict=True))
+        return math.fsum(price[burn.channel.name] * burn.on_time for burn in self.burns)
+
+    def moments(self) -> list[Vector]:
+        """Even moments (n,) s in each window, many in a turn unless there are too many turns."""
+        body, spans = self.spacecraft, self.windows
+        turns = max(abs(body.inertia.a * body.spin), abs(body.spin)) / (2.0 * math.pi)
+        total = sum(end - begin for begin, end in spans)
+        pace = min(LOOKS * turns, MOST_LOOKS / max(total, 1e-9))
+        return [np.linspace(begin, end, math.ceil((end - begin) * pace) + 2) for begin, end in spans]
+
+
+def certificate(plan: Plan) -> Certificate:
+    """The certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
+    known = plan.pulses.bounds
+    if plan.scheme != SCHEME:
+        raise BadRequest(f"a certificate is of a plan of {SCHEME}, not of {plan.scheme}")
+    if not plan.feasible or known is None or known.first_order is None:
+        raise BadRequest(f"{SCHEME} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
+    chosen = planner.options_of(catalogue.SCHEMES[SCHEME], plan.options)
+    body = planning.known(plan.spacecraft, chosen)
+    if body.thrust_laws:
+        chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)
+    body = model_of(body).body
+    assert isinstance(chosen, OptimalOptions)
+    try:
+        problem = Problem(replace(body, limits=replace(body.limits, horizon=known.within)), chosen)
+        program = problem.program()
+        solution = program.solve()
+    except Infeasible as reason:
+        raise BadRequest(f"{SCHEME} has no least cost to prove here: {reason}") from None
+    proof = bounds.first_order(program, solution.prices)
+    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(known.first_order):
+        raise BadRequest("the plan is put together from several programs, and none of them proves what all of it costs")
+    return Certificate(plan, problem, program, solution.burns, proof)
+
+
+class Point(NamedTuple):
+    """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within.
+
+    Its cost is counted in ``unit`` (kg or N m s), for all points alike.
+    """
+
+    plan: Plan
+    horizon: float
+    unit: str
+
+    @property
+    def cost(self) -> float:
+        """What the schedule costs, in its unit."""
+        return self.plan.pulses.cost_in(self.unit)
+
+    @property
+    def bounds(self) -> Bounds:
+        """What other schedules within the same horizon must cost; of another scheme than optimal not known."""
+        return self.plan.pulses.bounds or Bounds(None, None, self.unit, self.horizon)
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Schedules of which none is beaten in end and cost at once; H may end ``shift`` rad off its target.
+
+    ``why`` says why there is none, or, beside points of other schemes, none of optimal.
+    """
+
+    shift: float
+    points: tuple[Point, ...]
+    why: str | None = None
+
+    def least(self, point: Point) -> float | None:
+        """The first-order least of a ``point`` of it; no more than those of points that have less time."""
+        found, within = point.bounds.first_order, point.bounds.within
+        known = [one.bounds for one in self.points if one.bounds.within <= within]
+        return (
+            None if found is None else min([found, *(one.first_order for one in known if one.first_order is not None)])
+        )
+
+
+def fronts(
+    spacecraft: Spacecraft,
+    options: OptimalOptions,
+    *,
+    count: int,
+    shifts: Sequence[float],
+    progress: Callable[[int], None] = lambda _: None,
+) -> tuple[Front, ...]:
+    """One front for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
+
+    What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
+    Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds
+    none, those of the other schemes count that comply but for where H ends. ``progress`` is called with how many of the
+    count × len(shifts) searches are done.
+    """
+    if options.least == "impulse":
+        # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
+        spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
+    ordered = sorted(set(shifts))
+    found: list[tuple[float, Plan, float]] = []
+    why: dict[float, str] = {}
+    with work.budget("the fronts", work.FRONTS) as spent:
+        searches = _Searches(count * len(ordered), spent, progress)
+        for number, shift in enumerate(ordered, start=1):
+            made = _searched(spacecraft, _allowing(options, shift), count, searches)
+            if isinstance(made, str):
+                why[shift] = made
+            else:
+                found += [(shift, *one) for one in made]
+            searches.done = count * number
+    others = _others(spacecraft, options) if why else []
+    unit = "N m s" if options.least == "impulse" else _unit([*(one for _, one, _ in found), *others])
+    result: list[Front] = []
+    made_for = [(kept, Point(one, horizon, unit)) for kept, one, horizon in found]
+    for shift in ordered:
+        own = [point for kept, point in made_for if kept <= shift]
+        others_too = [
+            point
+            for kept, point in made_for
+            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, one) for one in own))
+        ]
+        points = [*own, *others_too]
+        if not points:
+            points = [Point(one, spacecraft.horizon, unit) for one in others if _keeps(one, shift)]
+        kept = undominated(points, result[-1].points if result else ())
+        result.append(Front(shift, kept, why.get(shift) if _by_others(kept) else None))
+    return tuple(result)
+
+
+def _unit(plans: Sequence[Plan]) -> str:
+    """The one in which the costs of all of them, and their bounds, are known."""
+    bounds = [one.pulses.bounds for one in plans if one.pulses.bounds is not None]
+    return "kg" if by_propellant(plans) and all(one.unit == "kg" for one in bounds) else "N m s"
+
+
+def _by_others(points: Sequence[Point]) -> bool:
+    """Whether no point is of the scheme optimal."""
+    return all(point.plan.scheme != OPTIMAL.name for point in points)
+
+
+def _keeps(one: Plan, shift: float) -> bool:
+    """Whether H ends no farther from its target than ``shift`` rad."""
+    return one.flight.residual.axis_error <= shift + LEFT
+
+
+def _serves(point: Point, instead_of: Point) -> bool:
+    """Whether a schedule costs as little, ends as soon and leaves H as near: on ticks none leaves it just there."""
+    one, other = point.plan, instead_of.plan
+    as_near = one.flight.residual.axis_error <= other.flight.residual.axis_error
+    return as_near and one.pulses.end <= other.pulses.end and point.cost <= instead_of.cost
+
+
+def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
+    """What the other schemes of the usual comparison plan, where that complies but for where H ends."""
+    names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
+    plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances))
+    ends = {Part.SHIFT, Part.DISTANCE}
+    return [one for one in plans if len(one.pulses) and {bound.part for bound in one.shortfalls} <= ends]
+
+
+@dataclass(eq=False)
+class _Searches:
+    """The searches of all fronts, within their ``budget``.
+
+    The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may; of
+    what they leave, all searches to come have equal shares.
+    """
+
+    count: int
+    budget: work.Budget
+    progress: Callable[[int], None]
+    done: int = 0
+
+    def __call__(self, spacecraft: Spacecraft, options: OptimalOptions) -> Plan:
+        left = self.budget.most - self.budget.done
+        with work.budget("a point", left if options.least == "time" else left / (self.count - self.done)):
+            found = plan(spacecraft, OPTIMAL.name, options)
+        self.done += 1
+        self.progress(self.done)
+        return found
+
+
+def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
+    anywhere = math.isinf(shift)
+    return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+
+
+def _searched(
+    spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
+) -> list[tuple[Plan, float]] | str:
+    """The schedule of the whole horizon, the fastest, and those of horizons between, evenly by their ratios.
+
+    Each with its horizon, s; or why there is none.
+    """
+    whole = searches(spacecraft, options)
+    if whole.schedule is None or whole.schedule.bounds is None:
+        return infeasibility(whole) or "there is nothing to do"
+    found = [(whole, spacecraft.horizon)]
+    fastest = searches(spacecraft, replace(options, least="time")) if count > 1 else whole
+    if fastest.schedule is None or not len(fastest.schedule):
+        return found
+    found.append((fastest, spacecraft.horizon))
+    begin, end = spacecraft.limits.earliest, fastest.pulses.end
+    for share in np.linspace(0.0, 1.0, count)[1:-1]:
+        horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
+        body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
+        made = searches(body, options)
+        if made.schedule is not None and made.schedule.bounds is not None:
+            found.append((made, horizon))
+    return found
+
+
+def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
+    """In the order of their ends, those that cost less than all that end no later, by `SAME_COST` or more.
+
+    Those of a ``stricter`` front count where they cost less at all: what allows more is nowhere dearer.
+    """
+    given = {id(point.plan) for point in stricter}
+    kept: list[Point] = []
+    for point in sorted(points, key=lambda one: (one.plan.pulses.end, one.cost)):
+        saved = 0.0 if id(point.plan) in given else SAME_COST
+        if not kept or point.cost < kept[-1].cost * (1.0 - saved):
+            kept.append(point)
+    return tuple(kept)
+
+
+def numbered(found: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
+    """All points of all fronts, numbered from 1."""
+    pairs = ((front, point) for front in found for point in front.points)
+    return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))

@@ -1,1 +1,0 @@
-"""Results as rich renderables and figures; nothing here prints."""

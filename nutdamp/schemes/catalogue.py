@@ -1,0 +1,328 @@
+"""What may be chosen of each scheme: one frozen class a scheme, checked when it is made.
+
+The command line makes its options, their help and their headings from the fields.
+
+The schemes there are, and what each can do. Loads none of them: the command line needs the names alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Self, TypeVar
+
+from nutdamp.errors import BadRequest, SenselessOption
+from nutdamp.units import as_given, is_count, is_number
+
+LEAST = ("propellant", "impulse", "time", "pulses")
+"""What the scheme optimal can save."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What values an option takes: ``expected`` in words, and ``unit`` (a dimension of `units`) of a quantity."""
+
+    expected: str
+    unit: str | None = None
+    names: tuple[str, ...] = ()
+    least: float = 0.0
+    none: bool = True
+
+    def takes(self, value: Any) -> bool:
+        """Whether a value makes sense."""
+        if value is None:
+            return self.none
+        if self.names:
+            return isinstance(value, str) and value in self.names
+        if self.unit is not None:
+            return is_number(value) and (value > 0.0 if self.unit == "time" else value >= self.least)
+        return is_count(value) if self.least else isinstance(value, bool)
+
+    @property
+    def flag(self) -> bool:
+        """Whether it is on or off."""
+        return not (self.names or self.unit or self.least)
+
+
+FLAG = Kind("True or False", none=False)
+COUNT = Kind("a whole number of at least 1", least=1)
+TIME = Kind("a time above zero, in s", "time")
+ANGLE = Kind("an angle of at least 0, in rad", "angle")
+
+
+def _option(default: Any, kind: Kind, text: str) -> Any:
+    return dataclasses.field(default=default, metadata={"kind": kind, "help": text})
+
+
+@dataclass(frozen=True, kw_only=True)
+class SchemeOptions:
+    """What may be chosen of every scheme. Raises SenselessOption for a value that makes no sense."""
+
+    with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value, kind = getattr(self, field.name), field.metadata["kind"]
+            if not kind.takes(value):
+                raise SenselessOption(field.name, as_given(value), f"expected {kind.expected}")
+
+    def settled(self, *, keeps_axis: bool) -> Self:  # noqa: ARG002 - what some schemes go by
+        """The same with what the spacecraft decides: ``keeps_axis``, whether something is asked of where H ends."""
+        return self
+
+    @property
+    def uncorrected(self) -> bool:
+        """Whether the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
+        return False
+
+    @property
+    def frees_axis(self) -> bool:
+        """Whether H may end anywhere."""
+        return False
+
+    @property
+    def equal(self) -> bool:
+        """Whether the pulses are of one size, which whoever corrects them keeps."""
+        return False
+
+    @property
+    def resizable(self) -> bool:
+        """Whether pulses may be made longer or shorter by whoever corrects them."""
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoPulseOptions(SchemeOptions):
+    """What may be chosen of two-pulse."""
+
+    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """As printed."""
+        return self.literal
+
+
+@dataclass(frozen=True, kw_only=True)
+class FourPulseOptions(SchemeOptions):
+    """What may be chosen of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
+
+    on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
+    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """Only full pulses."""
+        return self.coarse
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfConeOptions(SchemeOptions):
+    """What may be chosen of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
+
+    cones: int | None = _option(None, COUNT, "Half cones; default: until one more saves less than 1 %.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandBlockOptions(SchemeOptions):
+    """What may be chosen of command-block; ``max_blocks`` None: three, of which as few are used as will do."""
+
+    max_blocks: int | None = _option(None, COUNT, "Largest number of command blocks; default 3.")
+
+    @property
+    def uncorrected(self) -> bool:
+        """What is commanded is what is fired."""
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class RhumbLineOptions(SchemeOptions):
+    """What may be chosen of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
+
+    on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
+    per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
+
+    @property
+    def equal(self) -> bool:
+        """The width is one command."""
+        return True
+
+    @property
+    def resizable(self) -> bool:
+        """Not where a length was requested."""
+        return self.on_time is None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimalOptions(SchemeOptions):
+    """What may be chosen of optimal; ``shift`` rad, how far from its target H may end.
+
+    ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
+    """
+
+    least: str = _option(
+        LEAST[0],
+        Kind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
+        "What to save; impulse if propellant is unknown.",
+    )
+    free_axis: bool | None = _option(
+        None, dataclasses.replace(FLAG, none=True), "Let H end anywhere, whatever momentum_shift requires."
+    )
+    shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shift is not None and self.free_axis:
+            problem = "expected none beside a free axis, where H may end anywhere"
+            raise SenselessOption("shift", as_given(self.shift), problem)
+
+    @property
+    def frees_axis(self) -> bool:
+        """Whether H may end anywhere."""
+        return bool(self.free_axis)
+
+    def settled(self, *, keeps_axis: bool) -> Self:
+        """Whether H is free, where that was not said; no ``shift`` at all is none."""
+        if self.shift is not None:
+            return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
+        return self if self.free_axis is not None else dataclasses.replace(self, free_axis=not keeps_axis)
+
+
+KINDS = (
+    SchemeOptions,
+    FourPulseOptions,
+    TwoPulseOptions,
+    HalfConeOptions,
+    RhumbLineOptions,
+    CommandBlockOptions,
+    OptimalOptions,
+)
+
+Chosen = TypeVar("Chosen", bound=SchemeOptions)
+
+
+class Options:
+    """Options of several schemes at once, by keyword: each scheme takes those that it has.
+
+    Raises BadRequest for one that no scheme has, or a value that makes no sense.
+    """
+
+    def __init__(self, **chosen: Any) -> None:
+        self.chosen: Mapping[str, Any] = chosen
+        unknown = next((name for name in chosen if not any(name in names_of(kind) for kind in KINDS)), None)
+        if unknown is not None:
+            known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
+            raise BadRequest(f"options: no scheme has {unknown!r}; there are {', '.join(known)}")
+        for kind in KINDS:
+            self.of(kind)
+
+    def of(self, kind: type[Chosen]) -> Chosen:
+        """Those of one scheme."""
+        names = names_of(kind)
+        return kind(**{name: value for name, value in self.chosen.items() if name in names})
+
+    @property
+    def with_disturbances(self) -> bool:
+        """Whether all of them plan with the disturbances of the file."""
+        return self.of(SchemeOptions).with_disturbances
+
+    def without_effect(self, kinds: list[type[SchemeOptions]]) -> Iterator[str]:
+        """Names of options that were changed, and that none of the ``kinds`` has."""
+        read = {name for kind in kinds for name in names_of(kind)}
+        defaults = {field.name: field.default for kind in KINDS for field in dataclasses.fields(kind)}
+        for name, default in defaults.items():
+            if self.chosen.get(name, default) != default and name not in read:
+                yield name
+
+    def __repr__(self) -> str:
+        return f"Options({', '.join(f'{name}={value!r}' for name, value in self.chosen.items())})"
+
+
+def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
+    """Names of the options of a scheme."""
+    return tuple(field.name for field in dataclasses.fields(kind))
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A scheme: its ``name``, the ``module`` with its function ``schedule``, and the class of its ``options``.
+
+    ``classic``: of Magnus 1970. ``points``: can turn the spin axis to a target, and is planned when there is one and
+    none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
+    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
+    function ``alternatives`` too, of schedules about as good. ``body_fixed``: fires channels of
+    the file only, no steerable torquer. ``reads_commands``: makes blocks of the ``commands``
+    of the file, and is planned where there are some. ``on_true_body``: needs no symmetric model. ``slow``: may take
+    seconds.
+    """
+
+    name: str
+    module: str
+    options: type[SchemeOptions] = SchemeOptions
+    fires: bool = True
+    classic: bool = False
+    points: bool = False
+    only_points: bool = False
+    reads_sun: bool = False
+    sets_spin: bool = False
+    weighs_alternatives: bool = False
+    body_fixed: bool = False
+    reads_commands: bool = False
+    on_true_body: bool = False
+    slow: bool = False
+
+
+ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
+TWO_PULSE = Scheme(
+    "two-pulse", "nutdamp.schemes.two_pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
+)
+FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True, body_fixed=True)
+OPTIMAL = Scheme(
+    "optimal",
+    "nutdamp.schemes.optimal.search",
+    OptimalOptions,
+    points=True,
+    sets_spin=True,
+    body_fixed=True,
+    slow=True,
+)
+HALF_CONE = Scheme(
+    "half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True, body_fixed=True
+)
+RHUMB_LINE = Scheme(
+    "rhumb-line",
+    "nutdamp.schemes.rhumb_line",
+    RhumbLineOptions,
+    points=True,
+    only_points=True,
+    reads_sun=True,
+    body_fixed=True,
+)
+COMMAND_BLOCK = Scheme(
+    "command-block",
+    "nutdamp.schemes.command_block",
+    CommandBlockOptions,
+    reads_commands=True,
+    sets_spin=True,
+    on_true_body=True,
+    body_fixed=True,
+    slow=True,
+)
+NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
+"""Free motion, for comparison."""
+
+SCHEMES = {
+    scheme.name: scheme
+    for scheme in (ONE_PULSE, TWO_PULSE, FOUR_PULSE, OPTIMAL, HALF_CONE, RHUMB_LINE, COMMAND_BLOCK, NONE)
+}
+NAMES = tuple(SCHEMES)
+PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
+CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
+COMPARED = (*CLASSIC, OPTIMAL.name)
+"""What is planned where none is named and there is no target."""
+POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda one: one.slow) if scheme.points)
+"""In the order in which they are shown: those that take seconds last."""
+SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
+SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
+COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)

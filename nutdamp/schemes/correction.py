@@ -1,0 +1,515 @@
+"""Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
+
+A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
+takes longer than a whole plan.
+
+A schedule laid stage by stage along the flown motion: what the schemes that point the spin axis share.
+
+Taking the nutation out before H is turned: at a moment at which the spin axis, where H goes, is near the target.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nutdamp.common import work
+from nutdamp.errors import Infeasible, TooShort
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import make_dynamics
+from nutdamp.flight.propellant import supplied
+from nutdamp.physics import attitude
+from nutdamp.schemes.catalogue import Scheme, SchemeOptions
+from nutdamp.schemes.sequential import steady_omega
+from nutdamp.spacecraft.constraints import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
+
+CONVERGED = 1e-14
+"""rad; a few roundings of the integration."""
+
+DIFFERENCE = 1e-6
+"""Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
+
+ALIKE = 1e-9
+"""Difference in size, relative, up to which pulses are equal."""
+
+STEPS = 30
+
+INTEGRATED = 50_000
+"""Steps of integration after which a correction is left as it is: some seconds."""
+
+PROGRESS = 0.01
+"""Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
+
+
+TAIL = 4
+"""Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
+
+MOVED = 8
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
+
+BEFORE, AFTER = 12, 24
+"""Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
+
+CLEARLY = 0.5
+"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+
+EXACT = 1e-11
+"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
+
+
+def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[tuple[float, float]]) -> Schedule:
+    """One pulse of each channel, commandable: ``timing`` has the centre and the on-time of each, s."""
+    return Schedule(
+        tuple(
+            commandable(spacecraft, channel_pulse(channel, t, on_time))
+            for channel, (t, on_time) in zip(channels, timing, strict=True)
+        )
+    )
+
+
+def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
+    """Of schedules with what they leave (rad), the preferred first, the one to take; and the first that breaks a limit.
+
+    The first that is exact is taken, else the first that none behind it beats clearly.
+    """
+    best: tuple[float, Schedule] | None = None
+    broken: Schedule | None = None
+    for made, left in tried:
+        if not keeps_limits(spacecraft, made.pulses):
+            broken = broken or made
+        elif best is None or left < CLEARLY * best[0]:
+            best = left, made
+            if left <= EXACT:
+                break
+    return None if best is None else best[1], broken
+
+
+def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
+    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+
+    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
+    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
+    """
+    return _missed(propagation.flown(spacecraft, schedule))
+
+
+def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
+    """`misses` of a flight; ``spin`` adds a fifth, by how much of itself the final spin of the goal is missed."""
+    spacecraft, schedule = flight_.spacecraft, flight_.schedule
+    moments = np.asarray(flight_.last_moments)
+    body = flight_.settled.rates * moments
+    after = attitude.rotate(flight_.settled.quaternion, body)
+    steady = steady_omega(spacecraft, schedule.end)
+    body[:2] -= moments[:2] * (steady.real, steady.imag)
+    left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
+    final = spacecraft.goal.spin
+    return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
+
+
+def _across(axis: Vector, vector: Vector) -> Vector:
+    """The two components of ``vector`` square to the unit vector ``axis``."""
+    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, other)
+    first /= float(np.linalg.norm(first))
+    return np.array([first @ vector, np.cross(axis, first) @ vector])
+
+
+def correct(
+    spacecraft: Spacecraft,
+    made: Schedule,
+    *,
+    chosen: Sequence[int],
+    momentum: bool,
+    spin: bool = False,
+    equal: bool = False,
+    resizable: bool = True,
+) -> Schedule:
+    """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
+
+    Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses, those
+    as large as the last one, the sizes stay as they are, or all change alike where they are ``resizable`` and commands
+    have no ticks. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
+    taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
+    """
+    if not made.pulses:
+        return made
+    chosen = sorted({index % len(made) for index in chosen})
+    kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
+    moving = [made.pulses[index] for index in chosen]
+    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(made, pulse))) for pulse in moving]
+    ends = np.cumsum([len(one.start) for one in pulses])
+    together = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
+    common = [_Common(spacecraft, made)] if together else []
+
+    def build(x: Vector) -> Schedule:
+        parts = np.split(x, ends)
+        factor = float(parts[-1][0]) if common else 1.0
+        others = common[0].resized(kept, factor) if common else kept
+        moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
+        return Schedule(supplied(spacecraft, (*others, *moved)), made.notes, made.bounds)
+
+    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
+
+    def left(made: Schedule) -> Vector:
+        nonlocal steps
+        flown = propagation.flown(spacecraft, made, dynamics=dynamics)
+        steps += flown.steps
+        missed = _missed(flown, spin=spin)
+        return missed if momentum else np.delete(missed, [2, 3])
+
+    freedom = _stacked(*pulses, *common)
+    x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
+    rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
+    corrected = Schedule(rounded, made.notes, made.bounds)
+    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
+    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """Corrects schedules of a ``scheme`` on the motion of a true spacecraft."""
+
+    scheme: Scheme
+    options: SchemeOptions
+
+    @property
+    def momentum(self) -> bool:
+        """Whether H too is to end where it should."""
+        return self.scheme.points and not self.options.frees_axis
+
+    @property
+    def equal(self) -> bool:
+        """Whether the pulses are planned to be equal."""
+        return self.options.equal
+
+    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:
+        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        if self.options.uncorrected or not made.pulses:
+            return made
+        # The last pulses, which know what the others did on the model, undo what the true motion made of them.
+        whole, given = free == TAIL, self.options.equal and not self.options.resizable
+        last = free if not (whole and self.options.equal) else AFTER if given else MOVED
+        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
+        if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
+            damping = [index for index, pulse in enumerate(made) if not alike(made, pulse)]
+            chosen = (*damping[:BEFORE], *chosen)
+        spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
+        if spin and whole:  # and the pulse that gives most to the spin
+            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+        sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
+        return correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
+
+
+def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
+    """Start, scale, lower and upper bound of all that is free."""
+    start, scale, lower, upper = (
+        np.concatenate([getattr(one, name) for one in parts]) for name in ("start", "scale", "lower", "upper")
+    )
+    return start, scale, lower, upper
+
+
+def alike(made: Schedule, pulse: Pulse) -> bool:
+    """Whether a pulse is as large as the last one of a schedule."""
+    last = made.pulses[-1]
+    one, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
+    return abs(one - other) <= ALIKE * other
+
+
+class _Movable:
+    """What can be turned of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
+
+    Without the last of them where it is not ``sized`` for itself.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
+        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
+        latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
+        self.channel = channel_of(spacecraft, pulse)
+        self.torquer = spacecraft.torquer
+        self.size = _size(pulse)
+        start, scale, lower, upper = [pulse.start], [pace], [earliest], [latest]
+        if self.channel is None:
+            start.append(math.atan2(pulse.impulse[1], pulse.impulse[0]))
+            scale, lower, upper = [*scale, 1.0], [*lower, -math.inf], [*upper, math.inf]
+        if sized:
+            start, scale = [*start, self.size], [*scale, self.size]
+            least, most = _bounds(spacecraft, pulse)
+            lower, upper = [*lower, least], [*upper, most]
+        self.sized = sized
+        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+
+    def turn(self, x: Vector, factor: float) -> Pulse:
+        """The pulse with these settings; ``factor`` times as large where it is not sized for itself."""
+        size = float(x[-1]) if self.sized else factor * self.size
+        if self.channel is not None:
+            return channel_pulse(self.channel, x[0] + 0.5 * size, size)
+        assert self.torquer is not None
+        torque = self.torquer.torque
+        on_time = 0.0 if torque is None else size / torque
+        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[1]), impulse=size)
+
+
+class _Common:
+    """What equal pulses change alike: one factor on the size of all that are as large as the last one."""
+
+    start = scale = np.ones(1)
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        self.spacecraft, self.made, last = spacecraft, made, made.pulses[-1]
+        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if alike(made, pulse)]) / _size(last)
+        self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
+
+    def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
+        """The ``pulses`` about their centres, those alike ``factor`` times as large."""
+        return [self._resized(one, factor) if alike(self.made, one) else one for one in pulses]
+
+    def _resized(self, pulse: Pulse, factor: float) -> Pulse:
+        moved = _Movable(self.spacecraft, pulse, sized=False)
+        return replace(moved.turn(moved.start, factor), t=pulse.t)
+
+
+def _size(pulse: Pulse) -> float:
+    """What a pulse is measured by: on-time of a channel, s, impulse of a steerable torquer, N m s."""
+    return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
+
+
+def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
+    """The least and the largest size of a pulse."""
+    channel = channel_of(spacecraft, pulse)
+    if channel is None:
+        return 0.0, math.inf
+    return effective_on_times(channel)[0], max(longest_on_time(spacecraft, channel), pulse.on_time)
+
+
+def solve(
+    residual: Callable[[Vector], Vector],
+    start: Vector,
+    scale: Vector,
+    lower: Vector,
+    upper: Vector,
+    enough: Callable[[], bool] = lambda: False,
+) -> tuple[Vector, float]:
+    """Unknowns (n,) within bounds that make ``residual`` (m,) least in norm, and that norm.
+
+    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution. It is
+    left as it is once there was ``enough`` work.
+    """
+    x = np.clip(start, lower, upper)
+    value = residual(x)
+    norm = float(np.linalg.norm(value))
+    for _ in range(STEPS):
+        if norm <= CONVERGED or enough():
+            break
+        jacobian = _slopes(residual, x, value, scale)
+        step = bounded_step(jacobian, value, x, scale, lower, upper)
+        best, best_value, best_norm = x, value, norm
+        for shrink in range(8):
+            trial = np.clip(x + step * 0.5**shrink, lower, upper)
+            trial_value = residual(trial)
+            trial_norm = float(np.linalg.norm(trial_value))
+            if trial_norm < best_norm:
+                best, best_value, best_norm = trial, trial_value, trial_norm
+                break
+        stalled = best_norm > norm * (1.0 - PROGRESS)
+        x, value, norm = best, best_value, best_norm
+        if stalled:
+            break
+    return x, norm
+
+
+def _slopes(residual: Callable[[Vector], Vector], x: Vector, value: Vector, scale: Vector) -> Vector:
+    """Jacobian by the scaled unknowns, (m, n)."""
+    columns = []
+    for index, size in enumerate(scale):
+        moved = x.copy()
+        moved[index] += DIFFERENCE * size
+        columns.append((residual(moved) - value) / DIFFERENCE)
+    return np.column_stack(columns)
+
+
+def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
+    """Least-squares step (n,) for a ``jacobian`` (m, n) by scaled unknowns; one that would leave its bounds stays."""
+    free = np.ones(len(x), dtype=bool)
+    step = np.zeros(len(x))
+    for _ in range(len(x)):
+        step[:] = 0.0
+        step[free] = -np.linalg.lstsq(jacobian[:, free], value, rcond=1e-10)[0] * scale[free]
+        outward = free & (((x <= lower) & (step < 0.0)) | ((x >= upper) & (step > 0.0)))
+        if not outward.any():
+            break
+        free &= ~outward
+    return step
+
+
+LEFT_OVER = 0.05
+"""Share of nutation and turn together above which what is left makes a schedule no way to the target."""
+
+LEFT_OVER_BY_TICKS = 0.5
+"""The same where the resolution of commands may be to blame."""
+
+
+ROUNDING = 1e-12
+"""rad; where the spin axis is that near the target already, no pulses are needed."""
+
+
+class FlownBuilder:
+    """The pulses chosen so far, and the spacecraft as it is after them.
+
+    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there: attitude, rates,
+    limits and disturbances are those of that moment, its goal is where the builder is to end. ``steps``: of integration
+    that the flight took so far.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.here = replace(
+            spacecraft,
+            goal=replace(spacecraft.goal, axis=spacecraft.target_axis),
+            limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
+        )
+        self.now = 0.0
+        self.steps = 0
+        self.pulses: list[Pulse] = []
+        self._before: list[tuple[float, Spacecraft]] = []
+
+    @property
+    def allowed(self) -> float:
+        """How many pulses the limits still allow."""
+        most = self.here.limits.max_pulses
+        return math.inf if most is None else most
+
+    @property
+    def left(self) -> float:
+        """What is left, rad: nutation and distance of H from the target, whichever is more."""
+        return max(self.here.nutation, self.here.to_turn)
+
+    def fork(self) -> FlownBuilder:
+        """Another builder that goes on from here."""
+        other = FlownBuilder(self.here)
+        other.now, other.pulses, other._before = self.now, list(self.pulses), list(self._before)
+        return other
+
+    def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
+        """Take ``pulses``, in order and with times from ``now``, into the schedule and fly them.
+
+        Raises Infeasible where they are ``bounded`` by the budget of work and it ends before them.
+        """
+        base = self.now
+        for pulse in pulses:
+            if bounded and work.exhausted():
+                raise Infeasible("the flight of the pulses for that was not finished")
+            self._before.append((self.now, self.here))
+            timed = pulse.moved(base)
+            self.here, steps = _after(self.here, timed.moved(-self.now))
+            self.steps += steps
+            self.pulses.append(timed)
+            self.now = timed.over
+
+    def correct(self, last: int, *, resized: int = 0) -> None:
+        """Move the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
+
+        Their sizes stay, but that of the last ``resized`` pulses, which are equal, may change as one.
+        """
+        taken = min(max(last, resized), len(self.pulses))
+        if last == 0 or taken == 0:
+            return
+        self.now, self.here = self._before[-taken]
+        made = Schedule(tuple(pulse.moved(-self.now) for pulse in self.pulses[-taken:]))
+        del self.pulses[-taken:], self._before[-taken:]
+        chosen = range(max(taken - last, 0), taken)
+        self.fire(correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0))
+
+    def schedule(self, *notes: str) -> Schedule:
+        """What has been chosen."""
+        return Schedule(tuple(self.pulses), notes)
+
+
+def tolerable(spacecraft: Spacecraft) -> float:
+    """What a schedule may leave, rad, and still count as having reached the target: more where commands have ticks."""
+    share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
+    return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
+
+
+def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
+    """The spacecraft as it is when ``pulse`` ends, with its time counted from there; and the steps that it took."""
+    flown = propagation.flown(spacecraft, Schedule((pulse,)))
+    settled, since, limits = flown.settled, pulse.over, spacecraft.limits
+    to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)
+    given = spacecraft.attitude or Attitude(settled.quaternion)
+    after = replace(
+        spacecraft,
+        omega0=settled.rates,
+        attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
+        disturbances=tuple(
+            replace(one, transverse=one.transverse * cmath.exp(1j * one.rate * since))
+            for one in spacecraft.disturbances
+        ),
+        limits=replace(
+            limits,
+            horizon=spacecraft.horizon - since,
+            earliest=limits.gap,
+            max_pulses=None if limits.max_pulses is None else limits.max_pulses - 1,
+            blackout=tuple((begins - since, ends - since) for begins, ends in limits.blackout if ends > since),
+        ),
+    )
+    return after, flown.steps
+
+
+MOMENTS = 16
+"""Earliest starts that are tried."""
+
+PREDAMPING_INTEGRATED = 20_000
+"""Steps of integration after which no more of them are tried."""
+
+Planned = Callable[[Spacecraft, SchemeOptions], Schedule]
+
+IN_REACH = 0.5
+"""Share of the horizon within which the damping begins: the rest is for the turn."""
+
+
+def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
+    """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
+
+    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
+    C|ω3| times its angle, differs by the cone.
+    Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
+    """
+    here = start.here
+    h = here.inertia.C * abs(here.spin)
+    # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
+    span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
+    best: tuple[float, FlownBuilder] | None = None
+    reason: Infeasible | None = None
+    steps = 0
+    for number in range(MOMENTS):
+        earliest = here.limits.earliest + number * span / MOMENTS
+        if number > 0 and earliest > IN_REACH * here.horizon:
+            break
+        try:
+            made = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+        except Infeasible as why:
+            reason = why
+            continue
+        builder = start.fork()
+        try:
+            builder.fire(made, bounded=True)
+        except Infeasible as why:
+            reason = why
+            break
+        cost = made.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        if best is None or cost < best[0]:
+            best = cost, builder
+        steps += builder.steps
+        if steps > PREDAMPING_INTEGRATED or work.exhausted():
+            break
+    if best is None:
+        text = "the nutation is to be taken out first, and"
+        # Its cure, where it has one, is for the damping alone.
+        raise TooShort(f"{text} {reason.why}") if isinstance(reason, TooShort) else Infeasible(f"{text} {reason}")
+    return best[1]

@@ -1,0 +1,395 @@
+"""What a short firing at one moment does to what is left at the end: the equations of the linear program.
+
+Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), shift of H
+(two, square to the target axis) and spin (one). Before anything is planned they are those of small angles; after that
+those along a flight, at its true angles.
+
+Starts and on-times on the ticks of the commands, so that together they leave as little as they can.
+
+Rounding each pulse on its own leaves what half a tick of each can do. Here starts and on-times are stepped to and fro,
+two pulses at a time, by the linear model of what is left, which is taken anew about the ticks found.
+
+The last digits of a schedule: move and lengthen its pulses until the flown motion leaves nothing.
+
+A quasi-Newton iteration for the nearest solution. The slopes are those of `residual_equations`, which cost no
+flights, corrected by what each step shows (Broyden 1965).
+Room is shared between neighbours beforehand, so that no limit can be broken.
+
+What can be turned of a schedule of body-fixed channels: centre and on-time of each pulse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
+from nutdamp.schemes.correction import bounded_step
+from nutdamp.spacecraft.constraints import Windows, longest_on_time, rooms
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
+
+MOST_GROWN = 14.0
+"""Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost.
+
+A millionth is left then, which takes pulses that a clock still resolves.
+"""
+
+KNOTS = 400
+"""Even moments, besides the edges of pulses, at which ω3 is read from a flight with dissipation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """Which of the five are requested; the nutation always is."""
+
+    shift: bool = True
+    spin: bool = False
+
+    @property
+    def chosen(self) -> list[int]:
+        """Rows of the five that count."""
+        return [0, 1, *([2, 3] if self.shift else []), *([4] if self.spin else [])]
+
+    def beside(self, off: Vector) -> Vector:
+        """What is left (equations,) N m s where H ends ``off`` (2,) N m s beside its target, and nothing else is."""
+        return np.array([0.0, 0.0, *off, 0.0])[self.chosen]
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """``rows`` gives for times (n,) s what one N m s about each body axis adds to the equations, (n, equations, 3).
+
+    ``goal`` (equations,) N m s is what all pulses together are to add. ``turning`` (equations,) rad/s are the rates at
+    which the effects turn, for what is lost to a width.
+    """
+
+    rows: Callable[[Vector], Vector]
+    goal: Vector
+    turning: Vector
+
+    def widths(self, width: Vector) -> Vector:
+        """Share of the effect that is left of impulses spread over ``width`` (n,) s, (n, equations)."""
+        return np.sinc(np.outer(width, self.turning) / (2 * np.pi))
+
+    def of(self, schedule: Schedule, step: float) -> Vector:
+        """What all pulses add, (equations,) N m s, each taken in parts of at most ``step`` s."""
+        if not len(schedule):
+            return np.zeros(len(self.turning))
+        counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
+        widths = np.repeat([pulse.on_time for pulse in schedule], counts) / np.repeat(counts, counts)
+        parts = np.concatenate([np.arange(count) + 0.5 for count in counts])
+        times = np.repeat([pulse.start for pulse in schedule], counts) + widths * parts
+        impulses = np.repeat([pulse.impulse / count for pulse, count in zip(schedule, counts, strict=True)], counts, 0)
+        return np.asarray(np.einsum("nek,nk,ne->e", self.rows(times), impulses, self.widths(widths)))
+
+
+def growth_from(spacecraft: Spacecraft) -> float:
+    """s from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
+    growth = spacecraft.growth
+    return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
+
+
+def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
+    """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
+
+    What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
+    """
+    inertia, spin, goal, growth = spacecraft.inertia, spacecraft.spin, spacecraft.goal, spacecraft.growth
+    last = growth_from(spacecraft)
+    shift = -square_to_target(spacecraft) @ spacecraft.momentum
+    if np.any(shift):  # as long as the way there is on the sphere
+        shift *= spacecraft.turning_impulse / np.linalg.norm(shift)
+    final = spin if goal.spin is None else goal.spin
+    there = -inertia.A * spacecraft.omega0[:2] * math.exp(growth * last)
+    every = np.array([*there, *shift, inertia.C * (final - spin)])
+
+    def rows(times: Vector) -> Vector:
+        turned = np.exp(1j * np.outer(times, [inertia.a * spin, spin]))
+        turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
+        shifts = np.zeros((len(times), 2, 3))
+        shifts[:, :, :2] = _complex_product(turned[:, 1])
+        return _all_rows(turned[:, 0], shifts)[:, equations.chosen]
+
+    return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
+
+
+def along(flight: Flight, equations: Equations, step: float) -> Influence:
+    """The equations about a flight, at its true angles: what its pulses add, less what it leaves, is the goal.
+
+    That a firing also turns the body under the pulses that follow is neglected; ``step`` s is for `Influence.of`.
+    """
+    across = square_to_target(flight.spacecraft)
+
+    def rows(times: Vector) -> Vector:
+        _, quaternions = flight.motion(times)
+        columns = [attitude.rotate(quaternions, axis) @ across.T for axis in np.eye(3)]
+        back = _turned_back(flight, times)
+        return _all_rows(back, np.stack(columns, axis=-1))[:, equations.chosen]
+
+    here = Influence(rows, np.zeros(0), _turning(flight.spacecraft)[equations.chosen])
+    return Influence(rows, here.of(flight.schedule, step) - misses(flight, equations), here.turning)
+
+
+def misses(flight: Flight, equations: Equations) -> Vector:
+    """What a flight leaves of the equations, (equations,) N m s; zero where it ends as requested."""
+    body, end = flight.spacecraft, flight.settled
+    back = _turned_back(flight, np.array([flight.schedule.end]))[0]
+    nutation = body.inertia.A * end.omega * back
+    momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.last_moments))
+    final = end.spin if body.goal.spin is None else body.goal.spin
+    shift = square_to_target(body) @ momentum
+    return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
+
+
+def _turning(spacecraft: Spacecraft) -> Vector:
+    return np.repeat([spacecraft.inertia.a * spacecraft.spin, spacecraft.spin, 0.0], [2, 2, 1])
+
+
+def square_to_target(spacecraft: Spacecraft) -> Vector:
+    """Two inertial unit vectors (2, 3) square to the target axis: body axes 1 and 2 at t = 0 as seen along it."""
+    axis, body = spacecraft.target_axis, attitude.matrix(spacecraft.initial.quaternion)
+    sense = np.sign(axis @ body[:, 2]) or 1.0
+    first = body[:, 0] - axis * (axis @ body[:, 0])
+    if np.linalg.norm(first) < 0.5:  # the target lies near body axis 1
+        first = np.cross(sense * body[:, 1], axis)
+    first /= np.linalg.norm(first)
+    return np.array([first, sense * np.cross(axis, first)])
+
+
+def _turned_back(flight: Flight, times: Vector) -> Vector:
+    """e^{ia∫ω3dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
+    spacecraft, schedule = flight.spacecraft, flight.schedule
+    inertia, drift = spacecraft.inertia, spacecraft.spin_drift
+    if spacecraft.growth != 0.0:
+        return _turned_back_by_flight(flight, times)
+    turned = (spacecraft.spin + 0.5 * drift * times) * times
+    for pulse in schedule:
+        if pulse.impulse[2] and pulse.on_time > 0.0:
+            since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
+            turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
+    return np.asarray(np.exp(1j * inertia.a * turned))
+
+
+def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
+    """`_turned_back` where dissipation changes ω3: on coasts it is ω/ω3, or tan θ, that grows by e^{κt} exactly."""
+    body = flight.spacecraft
+    knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
+    grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
+    least = math.exp(-MOST_GROWN) * abs(body.spin)
+    now, then = (np.maximum(np.abs(np.interp(at, knots, spins)), least) for at in (times, flight.schedule.end))
+    phase = body.inertia.a * np.interp(times, knots, turned)
+    return np.asarray(np.exp(1j * phase + grown) * then / now)
+
+
+@lru_cache(maxsize=2)
+def _spins(flight: Flight, last: float) -> tuple[Vector, Vector, Vector]:
+    """Moments up to ``last`` s, ω3 there in rad/s, and by how much it has turned the body since t = 0, (n,) each."""
+    knots = np.unique(np.concatenate([[leg.start for leg in flight.legs], np.linspace(0.0, last, KNOTS)]))
+    spins = flight.motion(knots)[0][:, 2]
+    return knots, spins, np.concatenate([[0.0], np.cumsum(0.5 * (spins[1:] + spins[:-1]) * np.diff(knots))])
+
+
+def _complex_product(factors: Vector) -> Vector:
+    """Multiplication by complex ``factors`` (n,) as real matrices (n, 2, 2)."""
+    return np.stack([np.stack([factors.real, -factors.imag], -1), np.stack([factors.imag, factors.real], -1)], 1)
+
+
+def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
+    """All five equations, (n, 5, 3), from the turn of ω (n,) and the effect on H (n, 2, 3)."""
+    rows = np.zeros((len(nutation), 5, 3))
+    rows[:, :2, :2] = _complex_product(nutation)
+    rows[:, 2:4] = shifts
+    rows[:, 4, 2] = 1.0
+    return rows
+
+
+class PulseParameters:
+    """Centre and on-time of each pulse, as one vector: (c1, τ1, c2, τ2 …) s, its scale, and how far each may go."""
+
+    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+        names = {channel.name: channel for channel in spacecraft.channels}
+        self.channels = [names[pulse.channel] for pulse in made]
+        self.made = made
+        pace = 1.0 / abs(spacecraft.spin)
+        self.room = rooms(spacecraft, made.pulses)
+        start: list[float] = []
+        scale: list[float] = []
+        lower: list[float] = []
+        upper: list[float] = []
+        for pulse, channel, (begun, latest) in zip(made, self.channels, self.room, strict=True):
+            before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
+            start += [pulse.t, pulse.on_time]
+            scale += [pace, min(pulse.on_time, pace)]
+            lower += [pulse.t - 0.5 * before, min(channel.min_on_time, pulse.on_time)]
+            most = min(longest_on_time(spacecraft, channel), pulse.on_time + min(before, after))
+            upper += [pulse.t + 0.5 * after, max(most, pulse.on_time)]
+        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+
+    def schedule(self, x: Vector) -> Schedule:
+        """The schedule with these settings."""
+        pairs = x.reshape(-1, 2)
+        pulses = (
+            channel_pulse(channel, float(t), float(on)) for channel, (t, on) in zip(self.channels, pairs, strict=True)
+        )
+        return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
+
+    def slopes(self, made: Schedule, flown: propagation.Flight, equations: Equations, step: float) -> Vector:
+        """What the scaled parameters change in the equations, (equations, 2k) N m s."""
+        rows = along(flown, equations, step).rows
+        columns = []
+        begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in made), strict=True))
+        for index, channel in enumerate(self.channels):
+            on, off = begins[index] @ channel.torque, ends[index] @ channel.torque
+            columns += [off - on, 0.5 * (on + off)]
+        return np.asarray(np.column_stack(columns) * self.scale)
+
+
+REACH = 2.0
+"""Ticks that a start or on-time may lie from what it was before."""
+
+TICK_STEPS = 300
+"""Steps of one tick, two pulses at a time, by one linear model."""
+
+MODELS = 4
+"""Linear models, each about the best ticks so far."""
+
+WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+"""A step: of the start, of the on-time."""
+
+
+def on_ticks(
+    spacecraft: Spacecraft,
+    parameters: PulseParameters,
+    x: Vector,
+    left: Callable[[Schedule], tuple[Vector, Flight]],
+    slopes: Callable[[Schedule, Flight], Vector],
+) -> Schedule:
+    """The schedule of settings ``x`` (2k,) s of the ``parameters`` on ticks.
+
+    ``left`` gives what a schedule leaves (equations,) and its flight, ``slopes`` what the scaled parameters change
+    in it.
+    """
+    lattice = _Lattice(spacecraft, parameters, x)
+    ticks = lattice.rounded
+    best, least = parameters.schedule(lattice.settings(ticks)), np.inf
+    for _ in range(MODELS):
+        made = parameters.schedule(lattice.settings(ticks))
+        missing, flown = left(made)
+        size = float(np.linalg.norm(missing))
+        if size >= least:
+            break
+        best, least = made, size
+        ticks = lattice.stepped(ticks, missing, slopes(made, flown) / parameters.scale)
+    return best
+
+
+class _Lattice:
+    """Starts and on-times in ticks, (k, 2) each, and which of them may be commanded."""
+
+    def __init__(self, spacecraft: Spacecraft, parameters: PulseParameters, x: Vector) -> None:
+        windows, channels = Windows(spacecraft), parameters.channels
+        self.tick = spacecraft.limits.tick or 0.0
+        centres, needed = x.reshape(-1, 2).T
+        self.bounds = np.array([[channel.min_on_time, channel.max_on_time] for channel in channels]).T
+        self.room = np.array(parameters.room).T
+        self.exact = np.column_stack([centres - 0.5 * needed, needed]) / self.tick
+        on_times = [windows.on_time(on_time, *bounds) for on_time, bounds in zip(needed, self.bounds.T, strict=True)]
+        self.rounded = np.rint(np.column_stack([self.exact[:, 0], np.array(on_times) / self.tick]))
+
+    def settings(self, ticks: Vector) -> Vector:
+        """Centres and on-times, (2k,) s."""
+        return self.tick * np.ravel(np.column_stack([ticks[:, 0] + 0.5 * ticks[:, 1], ticks[:, 1]]))
+
+    def allowed(self, ticks: Vector) -> NDArray[np.bool_]:
+        """Pulses (k,) that keep their limits, and are near enough for a linear model."""
+        start, on_time = self.tick * ticks.T
+        near = np.abs(ticks - self.exact).max(axis=1) < REACH
+        inside = near & (start >= self.room[0] - TOUCHING) & (start + on_time <= self.room[1] + TOUCHING)
+        bounded = (on_time >= self.bounds[0] - TOUCHING) & (on_time <= self.bounds[1] + TOUCHING)
+        return np.asarray(inside & bounded & (on_time > 0.5 * self.tick))
+
+    def stepped(self, ticks: Vector, missing: Vector, slopes: Vector) -> Vector:
+        """Ticks that leave less, where ``ticks`` leave ``missing`` and ``slopes`` (…, 2k) are per s."""
+        ticks = ticks.copy()
+        for _ in range(TICK_STEPS):
+            possible = [(index, way) for way in WAYS for index in np.flatnonzero(self.allowed(ticks + way))]
+            if not possible:
+                break
+            pulse = np.array([index for index, _ in possible])
+            start, on_time = np.array([way for _, way in possible]).T
+            centre = start + 0.5 * on_time
+            changes = self.tick * (slopes[:, 2 * pulse] * centre + slopes[:, 2 * pulse + 1] * on_time)
+            alone = missing[:, None] + changes
+            pairs = np.linalg.norm(alone[:, :, None] + changes[:, None, :], axis=0)
+            # Two steps of one pulse might leave its room; on the diagonal is the single step.
+            pairs[pulse[:, None] == pulse[None, :]] = np.inf
+            np.fill_diagonal(pairs, np.linalg.norm(alone, axis=0))
+            one, two = divmod(int(np.argmin(pairs)), len(pulse))
+            if pairs[one, two] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
+                break
+            for index in {one, two}:
+                ticks[pulse[index]] += start[index], on_time[index]
+                missing = missing + changes[:, index]
+        return ticks
+
+
+CONVERGED = 1e-13
+"""Share of |H| that is left: a few roundings of the flight."""
+
+NEWTON_STEPS = 25
+
+
+def refine(
+    spacecraft: Spacecraft,
+    made: Schedule,
+    equations: Equations,
+    aside: Vector,
+    step: float,
+    fly: Callable[[Schedule], Flight],
+) -> Schedule:
+    """``made`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
+
+    ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
+    leaves is for the caller to judge.
+    """
+    parameters = PulseParameters(spacecraft, made)
+    size = float(np.linalg.norm(spacecraft.momentum))
+
+    def left(schedule: Schedule) -> tuple[Vector, Flight]:
+        flown = fly(schedule)
+        return (misses(flown, equations) - aside) / size, flown
+
+    def slopes_of(schedule: Schedule, flown: Flight) -> Vector:
+        return parameters.slopes(schedule, flown, equations, step) / size
+
+    x = parameters.start
+    value, flown = left(made)
+    slopes = slopes_of(made, flown)
+    for _ in range(NEWTON_STEPS):
+        norm = float(np.linalg.norm(value))
+        if norm <= CONVERGED:
+            break
+        move = bounded_step(slopes, value, x, parameters.scale, parameters.lower, parameters.upper)
+        for shrink in range(5):
+            trial = np.clip(x + move * 0.5**shrink, parameters.lower, parameters.upper)
+            following, _ = left(parameters.schedule(trial))
+            if np.linalg.norm(following) < norm:
+                break
+        moved = (trial - x) / parameters.scale
+        if not moved.any():
+            break
+        slopes = slopes + np.outer(following - value - slopes @ moved, moved) / (moved @ moved)
+        if np.linalg.norm(following) >= norm:
+            break
+        x, value = trial, following
+    if spacecraft.limits.tick is None:
+        return parameters.schedule(x)
+    return on_ticks(spacecraft, parameters, x, left, slopes_of)

@@ -1,0 +1,169 @@
+"""The schemes: one flat module each, `optimal` in a package, and the `tools` that they share.
+
+A scheme's module has ``schedule(spacecraft, options) -> Schedule``; `registry` says which there are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, cast
+
+from nutdamp.common import work
+from nutdamp.errors import BadRequest, Infeasible, TooShort
+from nutdamp.schemes.catalogue import (
+    POINTING,
+    SCHEMES,
+    Options,
+    Scheme,
+    SchemeOptions,
+)
+from nutdamp.units import as_given
+
+if TYPE_CHECKING:
+    from nutdamp.schemes.sequential import SymmetricModel
+    from nutdamp.spacecraft.model import Spacecraft
+    from nutdamp.spacecraft.schedule import Schedule
+
+
+Choice = Options | SchemeOptions | None
+"""What callers may hand over as options: those of one scheme, those of several, or none for the defaults."""
+
+
+def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
+    """The options of a scheme; raises BadRequest for those of another."""
+    if chosen is None:
+        return scheme.options()
+    if isinstance(chosen, Options):
+        return chosen.of(scheme.options)
+    if isinstance(chosen, scheme.options):
+        return chosen
+    raise BadRequest(f"options of {scheme.name}: expected {scheme.options.__name__}(…), got {as_given(chosen)}")
+
+
+def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
+    """The options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift."""
+    required = spacecraft.requirement
+    bound = required is not None and required.momentum_shift is not None
+    return options_of(scheme, chosen).settled(keeps_axis=bound or spacecraft.goal.axis is not None)
+
+
+def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:
+    """Pulses of the scheme ``name``, disturbances and all.
+
+    The scheme plans on the symmetric, undisturbed `symmetric_model` of the spacecraft; where that is not exact, the
+    last pulse (the last four of schemes that keep or turn H) is corrected on the true motion. Raises Infeasible with
+    the reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
+    """
+    from nutdamp.schemes.sequential import model_of
+
+    scheme = SCHEMES[name]
+    chosen = settled(scheme, options, spacecraft)
+    if scheme.on_true_body:
+        return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
+    if spacecraft.thrust_laws:
+        from nutdamp.schemes import correction, valve_commands
+
+        on_plain = valve_commands.options(spacecraft, chosen)
+        return valve_commands.planned(
+            spacecraft,
+            lambda body: schedule(name, body, on_plain),
+            correction.Correction(scheme, on_plain),
+        )
+    model = model_of(spacecraft, turning=chosen.equal)
+
+    def planned(body: Spacecraft) -> Schedule:
+        return cast("Schedule", _loaded(scheme).schedule(body, chosen))
+
+    try:
+        made = planned(model.body)
+    except TooShort as short:
+        raise TooShort(short.why, short.cure or _longer_horizon(model.body, planned)) from None
+    return _corrected(scheme, model, made, chosen)
+
+
+MOST_CORRECTED = 1_000
+"""Pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times."""
+
+LONGER = 4.0
+"""Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
+
+
+def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
+    """A horizon within which the whole schedule is ``planned``, in words: it was tried; else that none was found.
+
+    Empty where the budget of work ends before that is known.
+    """
+
+    def end(horizon: float) -> float | None:
+        """When the schedule within a horizon ends; None where there is none."""
+        try:
+            return planned(replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))).end
+        except Infeasible:
+            return None
+
+    usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
+    for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
+        over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
+        if over:
+            step = 10.0 ** (math.floor(math.log10(over)) - 3)
+            shortest = math.ceil(over / step) * step  # four digits, rounded up
+            needed = shortest if end(shortest) is not None else horizon
+            return f"limits.horizon = {needed:.4g} s is long enough"
+    if work.exhausted():
+        return ""
+    return f"not even limits.horizon = {horizon:.4g} s is long enough"
+
+
+def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> list[Schedule]:
+    """Schedules that the scheme ``name`` weighs against the one that `schedule` gives, which may be among them.
+
+    Raises KeyError for a name not in `NAMES`.
+    """
+    scheme = SCHEMES[name]
+    if not scheme.weighs_alternatives:
+        return []
+    from nutdamp.schemes.sequential import model_of
+
+    chosen = settled(scheme, options, spacecraft)
+    if spacecraft.thrust_laws:
+        from nutdamp.schemes import valve_commands
+
+        found = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
+        return [as_commands(name, spacecraft, made, chosen) for made in found]
+    model = model_of(spacecraft)
+    return [_corrected(scheme, model, made, chosen) for made in _loaded(scheme).alternatives(model.body, chosen)]
+
+
+def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
+    """A schedule ``made`` for the `commanding.plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+
+    Raises KeyError for a name not in `NAMES`.
+    """
+    from nutdamp.schemes import correction, valve_commands
+
+    scheme = SCHEMES[name]
+    chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
+    return valve_commands.as_commands(spacecraft, made, correction.Correction(scheme, chosen))
+
+
+def _loaded(scheme: Scheme) -> ModuleType:
+    """The scheme's module, loaded when it is planned first."""
+    return import_module(scheme.module)
+
+
+def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
+    """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
+    made = model.translate(made)
+    if not model.exact:
+        made = made.without_proof
+    if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
+        made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
+    if model.exact or len(made) > MOST_CORRECTED:
+        return made
+    from nutdamp.schemes import correction
+
+    return correction.Correction(scheme, options)(model.spacecraft, made)

@@ -1,0 +1,542 @@
+"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
+
+A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
+says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
+comes there; the moments are kept at which the second channel then points the right way. Both are corrected on the real
+widths.
+
+Where a steerable torquer is to push so that H and the spin axis come to the target axis: exact at any angle.
+
+The two pulses of an acquisition, and the first pulse of a row of half cones, are placed by `physics.pointing`; what is
+free, the moment of the first pulse and how far aside H goes between two, is chosen for least impulse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.common import work
+from nutdamp.errors import Infeasible
+from nutdamp.flight.propagation import Arc
+from nutdamp.physics import attitude, precession
+from nutdamp.schemes import correction
+from nutdamp.schemes.correction import tolerable
+from nutdamp.schemes.sequential import at_hand, model_of, turn_of
+from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, keeps_limits
+from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule, steerable_pulse
+
+SPIN_SAMPLES = 256
+"""Moments looked at in each turn of the spin axis, before the best is made exact."""
+
+SPIN_TURNS = 4
+"""Turns of the spin axis looked at from the earliest start, and one more from the end of each blackout window."""
+
+MOST_WINDOWS = 40
+"""Blackout windows after which a turn is looked at."""
+
+FURTHER_TURNS = 60
+"""Further whole turns that the second pulse may wait for, at most."""
+
+FURTHER_BESIDE = 12
+"""The same for the search beside the best places."""
+
+MOST_BESIDE = 1000
+"""Moments looked at in that search, at most."""
+
+ASIDE = np.linspace(-1.0, 1.0, 41)
+"""Places of H beside the best one, as shares of both jumps, for the case that the limits forbid that one."""
+
+NARROWEST = 1e-7
+"""Share of the first steps at which the search for the best choice ends; the cost is flat there to its square."""
+
+COMPASS_STEPS = 2000
+"""Steps of that search, at most."""
+
+ROUNDING = 1e-14
+"""Relative gain that counts as one while the best choice is made exact."""
+
+EQUAL = 1e-9
+"""Costs that differ by less, relatively, are equal: then the earlier end wins."""
+
+SMALLEST = 0.1
+"""Least share of both jumps that each real pulse of the two gets."""
+
+APART = 0.5
+"""Least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a turn to five."""
+
+NOTHING = 1e-12
+"""Jumps below this times C|ω3| are left out."""
+
+
+class SteerablePair:
+    """The choices of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
+
+    def __init__(self, spacecraft: Spacecraft, torquer: Steerable) -> None:
+        self.spacecraft, self.torquer = spacecraft, torquer
+        self.A, self.h = spacecraft.inertia.A, spacecraft.inertia.C * abs(spacecraft.spin)
+        self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
+        self.start = spacecraft.initial
+        self.windows = Windows(spacecraft)
+
+    # --- the motion --------------------------------------------------------------------------------------------------
+
+    def axes(self, times: Vector) -> Vector:
+        """Spin axis S at ``times`` (n,) s, (n, 3), inertial."""
+        _, quaternions = self._arc(0.0, self.start).motion(times)
+        return attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, self.spacecraft.spin)]))
+
+    def _arc(self, since: float, state: SpinState) -> Arc:
+        return Arc(self.A, self.spacecraft.inertia.C, since, state)
+
+    def on_times(self, jumps: Vector) -> Vector:
+        """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no pulse can."""
+        if self.torquer.torque is None:
+            return np.zeros_like(jumps)
+        return precession.on_times_to_turn(jumps, self.torquer.torque, self.spacecraft.spin)
+
+    def spent(self, jumps: Vector) -> Vector:
+        """Impulse (n,) N m s that ``jumps`` (n,) of H take: more where the pulse is wide."""
+        torque = self.torquer.torque
+        return jumps if torque is None else torque * self.on_times(jumps)
+
+    def pulses(self, jumps: list[tuple[float, Vector]]) -> tuple[Pulse, ...]:
+        """Pulses that bring H to the given vectors (3,) N m s at the given moments, in order."""
+        made, state, now, momentum = [], self.start, 0.0, self.momentum
+        for moment, after in jumps:
+            rates, quaternions = self._arc(now, state).motion(np.array([moment]))
+            body = attitude.matrix(quaternions[0]).T @ (after - momentum)
+            push = complex(body[0], body[1])
+            if abs(push) > NOTHING * self.h:
+                on_time = float(self.on_times(np.array([abs(push)]))[0])
+                requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
+                angle = math.atan2(push.imag, push.real)
+                pulse = steerable_pulse(self.torquer, moment, angle, **requested)
+                made.append(commandable(self.spacecraft, pulse))
+            state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
+            now, momentum = moment, after
+        return tuple(made)
+
+    # --- what can be chosen ------------------------------------------------------------------------------------------
+
+    def moments(self) -> Vector:
+        """Moments (n,) s of the first pulse worth looking at."""
+        period = self.spacecraft.inertial_period
+        first = self.spacecraft.limits.earliest
+        turn = np.arange(SPIN_SAMPLES) * (period / SPIN_SAMPLES)
+        ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:MOST_WINDOWS]
+        parts = [first + number * period + turn for number in range(SPIN_TURNS)] + [end + turn for end in ends]
+        times = np.unique(np.concatenate(parts))
+        return np.asarray(times[times <= self.windows.horizon])
+
+    def one(self, cones: int) -> tuple[Pulse, ...]:
+        """The first pulse of ``cones`` half cones in a row, at the moment from which all of them cost least."""
+
+        def cost(times: Vector) -> tuple[Vector, Vector]:
+            middle, rest = precession.half_cone(self.h, self.axes(times), self.target, cones)
+            jumps = np.linalg.norm(middle - self.momentum, axis=-1)
+            on_times = self.on_times(jumps)
+            allowed = self.windows.allowed(times - 0.5 * on_times, on_times, self.spacecraft.limits.earliest)
+            return np.where(allowed, self.spent(jumps) + rest, np.inf), middle
+
+        times = self.moments()
+        costs, _ = cost(times)
+        if len(times) == 0 or not np.isfinite(costs.min()):
+            raise Infeasible(self.no_room(cones))
+        best = float(times[np.flatnonzero(costs <= costs.min() * (1.0 + EQUAL))[0]])
+        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), self._steps(0.0)[:1])
+        moment = float(point[0])
+        return self.pulses([(moment, cost(np.array([moment]))[1][0])])
+
+    def two(self, straight: bool = False) -> tuple[Pulse, ...]:
+        """The two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
+        times = self.moments()
+        plain = np.zeros(len(times))
+        if len(times) == 0:
+            raise Infeasible(self.no_room(1))
+        free = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target)
+        least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
+        if not np.isfinite(least):
+            raise Infeasible(self.no_room(1))
+        found = self._best(times, plain, straight, FURTHER_TURNS)
+        if (found is None or found.cost > least * (1.0 + 1e-6)) and not straight:
+            some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
+            beside = np.repeat(times[some], len(ASIDE)), (ASIDE * free.cost[some, None]).ravel()
+            other = self._best(*beside, straight, FURTHER_BESIDE)
+            if other is not None and (found is None or other.cost < found.cost * (1.0 - EQUAL)):
+                found = other
+        if found is None:
+            raise Infeasible(self.no_room(1))
+        point = _descend(
+            lambda points: self._costs(points[:, 0], points[:, 1], found.further, straight)[0],
+            np.array([found.moment, found.aside]),
+            self._steps(0.0 if straight else 0.02 * found.jumps),
+        )
+        _, second, jumps = self._costs(point[:1], point[1:], found.further, straight)
+        return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
+
+    def _steps(self, aside: float) -> Vector:
+        return np.array([self.spacecraft.inertial_period / SPIN_SAMPLES, aside])
+
+    def _costs(
+        self, times: Vector, aside: Vector, further: int, straight: bool
+    ) -> tuple[Vector, Vector, precession.TwoJumps]:
+        """Impulse (n,) of first pulses at ``times`` (n,) s, infinite where not allowed; moment of the second."""
+        jumps = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target, aside, straight)
+        second = times + jumps.wait + further * jumps.turn
+        long, longer = self.on_times(jumps.first), self.on_times(jumps.second)
+        ready = times + 0.5 * long + self.spacecraft.limits.gap
+        allowed = self.windows.allowed(times - 0.5 * long, long, self.spacecraft.limits.earliest)
+        allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
+        if self.torquer.torque is not None:
+            # Widths are corrected on both pulses: both must be there, and not do the same a whole turn apart.
+            allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
+            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART
+        spent = self.spent(jumps.first) + self.spent(jumps.second)
+        return np.where(allowed, spent, np.inf), second, jumps
+
+    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Found | None:
+        """The cheapest choice with up to ``most`` further turns, of equal ones that which ends first."""
+        best: _Found | None = None
+        for further in range(most):
+            costs, second, jumps = self._costs(times, aside, further, straight)
+            least = float(costs.min())
+            if np.isfinite(least) and (best is None or least < best.cost * (1.0 - EQUAL)):
+                near = np.flatnonzero(costs <= least * (1.0 + EQUAL))
+                index = near[np.argmin(second[near])]
+                size = float(jumps.cost[index])
+                best = _Found(least, float(times[index]), float(aside[index]), further, size)
+            if not (second < self.windows.horizon).any() or (best is not None and not self.spacecraft.limits.blackout):
+                break
+        return best
+
+    def no_room(self, cones: int) -> str:
+        """Why no pulse could be placed."""
+        torque, spin, horizon = self.torquer.torque, abs(self.spacecraft.spin), self.windows.horizon
+        if torque is not None:
+            once = 2.0 * torque / spin
+            axes = self.axes(self.moments()[:SPIN_SAMPLES])
+            if len(axes) == 0:
+                return "no time is left between limits.earliest and limits.horizon"
+            if cones == 1:
+                sizes = precession.two_jumps(self.A, self.h, self.momentum, axes, self.target)
+                needed = float(np.maximum(sizes.first, sizes.second).min())
+            else:
+                middle, _ = precession.half_cone(self.h, axes, self.target, cones)
+                needed = float(np.linalg.norm(middle - self.momentum, axis=1).min())
+            if needed > once:
+                return (
+                    f"one pulse turns H by {turn_of(self.spacecraft, once)} at most (2M/|ω3|, the torque being fixed "
+                    f"in the body), and {turn_of(self.spacecraft, needed)} are needed at once; half-cone with more "
+                    "cones or rhumb-line take less"
+                )
+        return (
+            f"the pulses of {cones} half cone{'s' if cones > 1 else ''} find no room within the {horizon:.4g} s up to "
+            "limits.horizon, the gap and the blackout windows"
+        )
+
+
+class _Found(NamedTuple):
+    cost: float
+    moment: float
+    aside: float
+    further: int
+    jumps: float
+
+
+def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> Vector:
+    """The least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass that narrows from ``steps`` (k,)."""
+    rose = np.vstack([np.diag(steps), -np.diag(steps)])
+    rose = rose[np.any(rose != 0.0, axis=1)]
+    best = float(cost(point[None, :])[0])
+    narrowed = 1.0
+    for _ in range(COMPASS_STEPS if len(rose) else 0):
+        if narrowed <= NARROWEST:
+            break
+        around = point + narrowed * rose
+        costs = cost(around)
+        index = int(np.argmin(costs))
+        if costs[index] < best * (1.0 - ROUNDING):
+            best, point = float(costs[index]), around[index]
+        else:
+            narrowed *= 0.5
+    return point
+
+
+DEAREST = 3.0
+"""Pairs that cost more than this times the floor are not looked at."""
+
+CLOSE_IN_COST = 1.02
+"""Among candidates within this factor of the cheapest the one that ends first is preferred."""
+
+SHORTLIST = 8
+"""Candidates that are flown and corrected, at most."""
+
+BODY_SAMPLES = 96
+"""Moments looked at in each turn of the body."""
+
+BODY_TURNS = 24
+"""Turns of the body within which the first pulse comes, at most."""
+
+FURTHER = 60
+"""Further whole turns of the spin axis that the second pulse may wait for, at most."""
+
+PAIR = 5e-5
+"""Units of `work` of each moment of each pair of channels."""
+
+ON_CONE = 1e-3
+"""Share of its natural size below which the first jump counts as nothing."""
+
+BESIDE = 0.05
+"""How far beside the target, as a share of the angles at hand, a search goes that would find nothing on it."""
+
+
+def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
+    """The two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
+
+    Raises Infeasible with the reason.
+    """
+    most = spacecraft.limits.max_pulses
+    if most is not None and most < 2:
+        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
+    torquer = spacecraft.torquer
+    if torquer is not None:
+        made = Schedule(SteerablePair(spacecraft, torquer).two(straight))
+        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
+            raise Infeasible(_off_limits())
+        if torquer.torque is not None or not model_of(spacecraft).exact:
+            made = correction.correct(spacecraft, made, chosen=range(len(made)), momentum=True)
+        return _checked(spacecraft, made)
+    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
+
+
+def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:
+    """The schedule, if it keeps the limits and comes near the target."""
+    if not keeps_limits(spacecraft, made.pulses):
+        raise Infeasible(_off_limits())
+    if not _left(spacecraft, made) <= tolerable(spacecraft):
+        raise Infeasible(_too_wide(spacecraft, made.pulses))
+    return made
+
+
+def _off_limits() -> str:
+    return "with commands on the ticks of limits.tick the two pulses touch another limit"
+
+
+def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
+    widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in pulses), default=0.0)
+    if widest == 0.0:
+        return "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
+    return (
+        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
+        "target; half-cone with more cones or rhumb-line take smaller ones"
+    )
+
+
+def _left(spacecraft: Spacecraft, made: Schedule) -> float:
+    return float(np.linalg.norm(correction.misses(spacecraft, made)))
+
+
+# --- body-fixed channels ---------------------------------------------------------------------------------------------
+
+
+class Candidate(NamedTuple):
+    """Two channels, the moments (s) at which ideal impulses of theirs acquire the target, and their on-times (s)."""
+
+    cost: float
+    end: float
+    channels: tuple[Channel, Channel]
+    timing: tuple[tuple[float, float], tuple[float, float]]
+
+
+def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
+    """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
+    search = _Search(spacecraft, channels)
+    candidates = sorted(search.all_candidates(), key=lambda found: found.cost)
+    if not candidates:
+        raise Infeasible(search.reason())
+    near = [one for one in candidates if one.cost <= candidates[0].cost * CLOSE_IN_COST]
+    near.sort(key=lambda found: found.end)
+    others = [one for one in candidates if one.cost > candidates[0].cost * CLOSE_IN_COST]
+    best, _ = correction.best_of(spacecraft, _tried(spacecraft, [*near[: SHORTLIST // 2], *others][:SHORTLIST]))
+    if best is None:
+        raise Infeasible(search.reason())
+    made = _checked(spacecraft, best)
+    floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
+    one, two = (pulse.channel for pulse in made)
+    note = f"{one} then {two} after {made.pulses[1].t - made.pulses[0].t:.4g} s"
+    return Schedule(made.pulses, (f"{note}; {made.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
+
+
+def _tried(spacecraft: Spacecraft, candidates: list[Candidate]) -> Iterator[tuple[Schedule, float]]:
+    """The candidates, corrected on the flown motion, with the residual (rad) that each leaves."""
+    for candidate in candidates:
+        made = correction.fired(spacecraft, candidate.channels, candidate.timing)
+        if spacecraft.limits.tick is None or keeps_limits(spacecraft, made.pulses):
+            made = correction.correct(spacecraft, made, chosen=(0, 1), momentum=True)
+            yield made, _left(spacecraft, made)
+
+
+Indices = NDArray[np.intp]
+
+
+class _Search:
+    """Pairs of channels and moments at which ideal impulses acquire the target."""
+
+    def __init__(self, spacecraft: Spacecraft, channels: list[Channel]) -> None:
+        self.spacecraft, self.channels, self.windows = spacecraft, channels, Windows(spacecraft)
+        inertia = spacecraft.inertia
+        self.A, self.h = inertia.A, inertia.C * abs(spacecraft.spin)
+        self.turning = inertia.a * spacecraft.spin
+        self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
+        self.floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
+        self.arc = Arc(inertia.A, inertia.C, 0.0, spacecraft.initial)
+        self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
+
+    def times(self) -> Vector:
+        """Moments (n,) s of the first pulse that are looked at."""
+        turn = 2.0 * math.pi / abs(self.spacecraft.spin)
+        first = self.spacecraft.limits.earliest
+        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
+        span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
+        times = np.unique(np.concatenate([end + span for end in ends]))
+        return np.asarray(times[times <= self.windows.horizon])
+
+    def after(self, channel: Channel, times: Vector) -> _After:
+        """What follows when ``channel`` fires at ``times`` (n,) s as much as it must."""
+        direction = channel.transverse / abs(channel.transverse)
+        _, quaternions = self.arc.motion(times)
+        push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
+        sense = math.copysign(1.0, self.spacecraft.spin)
+        axes = attitude.rotate(quaternions, np.array([0.0, 0.0, sense]))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            first = (self.h - self.momentum @ self.target) / (push @ self.target)
+            first = np.where((first >= 0.0) & (first <= DEAREST * self.floor), first, np.nan)
+            middle = self.momentum + first[:, None] * push
+            wait, turn = precession.coast(self.A, middle, axes, self.target)
+            jump = self.h * self.target - middle
+            # The attitude when the spin axis is on the target: about H, and about axis 3, as on any arc.
+            half = 0.5 * np.linalg.norm(middle, axis=1) / self.A * wait
+            unit = middle / np.linalg.norm(middle, axis=1)[:, None]
+            outer = np.concatenate([np.cos(half)[:, None], np.sin(half)[:, None] * unit], axis=1)
+            there = attitude.multiply(outer, quaternions)
+            back = attitude.rotate(attitude.conjugate(there), jump)
+            body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
+        return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
+
+    def all_candidates(self) -> list[Candidate]:
+        """Candidates for the target; where the first jump would be nothing, for targets beside it, to be corrected.
+
+        That is where the target lies on the cone of the spin axis itself.
+        """
+        wide = self.spacecraft.nutation + self.spacecraft.to_turn
+        if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
+            return self.candidates()
+        found, target = [], self.target
+        side = np.cross(self.momentum, target)
+        for beside in (side, np.cross(side, target)):
+            for sense in (1.0, -1.0):
+                moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
+                self.target = moved / float(np.linalg.norm(moved))
+                found += self.candidates()
+        self.target = target
+        return found
+
+    def candidates(self) -> list[Candidate]:
+        """The pairs that close and keep the limits, the cheapest of each first channel."""
+        times = self.times()
+        found: list[Candidate] = []
+        if len(times) < 2:
+            return found
+        adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / abs(self.spacecraft.spin) / BODY_SAMPLES
+        for one in self.channels:
+            if work.exhausted():
+                break
+            after = self.after(one, times)
+            promising = adjoining & (after.first + after.second <= DEAREST * self.floor)[:-1]
+            for further in range(FURTHER):
+                if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
+                    break
+                work.spend(PAIR * len(times) * len(self.channels))
+                needed = after.body * np.exp(-1j * self.turning * further * after.turn)
+                for two in self.channels:
+                    off = np.angle(needed * two.transverse.conjugate())
+                    near = np.abs(off) < 0.5 * math.pi
+                    crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
+                    found += self._placed(one, two, further, times, after, off, crosses)
+        return found
+
+    def _placed(
+        self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Indices
+    ) -> list[Candidate]:
+        """The pairs at the zeros of ``off`` behind the rows ``crosses``, as far as on-times and limits allow them."""
+        if len(crosses) == 0:
+            return []
+        here, there = off[crosses], off[crosses + 1]
+        share = np.where(here == there, 0.5, here / (here - there + (here == there)))
+
+        def at(values: Vector) -> Vector:
+            return np.asarray(values[crosses] + share * (values[crosses + 1] - values[crosses]))
+
+        first = at(times)
+        second = first + at(after.wait) + further * at(after.turn)
+        long, longer = self._on_times(one, at(after.first)), self._on_times(two, at(after.second))
+        self.within_reach = True
+        ready = first + 0.5 * long + self.spacecraft.limits.gap
+        allowed = self.windows.allowed(first - 0.5 * long, long, self.spacecraft.limits.earliest)
+        allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
+        known = all(channel.mass_flow is not None for channel in self.channels)
+        prices = [channel.cost_rate(by_propellant=known) for channel in (one, two)]
+        made = []
+        for row in np.flatnonzero(allowed):
+            timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
+            cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
+            made.append(Candidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
+        return sorted(made, key=lambda candidate: candidate.cost)[:SHORTLIST]
+
+    def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
+        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number where it cannot."""
+        on_times = precession.on_times_to_turn(jumps, abs(channel.transverse), self.spacecraft.spin)
+        outside = (on_times < channel.min_on_time) | (on_times > channel.max_on_time)
+        return np.where(outside, np.nan, on_times)
+
+    def reason(self) -> str:
+        """Why there is no candidate."""
+        names = ", ".join(channel.name for channel in self.channels)
+        strongest = max(
+            precession.reach(abs(one.transverse), self.spacecraft.spin, one.max_on_time) for one in self.channels
+        )
+        if 2.0 * strongest < self.floor:
+            return (
+                f"one pulse turns H by {turn_of(self.spacecraft, strongest)} at most, and two together would have to "
+                f"by {turn_of(self.spacecraft, self.floor)}; half-cone with more cones or rhumb-line take smaller ones"
+            )
+        if self.within_reach:
+            return (
+                f"pairs of the channels ({names}) acquire the target, but not within on-times, gap, blackout windows "
+                f"and the {self.windows.horizon:.4g} s up to limits.horizon"
+            )
+        return (
+            f"no two of the channels ({names}) push in the right directions, one after the other, in the "
+            f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, a steerable torquer or rhumb-line "
+            "can help"
+        )
+
+
+class _After(NamedTuple):
+    """After a first jump of size ``first``: the second, N m s, the wait and one more turn, s; (n,) each.
+
+    ``body`` (n,) is the second jump in body axes, J1 + iJ2, at the end of the plain wait.
+    """
+
+    first: Vector
+    second: Vector
+    wait: Vector
+    turn: Vector
+    body: NDArray[np.complex128]

@@ -1,0 +1,500 @@
+"""A schedule laid pulse by pulse along the closed-form motion; what the body-fixed schemes share.
+
+The body that schemes plan on: symmetric, and moving as the true one does at small angles.
+
+Three different moments turn in the body at another rate than their mean, on an ellipse instead of a circle; lasting
+disturbances move the point about which ω turns. Both are taken out here, so that every scheme plans free motion of
+a symmetric body, and put back in: the schedule is translated to the true actuators and corrected on the true motion.
+
+Why a scheme cannot work, and what it leaves, in words.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nutdamp.errors import Infeasible, TooShort, listed
+from nutdamp.physics import attitude, energy_sink, response
+from nutdamp.physics import body as rigid_body
+from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
+from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
+from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
+
+ALIGNED = 1e-9
+"""Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
+
+MISSED = 50
+"""Alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready."""
+
+MOST_PULSES = 2000
+"""Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
+
+
+CORRECTED = 1e-4
+"""Share of A|ω0| that is left to correction under dissipation: `rates.width_factor` knows it at small angles only."""
+
+
+class ImpulseBuilder:
+    """The transverse rate as it will be, and the pulses chosen so far.
+
+    ``omega`` and ``spin`` (rad/s) hold just after the centre of the last pulse at ``now`` s; ``ready`` is the first
+    moment at which the next pulse may start.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
+        self.spacecraft = spacecraft
+        self.A, self.C, self.a = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.inertia.a
+        self.windows = Windows(spacecraft, endless=endless)
+        self.omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+        self.spin = spacecraft.spin
+        self.now = 0.0
+        self.ready = spacecraft.limits.earliest
+        self.pulses: list[Pulse] = []
+
+    @property
+    def left(self) -> float:
+        """Impulse in N m s that still has to be taken out: A|ω|."""
+        return self.A * abs(self.omega)
+
+    @property
+    def settled(self) -> bool:
+        """Whether what is left is rounding; under dissipation, what the last pulse can be corrected by."""
+        corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
+        return self.left <= max(1e-13 * self.C * abs(self.spin), corrected)
+
+    @property
+    def growing(self) -> bool:
+        """Whether the nutation grows by itself."""
+        return self.spacecraft.growth > 0.0
+
+    @property
+    def full(self) -> bool:
+        """Whether no more pulses are allowed."""
+        return len(self.pulses) >= self.most
+
+    @property
+    def most(self) -> int:
+        """Pulses that are allowed."""
+        most = self.spacecraft.limits.max_pulses
+        return MOST_PULSES if most is None else min(most, MOST_PULSES)
+
+    @property
+    def period(self) -> float:
+        """Nutation period in the body at the present spin, s; infinite for a sphere."""
+        rate = abs(self.a * self.spin)
+        return 2.0 * math.pi / rate if rate > 0.0 else math.inf
+
+    @property
+    def uniform(self) -> bool:
+        """Whether ω turns in the body at a constant rate between pulses."""
+        return not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
+
+    def _coast(self, time: float) -> tuple[complex, float]:
+        """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
+        since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
+        omega, spin, turned = self.omega, self.spin, since
+        if growth != 0.0:
+            found = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
+            omega, spin, turned = omega * found.transverse, spin * found.axial, found.turned
+        angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
+        return omega * cmath.exp(-1j * angle), spin + drift * since
+
+    def _sink(self) -> tuple[float, float, float]:
+        """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
+        axial, across = (self.C * self.spin) ** 2, (self.A * abs(self.omega)) ** 2
+        size = axial + across
+        if size == 0.0:
+            return self.spacecraft.growth, 1.0, 0.0
+        return self.spacecraft.growth, math.sqrt(axial / size), across / size
+
+    def _turned(self, time: float) -> float:
+        """How long, s, the present spin takes to turn the body as far as it turns from now to ``time`` s."""
+        since = time - self.now
+        return since if self.spacecraft.growth == 0.0 else energy_sink.course(*self._sink(), since).turned
+
+    def _when(self, turned: float) -> float:
+        """The moment at which `_turned` is ``turned`` s."""
+        return self.now + (turned if self.spacecraft.growth == 0.0 else energy_sink.time_to_turn(*self._sink(), turned))
+
+    def omega_at(self, time: float) -> complex:
+        """ω at ``time`` s if nothing more is fired."""
+        free, _ = self._coast(time)
+        if not self.spacecraft.disturbances:
+            return free
+        since = time - self.now
+        return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)
+
+    def _driven(self, disturbance: Disturbance, since: float) -> complex:
+        """What a turning disturbance has added to ω since the last pulse (`forced.rotating_torques` for one)."""
+        if disturbance.transverse == 0.0:
+            return 0.0 + 0.0j
+        torque = disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)
+        driven = response.rotating_torques(
+            np.array([since]), 0.0, self.spin, self.A, self.C, np.array([torque]), np.array([disturbance.rate])
+        )
+        return complex(driven[0])
+
+    def acts(self, pulse: Pulse) -> complex:
+        """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
+        axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
+        _, spin = self._coast(pulse.start)
+        factor = response.width_factor(
+            self.a,
+            spin,
+            axial / self.C,
+            pulse.on_time,
+            growth=self.spacecraft.growth,
+            drift=self.spacecraft.spin_drift,
+        )
+        return complex(pulse.impulse[0], pulse.impulse[1]) * factor
+
+    def left_after(self, pulse: Pulse) -> float:
+        """What would be left, N m s, if ``pulse`` were fired next."""
+        return abs(self.A * self.omega_at(pulse.t) + self.acts(pulse))
+
+    def helps(self, pulse: Pulse) -> bool:
+        """Whether less is left with ``pulse`` than without."""
+        return self.left_after(pulse) < abs(self.A * self.omega_at(pulse.t))
+
+    def fire(self, pulse: Pulse) -> None:
+        """Take ``pulse`` into the schedule."""
+        omega, (_, spin) = self.omega_at(pulse.t) + self.acts(pulse) / self.A, self._coast(pulse.t)
+        self.omega, self.spin = omega, spin + float(pulse.impulse[2]) / self.C
+        self.now = pulse.t
+        self.ready = pulse.end + self.spacecraft.limits.gap
+        self.pulses.append(pulse)
+
+    def schedule(self) -> Schedule:
+        """What has been chosen."""
+        cut = f"ends after {MOST_PULSES} pulses, the most that are planned; a longer max_on_time helps"
+        return Schedule(tuple(self.pulses), (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else ())
+
+    def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
+        """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
+        spin_rate = channel.axial / self.C
+        return response.on_time_for(impulse, abs(channel.transverse), self.a, self.spin, spin_rate, longest)
+
+    def align(self, channel: Channel, on_time: float) -> Pulse | None:
+        """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
+        on_time = self.windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
+        probe = channel_pulse(channel, self.now, on_time)
+        turn = rigid_body.phase_to_oppose(self.omega, self.acts(probe))
+        if math.isinf(self.period):
+            start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
+            return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
+        first = turn / (self.a * self.spin)  # and the times below: as long as it takes at the present spin
+        # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
+        slack = min(TOUCHING, 1e-3 * on_time) if self.pulses else 0.0
+
+        def alignment(ready: float) -> float:
+            """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
+            return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
+
+        turns = alignment(self.ready)
+        for _ in range(len(self.windows.limits.blackout) + MISSED):
+            centre = self._when(first + turns * self.period)
+            if math.isinf(centre):  # dissipation stops the spin before
+                return None
+            if not self.uniform:
+                centre = self._opposed_near(channel, centre, on_time)
+            start = centre - 0.5 * on_time
+            if self.windows.limits.tick is not None:
+                start = self.windows.nearest_tick(start)
+                centre = start + 0.5 * on_time
+            free = self.windows.blocked_until(start, on_time)
+            later = not self.pulses or centre > self.now  # also where the clock cannot tell so short a time
+            if start >= self.ready - slack and later and free is None:
+                allowed = self.windows.allows(start, on_time, self.ready)
+                return channel_pulse(channel, centre, on_time) if allowed else None
+            # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
+            turns = max(turns + 1, alignment(self.ready if free is None else free))
+        return None
+
+    def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
+        """Moment near ``centre`` at which ω opposes the pulse where it does not turn evenly.
+
+        Each step mends the angle still missing, by the rate at which ω turns there.
+        """
+        for _ in range(20):
+            turn = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
+            _, spin = self._coast(centre)
+            centre += turn / (self.a * (spin or self.spin))
+            if abs(turn) < ALIGNED:
+                break
+        return centre
+
+    def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
+        """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
+        if steerable.torque is None:
+            start = self.windows.earliest_start(0.0, self.ready)
+            if start is None:
+                return None
+            return steerable_pulse(steerable, start, cmath.phase(-self.omega_at(start)), impulse=impulse)
+        needed = response.on_time_for(impulse, steerable.torque, self.a, self.spin, 0.0, math.inf)
+        if needed is None:
+            return None
+        on_time = self.windows.on_time(needed, 0.0, math.inf)
+        start = self.windows.earliest_start(on_time, self.ready)
+        if start is None:
+            return None
+        centre = start + 0.5 * on_time
+        angle = cmath.phase(-self.omega_at(centre))
+        return steerable_pulse(steerable, centre, angle, on_time=on_time)
+
+
+FADED = 1e-6
+"""Share of the nutation below which there is nothing left for pulses to do: dissipation has taken it out before."""
+
+
+def no_channels(spacecraft: Spacecraft) -> str:
+    """No body-fixed channel can damp."""
+    if any(channel.damps for channel in spacecraft.channels):
+        ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
+        time = spacecraft.horizon - spacecraft.limits.earliest
+        if time <= 0.0:  # by the file, or where other pulses of the scheme come first
+            return "limits.earliest, or the pulses before, leave no time within limits.horizon"
+        return (
+            f"no channel can be on for as long as its min_on_time requires{ticks}, at most for its max_on_time, within "
+            f"the {time:.4g} s from limits.earliest to limits.horizon"
+        )
+    if spacecraft.channels:
+        return "no channel has a torque more transverse than axial, so none can damp a nutation"
+    return "the file names no thrusters, and this scheme fires body-fixed ones"
+
+
+def bounded_by(spacecraft: Spacecraft) -> str:
+    """The limits that a schedule of its channels has to keep, by name: the horizon, and those that the file sets."""
+    limits, channels = spacecraft.limits, spacecraft.channels
+    there = {
+        "on-times": any(one.min_on_time > 0.0 or math.isfinite(one.max_on_time) for one in channels),
+        "gap": limits.gap > 0.0,
+        "ticks": limits.tick is not None,
+        "blackout windows": bool(limits.blackout),
+    }
+    names = [f"the horizon of {spacecraft.horizon:.4g} s", *(name for name in there if there[name])]
+    return listed(names)
+
+
+def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
+    """The ``channels`` that can damp; raises Infeasible where there are none."""
+    if not channels:
+        raise Infeasible(no_channels(spacecraft))
+    return channels
+
+
+def expect_aim(spacecraft: Spacecraft) -> None:
+    """Raises Infeasible without a target to which a scheme could turn the spin axis, or without what could do it."""
+    if spacecraft.goal.axis is None:
+        raise Infeasible("needs a target axis: --target, or goal in the file")
+    if spacecraft.torquer is None:
+        at_hand(spacecraft, usable(spacecraft))
+
+
+def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
+    """That no channel can be fired against ω within the limits, with the cure."""
+    omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+    if spacecraft.inertia.a == 0.0:
+        off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
+        nearest = min(off, key=lambda name: off[name])
+        return Infeasible(
+            "in a sphere (a = 0) ω does not turn in the body, so waiting brings no channel to oppose it; "
+            f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
+        )
+    builder = ImpulseBuilder(spacecraft, endless=True)
+    pulses = [builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period)) for channel in channels]
+    there = [pulse for pulse in pulses if pulse is not None]
+    if not there:
+        flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
+        return Infeasible(f"no channel ever opposes the nutation{flat * builder.growing}")
+    by_name = {channel.name: channel for channel in channels}
+    ends = [_end(builder, by_name[pulse.channel], pulse) for pulse in there if builder.helps(pulse)]
+    if not ends:
+        best = min(there, key=builder.left_after)
+        left = builder.A * abs(builder.omega_at(best.t))
+        if left < FADED * builder.left:
+            return Infeasible(
+                f"dissipation takes the nutation out before a channel comes to oppose it, at {best.t:.4g} s"
+            )
+        return Infeasible(
+            f"every channel's shortest pulse is too strong: there are {turn_of(spacecraft, left)} of nutation, and "
+            f"firing would leave {turn_of(spacecraft, builder.left_after(best))}; lower min_on_time"
+        )
+    if min(ends) <= spacecraft.horizon:
+        return Infeasible("channels oppose the nutation within the horizon, but the pulses planned increase it")
+    return TooShort(
+        f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
+        f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
+    )
+
+
+def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left: float) -> str:
+    """That trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
+    ratio = spacecraft.inertia.C / (spacecraft.inertia.A * per_turn)
+    off, least = abs(ratio - round(ratio)), math.degrees(left)
+    if off * most >= 1.0:
+        return (
+            f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
+            f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+        )
+    return (
+        f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
+        f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
+        f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
+    )
+
+
+def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
+    """By how many degrees an ``impulse`` across the spin axis, N m s, turns H; of A|ω|, the nutation."""
+    return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"
+
+
+def _end(builder: ImpulseBuilder, channel: Channel, shortest: Pulse) -> float:
+    """End in s of the first pulse of a channel that is as long as it takes; of the ``shortest`` where none has room."""
+    needed = builder.on_time_for(channel, builder.left)
+    most = longest_useful(channel.max_on_time, builder.period)
+    pulse = builder.align(channel, most if needed is None else min(needed, most))
+    return shortest.end if pulse is None else max(pulse.end, shortest.end)
+
+
+@dataclass(frozen=True, eq=False)
+class SymmetricModel:
+    """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1, ω2) to the circle."""
+
+    spacecraft: Spacecraft
+    body: Spacecraft
+    stretch: Vector
+
+    @property
+    def exact(self) -> bool:
+        """Whether the model moves as the spacecraft does, so that nothing has to be corrected."""
+        return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
+
+    def translate(self, made: Schedule) -> Schedule:
+        """The schedule with the true actuators."""
+        if self.spacecraft.inertia.symmetric:
+            return made
+        channels = {channel.name: channel for channel in self.spacecraft.channels}
+        windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
+        for pulse in made:
+            channel = channels.get(pulse.channel)
+            if channel is None:
+                pulses.append(self._steered(pulse, windows, ready))
+            else:
+                pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
+            ready = pulses[-1].end + self.spacecraft.limits.gap
+        return Schedule(tuple(pulses), made.notes, made.bounds)
+
+    def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
+        """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
+        torquer = self.spacecraft.torquer
+        assert torquer is not None
+        first, second = pulse.impulse[:2] / self.stretch
+        impulse, angle = math.hypot(first, second), math.atan2(second, first)
+        if torquer.torque is None:
+            return steerable_pulse(torquer, pulse.t, angle, impulse=impulse)
+        on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
+        start = windows.earliest_start(on_time, max(pulse.start, ready))
+        t = pulse.t if start is None else start + 0.5 * on_time
+        return steerable_pulse(torquer, t, angle, on_time=on_time)
+
+
+def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:
+    """The model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself.
+
+    Its torques change ω as the true ones do; ``turning``: they turn H as the true ones do, and ω at t = 0 is as much
+    larger or smaller on average, as the circle may be of any size.
+    """
+    undisturbed = _without_steady(spacecraft)
+    inertia = spacecraft.inertia
+    if inertia.symmetric:
+        return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
+    from nutdamp.physics import triaxial  # a body of three moments needs it, and few plans are of one
+
+    first, second, C = inertia.moments
+    # a ω3 is the true nutation rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
+    A = C / (1.0 - triaxial.body_nutation_rate(inertia.moments, 1.0))
+    circle = (first * (first - C) / (second * (second - C))) ** 0.25
+    scale = np.array([circle, 1.0 / circle])
+    stretch = scale * A / np.array([first, second])  # for torques and impulses
+    size = float(np.mean(stretch)) if turning else 1.0
+    body = replace(
+        undisturbed,
+        inertia=Inertia((A, A, C), inertia.axes),
+        omega0=np.array([*(scale * undisturbed.omega0[:2] / size), undisturbed.omega0[2]]),
+        channels=tuple(_stretched(channel, stretch if not turning else np.ones(2)) for channel in undisturbed.channels),
+        steerable=_stretched_torquer(undisturbed.steerable, stretch),
+        limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
+    )
+    return SymmetricModel(spacecraft, _aimed(body, spacecraft), stretch)
+
+
+def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
+    """The ``body`` with the attitude of the ``spacecraft``, and the target axis as far from its H as the true one is.
+
+    Both have other rates, and so another H; what a plan has to do is the turn from H to the target.
+    """
+    if spacecraft.goal.axis is None or body is spacecraft:
+        return body
+    quaternion = spacecraft.initial.quaternion
+    given = spacecraft.attitude or Attitude(quaternion)
+    in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
+    held = replace(body, attitude=replace(given, quaternion=in_file_axes))
+    before, after = (one / float(np.linalg.norm(one)) for one in (spacecraft.momentum, held.momentum))
+    # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
+    middle = (before + after) / float(np.linalg.norm(before + after))
+    axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
+    return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
+
+
+def _stretched(channel: Channel, stretch: Vector) -> Channel:
+    def thruster(one: Thruster) -> Thruster:
+        return replace(one, torque=one.torque * np.array([*stretch, 1.0]))
+
+    return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters), spends=channel.strength)
+
+
+def _stretched_torquer(torquer: Steerable | None, stretch: Vector) -> Steerable | None:
+    """The stretch differs by direction; its mean is near enough for a plan that is corrected."""
+    if torquer is None or torquer.torque is None:
+        return torquer
+    return replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
+
+
+def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
+    """The spacecraft with ω counted from the steady response to its disturbances, which are then taken out.
+
+    Axial disturbances stay, and transverse ones too slow against the nutation to be steady within the horizon.
+    """
+    if not spacecraft.disturbances:
+        return spacecraft
+    steady = steady_omega(spacecraft, 0.0)
+    left = tuple(
+        replace(one, transverse=0.0 + 0.0j) if settles(spacecraft, one) else one for one in spacecraft.disturbances
+    )
+    omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
+    return replace(spacecraft, omega0=omega0, disturbances=tuple(one for one in left if one.axial or one.transverse))
+
+
+def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
+    """Whether ω beats against the disturbance at least once within the horizon: else it is resonant for the plan."""
+    detuning = abs(spacecraft.inertia.a * spacecraft.spin + disturbance.rate)
+    return detuning * spacecraft.horizon > 2.0 * math.pi
+
+
+def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
+    """ω of the steady response to the disturbances that settle, at ``time`` s: nothing is to be damped about it."""
+    inertia = spacecraft.inertia
+    return sum(
+        (
+            response.steady_response(inertia.A, inertia.C, spacecraft.spin, one.transverse, one.rate)
+            * complex(math.cos(one.rate * time), math.sin(one.rate * time))
+            for one in spacecraft.disturbances
+            if one.transverse and settles(spacecraft, one)
+        ),
+        0.0 + 0.0j,
+    )

@@ -1,1 +1,0 @@
-"""What the schemes share: models, builders of schedules, searches, and reasons."""

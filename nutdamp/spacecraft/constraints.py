@@ -1,0 +1,349 @@
+"""All that a schedule must keep: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
+
+`Windows` says when a pulse may be on; `breaches` judges whole schedules, for the schemes and for the judge alike. It
+gives data; `nutdamp.planning.decision` has the words.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from enum import Enum
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp.spacecraft.equipment import Channel, Commands
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, on_command, touching
+
+OFF_TICK = 1e-6
+"""Share of a tick by which starts and on-times may be off their ticks: the rounding of files."""
+
+
+class Windows:
+    """The limits of one spacecraft, for one pulse at a time."""
+
+    def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
+        """``endless`` drops the horizon, to tell what a longer one would allow."""
+        self.limits = spacecraft.limits
+        self.horizon = math.inf if endless else spacecraft.horizon
+
+    def blocked_until(self, start: float, on_time: float) -> float | None:
+        """End of the first blackout window that the pulse would touch; None where it is free."""
+        if not self.limits.blackout:
+            return None
+        begins, over = self.dark
+        # The first window that is not over when the pulse starts is the only one that it can touch first.
+        slack = touching(start + on_time)
+        following = int(np.searchsorted(over, start + slack, side="right"))
+        touched = following < len(over) and start + on_time > begins[following] + slack
+        return float(over[following]) if touched else None
+
+    def allows(self, start: float, on_time: float, ready: float) -> bool:
+        """Whether a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
+        slack = touching(start + on_time)
+        return (
+            start >= ready - slack
+            and start + on_time <= self.horizon + slack
+            and self.blocked_until(start, on_time) is None
+        )
+
+    def allowed(self, starts: Vector, on_times: Vector, ready: Vector | float) -> NDArray[np.bool_]:
+        """`allows` for many pulses at once, (n,) each; a pulse whose on-time is not a number is not allowed."""
+        ends = starts + on_times
+        with np.errstate(invalid="ignore"):
+            slack = np.maximum(TOUCHING, np.spacing(ends))  # `touching`
+        free = (starts >= np.maximum(ready, 0.0) - slack) & (ends <= self.horizon + slack)
+        if self.limits.blackout:
+            free &= ~self.blocked(starts, ends, slack)
+        return np.asarray(free)
+
+    @cached_property
+    def dark(self) -> tuple[Vector, Vector]:
+        """Begins and ends of the blackout windows, s, in order, those that overlap as one."""
+        merged: list[list[float]] = []
+        for begins, ends in sorted(self.limits.blackout):
+            if merged and begins < merged[-1][1]:
+                merged[-1][1] = max(merged[-1][1], ends)
+            else:
+                merged.append([begins, ends])
+        return np.array([one for one, _ in merged]), np.array([other for _, other in merged])
+
+    def blocked(self, starts: Vector, ends: Vector, slack: Vector | float = 0.0) -> NDArray[np.bool_]:
+        """Whether what lasts from ``starts`` to ``ends`` (n,) s is in a blackout window for more than ``slack`` s."""
+        begins, over = self.dark
+        # The first window that is not over at the start is the only one that can be met first.
+        following = np.searchsorted(over, starts + slack, side="right")
+        return np.asarray(ends > np.append(begins, np.inf)[following] + slack)
+
+    def earliest_start(self, on_time: float, ready: float) -> float | None:
+        """First allowed start, s, on a tick; None where the horizon comes first."""
+        start = self.tick_after(ready)
+        for _ in range(len(self.limits.blackout)):  # none blocks twice
+            free = self.blocked_until(start, on_time)
+            if free is None:
+                break
+            start = self.tick_after(free)
+        return start if self.allows(start, on_time, ready) else None
+
+    def nearest_tick(self, time: float) -> float:
+        """``time`` rounded to the resolution of commands."""
+        tick = self.limits.tick
+        return time if tick is None else round(time / tick) * tick
+
+    def nearest_ticks(self, times: Vector) -> Vector:
+        """`nearest_tick` of many times (n,)."""
+        tick = self.limits.tick
+        return times if tick is None else np.rint(times / tick) * tick
+
+    def tick_after(self, time: float) -> float:
+        """First commandable time not before ``time``, but for rounding."""
+        tick = self.limits.tick
+        return time if tick is None else math.ceil((time - 0.5 * TOUCHING) / tick) * tick
+
+    def ticks_after(self, times: Vector) -> Vector:
+        """`tick_after` of many times (n,)."""
+        tick = self.limits.tick
+        return times if tick is None else np.ceil((times - 0.5 * TOUCHING) / tick) * tick
+
+    def on_time(self, needed: float, shortest: float, longest: float) -> float:
+        """Commandable on-time nearest to ``needed`` s within the bounds, and not zero."""
+        tick = self.limits.tick
+        if tick is None:
+            return min(max(needed, shortest), longest)
+        least = max(math.ceil((shortest - TOUCHING) / tick), 1)
+        most = math.inf if math.isinf(longest) else math.floor((longest + TOUCHING) / tick)
+        return float(min(max(round(needed / tick), least), most)) * tick
+
+
+def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[tuple[float, float]]:
+    """When pulses may be on, (begin, end) s in order: from the earliest start to the horizon, blackout left out.
+
+    ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a moment free between
+    them.
+    """
+    limits, until = spacecraft.limits, spacecraft.horizon if horizon is None else horizon
+    now = limits.earliest
+    free: list[tuple[float, float]] = []
+    for dark, light in sorted(limits.blackout):
+        if now >= until:
+            return free
+        if dark >= now:
+            free.append((now, min(dark, until)))
+        now = max(now, light)
+    return [*free, (now, max(now, until))] if now < until or not limits.blackout else free
+
+
+def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, float]]:
+    """(begin, end) s between which each of the ``pulses``, in order, may move; the room between two is halved."""
+    limits, ready, bounds = spacecraft.limits, spacecraft.limits.earliest, []
+    begins, over = (part.tolist() for part in Windows(spacecraft).dark)
+    for pulse in pulses:
+        before, after = bisect_right(over, pulse.start + TOUCHING), bisect_left(begins, pulse.end - TOUCHING)
+        bounds.append([max([ready, *over[:before][-1:]]), min([spacecraft.horizon, *begins[after:][:1]])])
+        ready = pulse.end + limits.gap
+    for index in range(len(bounds) - 1):
+        off, on = pulses[index].end, pulses[index + 1].start
+        half = 0.5 * max(on - off - limits.gap, 0.0)
+        bounds[index][1] = min(bounds[index][1], off + half)
+        bounds[index + 1][0] = max(bounds[index + 1][0], on - half)
+    return [(begun, latest) for begun, latest in bounds]
+
+
+def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
+    """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time.
+
+    One whose torques cancel is none of them.
+    """
+    time = spacecraft.horizon - spacecraft.limits.earliest
+
+    def has_on_time(channel: Channel) -> bool:
+        return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
+
+    turning = [one for one in spacecraft.channels if one.damps or (axial and one.torque.any())]
+    return [channel for channel in turning if has_on_time(channel)]
+
+
+def commandable_widths(commands: Commands, channel: Channel) -> Vector:
+    """Widths (n,) s that a command block of a channel may have: those that give thrust."""
+    widths = commands.widths
+    widths = widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
+    return (
+        widths if channel.valve is None else widths[[effective_on_time(channel, one) > 0.0 for one in widths.tolist()]]
+    )
+
+
+def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
+    """What a start and an on-time half a tick off leave of each pulse, rad, as chance adds them up; without ticks 0."""
+    body, half = spacecraft, 0.5 * (spacecraft.limits.tick or 0.0)
+    rate, size = max(1.0, abs(body.inertia.a)) * abs(body.spin), body.inertia.C * abs(body.spin)
+    lengths = ((one.magnitude, 1.0 / one.on_time if one.on_time > 0.0 else 0.0) for one in pulses)
+    return [half * magnitude * math.hypot(share, rate) / size for magnitude, share in lengths]
+
+
+def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
+    """Shortest on-time that can be commanded, s: the min_on_time, on ticks rounded up to one and not less than one."""
+    tick = spacecraft.limits.tick
+    return channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - TOUCHING) / tick), 1) * tick
+
+
+def longest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
+    """Longest useful on-time of a channel, s: see `longest_useful`, which is for torques across the spin axis."""
+    longest = effective_on_times(channel)[1]
+    return longest_useful(longest, spacecraft.body_period) if channel.damps else longest
+
+
+def effective_on_times(channel: Channel) -> tuple[float, float]:
+    """Bounds (s) of the pulses that a channel can give, in effective on-times: without a valve those commanded."""
+    return effective_on_time(channel, channel.min_on_time), effective_on_time(channel, channel.max_on_time)
+
+
+def effective_on_time(channel: Channel, on_time: float) -> float:
+    """Time (s) of full thrust that a command of ``on_time`` s acts for: its impulse over the torque.
+
+    An ``on_time`` of 0 is the shortest there is: a valve that closes later than it opens gives thrust for a while.
+    """
+    valve = channel.valve
+    return on_time if valve is None or math.isinf(on_time) else valve.thrust(on_time or TOUCHING).on_time
+
+
+def longest_useful(max_on_time: float, period: float) -> float:
+    """Longest useful on-time, s: a torque across the spin axis works against itself after half a nutation ``period``.
+
+    That is the one in the body, s, at the spin with which the pulse begins.
+    """
+    return min(max_on_time, 0.5 * period)
+
+
+PAIRED = 24
+"""Directions about which channels are looked at in pairs."""
+
+
+def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
+    """`usable`, but of very many channels only the cheapest about each of `PAIRED` directions: pairs are many."""
+    channels = usable(spacecraft)
+    if len(channels) <= PAIRED:
+        return channels
+    cheapest: dict[int, Channel] = {}
+    for channel in sorted(channels, key=lambda one: (one.price, -abs(one.transverse))):
+        cheapest.setdefault(_about(channel), channel)
+    return [channel for channel in channels if cheapest.get(_about(channel)) is channel]
+
+
+def _about(channel: Channel) -> int:
+    """Number of the direction that a channel is about."""
+    return round(cmath.phase(channel.transverse) / (2.0 * math.pi) * PAIRED) % PAIRED
+
+
+def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
+    """The channel that fires the pulse; None for a steerable torquer."""
+    return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
+
+
+def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
+    """The pulse with start and on-time on the ticks of the commands."""
+    if spacecraft.limits.tick is None:
+        return pulse
+    windows, channel = Windows(spacecraft), channel_of(spacecraft, pulse)
+    bounds = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+    if channel is not None and pulse.command is not None:
+        start, on_time = pulse.loaded
+        return on_command(channel, windows.nearest_tick(start), windows.on_time(on_time, *bounds))
+    on_time = 0.0 if pulse.on_time == 0.0 else windows.on_time(pulse.on_time, *bounds)
+    t = windows.nearest_tick(pulse.start) + 0.5 * on_time
+    if channel is not None:
+        return channel_pulse(channel, t, on_time)
+    scale = 1.0 if pulse.on_time == 0.0 else on_time / pulse.on_time
+    propellant = None if pulse.propellant is None else pulse.propellant * scale
+    return replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, propellant=propellant)
+
+
+class Limit(Enum):
+    """What a schedule may break; ``limits.…`` are keys of the file."""
+
+    RESOLUTION = "resolution of times"
+    EARLIEST = "limits.earliest"
+    HORIZON = "limits.horizon"
+    GAP = "limits.gap"
+    BLACKOUT = "limits.blackout"
+    MIN_ON_TIME = "min_on_time"
+    MAX_ON_TIME = "max_on_time"
+    START_TICK = "limits.tick of starts"
+    ON_TIME_TICK = "limits.tick of on-times"
+    MAX_PULSES = "limits.max_pulses"
+
+
+class Breach(NamedTuple):
+    """A ``limit`` that the pulse with the ``number``, from 1, breaks: its ``bound`` s, exceeded ``by`` so many s.
+
+    For `Limit.MAX_PULSES` both count pulses, and the pulse is the last one. ``window``: the blackout window, s; the
+    pulse would have to end before its begin, the ``bound``, or to start after its end, whichever is nearer.
+    """
+
+    limit: Limit
+    number: int
+    pulse: Pulse
+    bound: float
+    by: float
+    window: tuple[float, float] | None = None
+
+
+def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach]:
+    """What ``pulses``, in order, break of the limits and on-times of the file, pulse by pulse.
+
+    What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything. Command blocks
+    have steps of their own, from a Sun pulse that comes on no tick: limits.tick is not theirs.
+    """
+    windows, previous_end, number = Windows(spacecraft), -math.inf, 0
+    if isinstance(pulses, Schedule) and pulses.blocks:
+        windows.limits = replace(windows.limits, tick=None)
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    for number, pulse in enumerate(pulses, start=1):
+        for limit, bound, by, allowed in _margins(windows, channels.get(pulse.channel), pulse, previous_end):
+            if by > allowed:
+                yield Breach(limit, number, pulse, bound, by)
+        start = pulse.loaded[0]
+        lasts = pulse.on_time if pulse.command is None else pulse.over - start
+        if windows.blocked_until(start, lasts) is not None:
+            for begins, ends in windows.limits.blackout:
+                by = min(ends - start, pulse.over - begins)
+                if by > touching(pulse.over):
+                    yield Breach(Limit.BLACKOUT, number, pulse, begins, by, (begins, ends))
+        previous_end = max(previous_end, pulse.over)
+    most = spacecraft.limits.max_pulses
+    if most is not None and number > most:
+        yield Breach(Limit.MAX_PULSES, number, pulse, most, number - most)
+
+
+def _margins(
+    windows: Windows, channel: Channel | None, pulse: Pulse, previous_end: float
+) -> Iterator[tuple[Limit, float, float, float]]:
+    """Each limit but the blackout windows with its bound, by how much a pulse exceeds it, and by how much it may; s.
+
+    Starts, on-times and ticks are those of the command; horizon and gap wait until its thrust is over too.
+    """
+    limits, slack = windows.limits, touching(pulse.over)
+    start, on_time = pulse.loaded
+    if on_time > 0.0:
+        coarsest = RESOLUTION * on_time
+        yield Limit.RESOLUTION, coarsest, math.ulp(pulse.over), coarsest
+    yield Limit.EARLIEST, limits.earliest, limits.earliest - start, 0.0 if start < 0.0 else slack
+    yield Limit.HORIZON, windows.horizon, pulse.over - windows.horizon, slack
+    yield Limit.GAP, limits.gap, previous_end + limits.gap - start, slack
+    if channel is not None:
+        yield Limit.MIN_ON_TIME, channel.min_on_time, channel.min_on_time - on_time, slack
+        yield Limit.MAX_ON_TIME, channel.max_on_time, on_time - channel.max_on_time, slack
+    if limits.tick is not None:
+        for limit, value in ((Limit.START_TICK, start), (Limit.ON_TIME_TICK, on_time)):
+            yield limit, limits.tick, abs(value - windows.nearest_tick(value)), slack + OFF_TICK * limits.tick
+
+
+def keeps_limits(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> bool:
+    """Whether ``pulses``, in order, break nothing: see `breaches`."""
+    return next(breaches(spacecraft, pulses), None) is None

@@ -1,0 +1,300 @@
+"""What a spacecraft can fire: thrusters, channels of them, and Magnus' steerable torquer. SI, in principal axes.
+
+What a spinner is commanded with: a Sun sensor that starts the clock of each spin, and blocks of pulses.
+
+A closed loop as the file describes it: the sensor, the law that fires by it, and faults to fly with. SI, rad.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Valve
+
+
+@dataclass(frozen=True, slots=True)
+class SunSensor:
+    """Gives a pulse in each spin, when the Sun passes its ``azimuth``: rad in the body, about axis 3 from axis 1.
+
+    It sees the Sun at most ``half_width`` rad from ``elevation``, which is counted from the plane square to axis 3
+    towards the spin axis. ``jitter`` s is one sigma of its pulses.
+    """
+
+    azimuth: float
+    elevation: float = 0.0
+    half_width: float = 0.5 * math.pi
+    jitter: float = 0.0
+
+    @property
+    def sees_all(self) -> bool:
+        """Whether no direction but those along the axis is out of its view, and so every passage of the Sun is seen."""
+        return self.elevation == 0.0 and self.half_width >= 0.5 * math.pi
+
+    def sees(self, sun_angle: Any) -> Any:
+        """Whether it sees the Sun at this angle (rad) from the spin axis; of arrays each."""
+        return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Commands:
+    """What a block may hold: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
+    ``max_count`` pulses, one in ``every`` so many spins.
+    """
+
+    delay_step: float
+    delay_max: float
+    widths: NDArray[np.float64]
+    max_count: int
+    every: tuple[int, ...]
+    width_step: float | None = None
+
+    def delay_counts(self, delay: float) -> int:
+        """Steps of a ``delay`` s."""
+        return round(delay / self.delay_step)
+
+    def width_counts(self, width: float) -> int:
+        """Steps of a ``width`` s; of widths that are a list the number of the entry next to it, 1 the shortest."""
+        if self.width_step is not None:
+            return round(width / self.width_step)
+        return 1 + int(np.abs(self.widths - width).argmin())
+
+    def delay_of(self, counts: float) -> float:
+        """The delay, s, of so many steps."""
+        return counts * self.delay_step
+
+    def width_of(self, counts: float) -> float | None:
+        """The width, s, of so many steps, or of that number in the list; None where the list has no such number."""
+        if self.width_step is not None:
+            return counts * self.width_step
+        return float(self.widths[int(counts) - 1]) if 1 <= counts <= len(self.widths) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """``count`` pulses of ``channel``, each ``width`` s long and begun ``delay`` s after a Sun pulse.
+
+    ``first`` is the number of the Sun pulse of the first one, 1 the first after t = 0; from then on every
+    ``every``-th Sun pulse fires one.
+    """
+
+    channel: str
+    first: int
+    delay: float
+    width: float
+    count: int
+    every: int = 1
+
+    @property
+    def sun_pulses(self) -> range:
+        """Numbers of the Sun pulses that fire it."""
+        return range(self.first, self.first + self.count * self.every, self.every)
+
+
+Vector = NDArray[np.float64]
+
+GYRO, ACCELEROMETER = "gyro", "accelerometer"
+"""Kinds of sensor: rate gyros about the body axes 1 and 2, or one accelerometer."""
+
+FOUR_PULSE, ONE_PULSE, BANG = "four-pulse", "one-pulse", "bang"
+"""Laws: pulses up to a length in proportion to what is left; one pulse for all that is left; pulses all alike."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensor:
+    """What the loop sees: ``scale`` times the truth plus ``bias``, with ``noise`` (one sigma), in steps.
+
+    ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an accelerometer, which is at
+    ``position`` (3,) m from the centre of mass and measures along the unit vector ``axis`` (3,), both in principal
+    axes. ``rate`` Hz is that of its samples, None is a continuous signal; ``delay`` s until a sample can be used;
+    ``low_pass`` s the time constant of a first-order filter over the samples, 0 is none. ``second`` is what the gyro
+    about axis 2 has as scale and bias, where that differs.
+    """
+
+    kind: str = GYRO
+    rate: float | None = None
+    quantisation: float = 0.0
+    noise: float = 0.0
+    bias: float = 0.0
+    scale: float = 1.0
+    delay: float = 0.0
+    low_pass: float = 0.0
+    position: Vector = field(default_factory=lambda: np.zeros(3))
+    axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    second: tuple[float, float] | None = None
+
+    @property
+    def scales(self) -> tuple[float, ...]:
+        """Scale of each column of the signal."""
+        return self._each(self.scale, 0)
+
+    @property
+    def biases(self) -> tuple[float, ...]:
+        """Bias of each column, rad/s or m/s²."""
+        return self._each(self.bias, 1)
+
+    def _each(self, value: float, which: int) -> tuple[float, ...]:
+        if self.kind == ACCELEROMETER:
+            return (value,)
+        return (value, value if self.second is None else self.second[which])
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """Fire by what ``sensor`` shows, from where the nutation reaches ``start`` rad until it is down to ``stop`` rad.
+
+    ``law`` is one of the names above; ``on_time`` s is the longest pulse of four-pulse (None: as the scheme) and every
+    pulse of bang. After a firing the sensor is not looked at for ``settle`` s, and the next one begins ``min_interval``
+    s later at the earliest. ``predict``: delay, filter and half the on-time are compensated. ``reversed``: channels
+    that in truth push the other way.
+    """
+
+    sensor: Sensor
+    law: str = FOUR_PULSE
+    start: float = 0.0
+    stop: float = 0.0
+    settle: float = 0.0
+    min_interval: float = 0.0
+    predict: bool = True
+    on_time: float | None = None
+    reversed: tuple[str, ...] = ()
+
+
+STANDARD_GRAVITY = 9.80665
+"""m/s², exact by definition (3rd CGPM, 1901); turns a specific impulse in seconds into m/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thruster:
+    """One thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
+
+    ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
+    ``valve`` is what it makes of commands; None gives full thrust from the start of a command to its end.
+    """
+
+    name: str
+    torque: Vector
+    force: Vector | None = None
+    thrust: float | None = None
+    isp: float | None = None
+    min_on_time: float = 0.0
+    max_on_time: float = math.inf
+    position: Vector | None = None
+    valve: Valve | None = None
+
+    @property
+    def mass_flow(self) -> float | None:
+        """Propellant flow in kg/s; None where thrust or specific impulse is not known."""
+        if self.thrust is None or self.isp is None:
+            return None
+        return self.thrust / (self.isp * STANDARD_GRAVITY)
+
+
+CANCELLED = 1e-12
+"""Share of the largest torque of its thrusters below which that of a channel is rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """Thrusters that fire together, as one body-fixed torque.
+
+    ``spends`` N m s is the impulse that a second of it counts for, where the torque is not the true one.
+    """
+
+    name: str
+    thrusters: tuple[Thruster, ...]
+    spends: float | None = None
+
+    def of(self, **changed: Any) -> Channel:
+        """The same of thrusters with these fields ``changed`` in each."""
+        return replace(self, thrusters=tuple(replace(one, **changed) for one in self.thrusters))
+
+    @property
+    def torque(self) -> Vector:
+        """Sum of the torques, (3,) N m; zero where they cancel, as of a pair for velocity changes, but for rounding."""
+        torques = np.array([thruster.torque for thruster in self.thrusters], dtype=np.float64)
+        total = torques.sum(axis=0)
+        return np.asarray(np.where(np.abs(total) > CANCELLED * np.abs(torques).max(), total, 0.0))
+
+    @property
+    def valve(self) -> Valve | None:
+        """That of its thrusters, which all have the same."""
+        return self.thrusters[0].valve
+
+    @property
+    def transverse(self) -> complex:
+        """M1 + i M2 in N m."""
+        torque = self.torque
+        return complex(torque[0], torque[1])
+
+    @property
+    def axial(self) -> float:
+        """M3 in N m, which changes the spin."""
+        return float(self.torque[2])
+
+    @property
+    def strength(self) -> float:
+        """Impulse that a second of it costs, N m s: the size of the torque."""
+        return float(np.linalg.norm(self.torque)) if self.spends is None else self.spends
+
+    @property
+    def damps(self) -> bool:
+        """Whether the torque is more transverse than axial; thrusters for the spin are left alone."""
+        return abs(self.transverse) > abs(self.axial)
+
+    @property
+    def min_on_time(self) -> float:
+        """Largest of the thrusters' minima, s."""
+        return max(thruster.min_on_time for thruster in self.thrusters)
+
+    @property
+    def max_on_time(self) -> float:
+        """Smallest of the thrusters' maxima, s."""
+        return min(thruster.max_on_time for thruster in self.thrusters)
+
+    @property
+    def mass_flow(self) -> float | None:
+        """Propellant flow of all thrusters in kg/s; None where one of them is not known."""
+        flows = [thruster.mass_flow for thruster in self.thrusters]
+        known = [flow for flow in flows if flow is not None]
+        return math.fsum(known) if len(known) == len(flows) else None
+
+    @property
+    def price(self) -> float:
+        """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
+        return self.cost_rate(by_propellant=True) / abs(self.transverse)
+
+    def cost_rate(self, *, by_propellant: bool) -> float:
+        """Propellant, kg/s, of firing; impulse, N m, where that is not known or not what counts."""
+        flow = self.mass_flow
+        return flow if by_propellant and flow is not None else self.strength
+
+    @property
+    def force(self) -> Vector | None:
+        """Sum of the forces in body axes, (3,) N; None where the direction of one is not known."""
+        known = [thruster.force for thruster in self.thrusters if thruster.force is not None]
+        return np.sum(known, axis=0) if len(known) == len(self.thrusters) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Steerable:
+    """Magnus' actuator: a torque about any transverse axis, body-fixed during one pulse.
+
+    ``torque`` in N m; None is an ideal impulse of no width.
+    """
+
+    torque: float | None = None
+    isp: float | None = None
+    lever_arm: float | None = None
+
+    @property
+    def propellant_per_impulse(self) -> float | None:
+        """kg for each N m s; None where specific impulse or lever arm is not known."""
+        if self.isp is None or self.lever_arm is None:
+            return None
+        return 1.0 / (self.lever_arm * self.isp * STANDARD_GRAVITY)

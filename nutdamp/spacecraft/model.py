@@ -1,0 +1,482 @@
+"""The spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement.
+
+Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan. ``Inertia.axes``
+leads back to the axes of the file, which is where vectors and quaternions are shown to people.
+
+What is demanded of a plan: what it reaches, and what it keeps on the way. SI and rad, in principal axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nutdamp import units
+from nutdamp.common import results
+from nutdamp.common.numerics import cleaned
+from nutdamp.common.time import DIGITS, Epoch
+from nutdamp.errors import BadRequest
+from nutdamp.physics import attitude
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics.body import Cones
+from nutdamp.physics.thruster import Cold as Cold
+from nutdamp.physics.thruster import Tank as Tank
+from nutdamp.physics.triaxial import arc_cones
+from nutdamp.spacecraft.equipment import Channel as Channel
+from nutdamp.spacecraft.equipment import Commands as Commands
+from nutdamp.spacecraft.equipment import Loop as Loop
+from nutdamp.spacecraft.equipment import Steerable as Steerable
+from nutdamp.spacecraft.equipment import SunSensor as SunSensor
+from nutdamp.spacecraft.equipment import Thruster as Thruster
+from nutdamp.spacecraft.tolerances import Dispersions
+
+Vector = NDArray[np.float64]
+
+SLACK = 1e-9
+"""rad by which a bound of `Keep` may be passed: rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
+
+    ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
+    """
+
+    nutation: float | None = None
+    momentum_shift: float | None = None
+    probability: float | None = None
+
+
+PROBABILITY = 0.997
+"""Share of cases that must comply where the requirement gives none."""
+
+
+def required_share(requirement: Requirement | None) -> float:
+    """Share of dispersed cases that must comply, 0 to 1."""
+    given = None if requirement is None else requirement.probability
+    return PROBABILITY if given is None else given
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Where the motion is to end, besides without nutation.
+
+    ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
+    where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
+    the inertial direction by which a train of pulses keeps its phase; None is along the great circle to ``axis``.
+    """
+
+    axis: Vector | None = None
+    spin: float | None = None
+    sun: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
+
+    ``horizon`` None means `Spacecraft.horizon`'s default.
+    """
+
+    horizon: float | None = None
+    earliest: float = 0.0
+    gap: float = 0.0
+    tick: float | None = None
+    max_pulses: int | None = None
+    blackout: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Keep:
+    """The spin axis is to stay from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,)."""
+
+    name: str
+    direction: Vector
+    least: float = 0.0
+    most: float = math.pi
+
+    def used(self, least: Any, largest: Any) -> Any:
+        """The share of a bound that is used up where the angles on the way are from ``least`` to ``largest`` rad.
+
+        1 or less is kept. Numbers, or arrays over cases.
+        """
+        near = (self.least - SLACK) / np.maximum(least, SLACK)
+        return np.maximum(near, largest / (self.most + SLACK))
+
+
+VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
+"""The `Spacecraft.thrust_laws` that there are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the file.
+
+    ``moments`` is (I1, I2, I3), those that `inertia.settled` calls equal made so; ``axes`` is 3×3, its columns the
+    principal axes in file axes.
+    """
+
+    moments: rigid_body.Moments
+    axes: Vector = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "moments", rigid_body.settled(self.moments))
+
+    @property
+    def A(self) -> float:
+        """Transverse moment of the equivalent symmetric body, kg m²: the mean of I1 and I2."""
+        return 0.5 * (self.moments[0] + self.moments[1])
+
+    @property
+    def C(self) -> float:
+        """Moment about the spin axis, kg m²."""
+        return self.moments[2]
+
+    @property
+    def a(self) -> float:
+        """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a sphere."""
+        return rigid_body.ratio(self.A, self.C)
+
+    @property
+    def body_rate(self) -> float:
+        """Rate at which a small nutation turns in the body, over ω3: ``a`` where I1 = I2."""
+        first, second, third = self.moments
+        if self.symmetric or (first - third) * (second - third) <= 0.0:
+            return self.a
+        from nutdamp.physics import triaxial  # few bodies need it
+
+        return triaxial.body_nutation_rate(self.moments, 1.0)
+
+    @property
+    def nutating(self) -> float:
+        """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
+        return self.A if self.symmetric else self.C / (1.0 - self.body_rate)
+
+    @property
+    def shape(self) -> str:
+        """``prolate``, ``oblate`` or ``sphere``."""
+        return rigid_body.shape(self.A, self.C)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether I1 = I2, so that the closed forms hold exactly."""
+        return self.moments[0] == self.moments[1]
+
+    @property
+    def tensor(self) -> Vector:
+        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: what an eigensolver keeps of them."""
+        if self.aligned:
+            return np.diag(self.moments)
+        tensor = self.axes @ np.diag(self.moments) @ self.axes.T
+        digits = 13 - math.floor(math.log10(max(self.moments)))
+        return np.asarray(np.round(0.5 * (tensor + tensor.T), digits)) + 0.0
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the principal axes are the axes of the file."""
+        return bool(np.array_equal(self.axes, np.eye(3)))
+
+    def in_file(self, vector: Vector) -> Vector:
+        """A vector (3,) of the principal axes in the axes of the file, as it is shown: without rounding."""
+        return cleaned(self.axes @ vector)
+
+    def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
+        """Rates (..., 3) and quaternions (..., 4) of the principal axes as those of the axes of the file."""
+        if self.aligned:
+            return rates, quaternion
+        return rates @ self.axes.T, attitude.multiply(quaternion, attitude.from_matrix(self.axes.T))
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """A torque that nobody commands, in principal body axes.
+
+    ``transverse`` M1 + iM2 (N m, at t = 0) turns about axis 3 of the body at ``rate`` rad/s; 0 is fixed in the body,
+    minus the spin is nearly fixed in space. ``axial`` M3 (N m) is constant.
+    """
+
+    transverse: complex
+    axial: float = 0.0
+    rate: float = 0.0
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """Attitude at t = 0 as the file gives it: unit quaternion body (file axes) -> frame, scalar first."""
+
+    quaternion: Vector
+    epoch: str | None = None
+    frame: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Orbit:
+    """Where the spacecraft is at t = 0 and how it moves: (3,) m and (3,) m/s from ``center``, in the attitude's frame.
+
+    Nothing is computed from it: messages to flight dynamics carry it.
+    """
+
+    position: Vector
+    velocity: Vector
+    center: str = "EARTH"
+
+
+@dataclass(frozen=True, slots=True)
+class SpinState:
+    """The motion at one moment, for the closed forms.
+
+    ``omega`` is ω1 + iω2 in rad/s, ``spin`` is ω3 in rad/s, ``quaternion`` (4,) body -> inertial, scalar first.
+    """
+
+    omega: complex
+    spin: float
+    quaternion: Vector
+
+    @property
+    def rates(self) -> Vector:
+        """(ω1, ω2, ω3) in rad/s."""
+        return np.array([self.omega.real, self.omega.imag, self.spin])
+
+
+class Source(Protocol):
+    """What a spacecraft was read from."""
+
+    def changed(self, keys: Mapping[str, object]) -> Spacecraft:
+        """The spacecraft with keys of its file changed; raises FaultyFile or BadRequest."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Spacecraft(results.Data, results.Shown):
+    """A spinning rigid body, how it moves at t = 0, and what can be fired.
+
+    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
+    which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says which, None: by shape;
+    ``dispersions``: how far true values may differ; ``object_id`` names it in messages, which carry ``orbit``; ``sun``
+    (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are cones for the spin axis; ``commands``
+    is what blocks fired from the Sun pulses of ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than
+    the thrusters say, None where they are not; ``loop`` damps by what a sensor shows; ``source`` is what it was read
+    from, None once a field is replaced.
+    """
+
+    name: str
+    inertia: Inertia
+    omega0: Vector
+    mass: float | None = None
+    attitude: Attitude | None = None
+    channels: tuple[Channel, ...] = ()
+    steerable: Steerable | None = None
+    requirement: Requirement | None = None
+    limits: Limits = field(default_factory=Limits)
+    disturbances: tuple[Disturbance, ...] = ()
+    dissipation: float | None = None
+    nutation_grows: bool | None = None
+    goal: Goal = field(default_factory=Goal)
+    dispersions: Dispersions | None = None
+    object_id: str | None = None
+    orbit: Orbit | None = None
+    sun: Vector | None = None
+    keep: tuple[Keep, ...] = ()
+    sun_sensor: SunSensor | None = None
+    commands: Commands | None = None
+    cold: Cold | None = None
+    tank: Tank | None = None
+    loop: Loop | None = None
+    source: Source | None = field(default=None, init=False)
+
+    def with_(self, **keys: object) -> Spacecraft:
+        """The spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
+
+        Of a mapping only the keys that are in it change, so that the other limits keep their values; entries of a list
+        are named by their ``name``: ``thrusters={"T1": {"force": "12 N"}}``. All is checked as the file is. Raises
+        FaultyFile with everything wrong, BadRequest for what no file can hold or where no file was read.
+        """
+        if self.source is None:
+            raise BadRequest("with_: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+        return self.source.changed(keys)
+
+    def replace(self, **fields: object) -> Spacecraft:
+        """The spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
+
+        Only names and types are checked; `with_` checks all that a file is checked for. Raises BadRequest.
+        """
+        return units.replaced(self, fields)
+
+    @property
+    def thrust_laws(self) -> tuple[str, ...]:
+        """What makes the pulse of a command other than a rectangle of the thrust of the file, in words."""
+        valves = any(channel.valve is not None for channel in self.channels)
+        laws = (VALVES, valves), (COLD, self.cold is not None), (BLOWDOWN, self.tank is not None)
+        lighter = self.tank is not None and self.tank.inertia_per_kg is not None
+        return tuple(name for name, holds in (*laws, (LIGHTER, lighter)) if holds)
+
+    @property
+    def rates(self) -> Vector:
+        """Body rates at t = 0, (3,) rad/s, in the axes of the file."""
+        return self.inertia.in_file(self.omega0)
+
+    @property
+    def watched(self) -> tuple[Keep, ...]:
+        """The cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
+        if self.sun is None or any(np.array_equal(one.direction, self.sun) for one in self.keep):
+            return self.keep
+        return (*self.keep, Keep("Sun", self.sun))
+
+    @property
+    def growth(self) -> float:
+        """Rate κ (1/s) at which energy dissipation lets a small nutation grow; negative where it decays.
+
+        By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
+        that the Sun heats. A sphere has no energy to give: zero. See `physics.energy_sink`.
+        """
+        if self.dissipation is None or self.inertia.a == 0.0:
+            return 0.0
+        grows = self.inertia.a > 0.0 if self.nutation_grows is None else self.nutation_grows
+        return 1.0 / self.dissipation if grows else -1.0 / self.dissipation
+
+    @property
+    def spin_drift(self) -> float:
+        """Spin acceleration by the axial disturbances, rad/s²."""
+        return math.fsum(disturbance.axial for disturbance in self.disturbances) / self.inertia.C
+
+    @property
+    def torquer(self) -> Steerable | None:
+        """The steerable torquer; an ideal one is assumed where the file names no actuator at all."""
+        if self.steerable is None and not self.channels:
+            return Steerable()
+        return self.steerable
+
+    @property
+    def horizon(self) -> float:
+        """End of the planning time, s.
+
+        Default: 20 × the longer of the nutation periods seen in the body and inertially; a sphere: the latter.
+        """
+        if self.limits.horizon is not None:
+            return self.limits.horizon
+        body, inertial = rigid_body.body_period(self.inertia.A, self.inertia.C, self.spin), self.inertial_period
+        return 20.0 * (max(body, inertial) if math.isfinite(body) else inertial)
+
+    @cached_property
+    def initial(self) -> SpinState:
+        """The motion at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
+        omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
+        if self.attitude is None:
+            first, second, third = self.inertia.moments
+            # With moments of one, rates are momenta: N goes by the true H.
+            quaternion = attitude.frame_n(1.0, 1.0, complex(first * omega.real, second * omega.imag), third * spin)
+        else:
+            quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
+        return SpinState(omega, spin, quaternion)
+
+    @property
+    def axis(self) -> Vector:
+        """Spin axis at t = 0, inertial unit vector (3,)."""
+        return attitude.rotate(self.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, self.spin)]))
+
+    @cached_property
+    def momentum(self) -> Vector:
+        """Angular momentum at t = 0 in the inertial frame, (3,) N m s."""
+        start = self.initial
+        return attitude.rotate(start.quaternion, start.rates * np.asarray(self.inertia.moments))
+
+    @cached_property
+    def target_axis(self) -> Vector:
+        """Direction in which the angular momentum is to end, (3,) unit vector in the inertial frame."""
+        if self.goal.axis is not None:
+            return self.goal.axis
+        momentum = self.momentum
+        return np.asarray(momentum / np.linalg.norm(momentum))
+
+    @property
+    def to_turn(self) -> float:
+        """Angle from the angular momentum at t = 0 to the target axis, rad; exactly zero without a target."""
+        return 0.0 if self.goal.axis is None else float(attitude.angle_between(self.momentum, self.goal.axis))
+
+    @property
+    def turning_impulse(self) -> float:
+        """C |ω3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target with less."""
+        return self.inertia.C * abs(self.spin) * self.to_turn
+
+    def direction_in_n(self, tilt: float, azimuth: float) -> Vector:
+        """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x of the frame N."""
+        in_n = np.array([math.sin(tilt) * math.cos(azimuth), math.sin(tilt) * math.sin(azimuth), math.cos(tilt)])
+        if self.attitude is None:
+            return in_n
+        body_to_n = replace(self, attitude=None).initial.quaternion
+        in_body = attitude.matrix(body_to_n).T @ in_n
+        return attitude.rotate(self.initial.quaternion, in_body)
+
+    def angles_of(self, direction: Vector) -> tuple[float | None, float]:
+        """The angles that name an inertial ``direction`` (3,), rad.
+
+        Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in [0, 2π) and tilt, as
+        `direction_in_n` takes them. Right ascension and azimuth are None at the pole, where there is none.
+        """
+        about, declination = attitude.sphere_angles(direction)
+        return about, math.atan2(math.hypot(*direction[:2]), direction[2]) if self.attitude is None else declination
+
+    def utc(self, time: float, digits: int = DIGITS) -> str | None:
+        """Date and time in UTC ``time`` s after the epoch, rounded to ``digits`` of a second.
+
+        None without an epoch, before 1972 and after the year 9999.
+        """
+        if self.attitude is None or self.attitude.epoch is None:
+            return None
+        try:
+            return f"{Epoch.parse(self.attitude.epoch).plus(time).rounded(digits)}Z"
+        except ValueError:
+            return None
+
+    @cached_property
+    def widest(self) -> Cones:
+        """The cone angles of the free motion from t = 0, where its nutation is largest; with I1 = I2 it stays so."""
+        return arc_cones(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin))
+
+    @property
+    def nutation(self) -> float:
+        """Nutation angle θ of the free motion from t = 0, rad, Magnus (19); its largest where I1 ≠ I2."""
+        return self.widest.nutation
+
+    @property
+    def tilt(self) -> float:
+        """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2, else equal."""
+        return rigid_body.momentary(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin)).nutation
+
+    @property
+    def transverse_rate(self) -> float:
+        """|ω0| at t = 0, rad/s."""
+        return math.hypot(self.omega0[0], self.omega0[1])
+
+    @property
+    def spin(self) -> float:
+        """ω3 at t = 0, rad/s, signed."""
+        return float(self.omega0[2])
+
+    @property
+    def body_period(self) -> float:
+        """Period of a small nutation seen in the body, Magnus (12), s; infinite for a sphere."""
+        rate = abs(self.inertia.body_rate * self.spin)
+        return 2 * math.pi / rate if rate > 0.0 else math.inf
+
+    @property
+    def inertial_period(self) -> float:
+        """Nutation period seen inertially, 2π A/|H|, s; with I1 ≠ I2 that of a small nutation."""
+        return rigid_body.inertial_period(self.inertia.nutating, self.inertia.C, self.transverse_rate, self.spin)
+
+    @property
+    def nutation_period(self) -> float:
+        """Nutation period as seen in the body, s; for a sphere, where that is infinite, as seen inertially."""
+        return self.body_period if math.isfinite(self.body_period) else self.inertial_period
+
+    @property
+    def least_impulse(self) -> float:
+        """A |ω0| in N m s: no schedule can remove the nutation of a symmetric body without dissipation with less."""
+        return self.inertia.A * self.transverse_rate

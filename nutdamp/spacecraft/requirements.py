@@ -1,0 +1,232 @@
+"""What a motion must end with: the requirement of the file, the spin rate of the goal, and what counts as damped.
+
+One home for what complies, for one plan or for many dispersed cases: every function works on numbers and on arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nutdamp.spacecraft.model import Spacecraft
+
+DAMPED_SHARE = 0.01
+"""Share of the initial nutation (of the turn to a target axis) that may be left where it counts as damped (reached)."""
+
+DAMPED_ANGLE = math.radians(1e-3)
+"""rad that may be left in any case."""
+
+SAME_COST = 1e-3
+"""Costs that differ by less, relatively, are equal: then other things decide."""
+
+NEGLIGIBLE = math.radians(1e-9)
+"""rad below which angles are rounding, and shown as nothing."""
+
+SPIN_TOLERANCE = 1e-3
+"""By how much, relatively, the spin at the end may miss the one of the goal."""
+
+
+class Part(Enum):
+    """What is bounded: angles in rad, the spin rate in rad/s from the one of the goal."""
+
+    NUTATION = "nutation"
+    SHIFT = "momentum_shift"
+    DISTANCE = "axis_error"
+    SPIN = "spin"
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        names = {Part.SHIFT: "shift of H", Part.DISTANCE: "error of H", Part.SPIN: "spin error"}
+        return names.get(self, "nutation")
+
+
+class Bound(NamedTuple):
+    """The most that may be left of a part; ``required`` by file or command line, else what counts as damped."""
+
+    part: Part
+    most: float
+    required: bool
+
+
+class Held(NamedTuple):
+    """A bound, and what is left of its part in the same unit."""
+
+    bound: Bound
+    left: float
+
+    @property
+    def met(self) -> bool:
+        """Whether no more is left than may be."""
+        return self.left <= self.bound.most
+
+
+class Left(NamedTuple):
+    """What is left: ``nutation`` and ``aim`` rad (H from the target axis, else from where it was), ``spin`` rad/s.
+
+    Each is a number or an array over cases.
+    """
+
+    nutation: Any
+    aim: Any
+    spin: Any
+
+
+def aim(spacecraft: Spacecraft) -> Part:
+    """How far H ends from where it shall: from the target axis, or without one from where it was."""
+    return Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
+
+
+def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
+    """The bounds of the requirement, and of the spin where the goal names one; none where nothing is required."""
+    requested, goal = spacecraft.requirement, spacecraft.goal
+    bounds = []
+    if requested is not None and requested.nutation is not None:
+        bounds.append(Bound(Part.NUTATION, requested.nutation, True))
+    if requested is not None and requested.momentum_shift is not None:
+        bounds.append(Bound(aim(spacecraft), requested.momentum_shift, True))
+    if goal.spin is not None:
+        bounds.append(Bound(Part.SPIN, SPIN_TOLERANCE * abs(goal.spin), True))
+    return tuple(bounds)
+
+
+def judged(spacecraft: Spacecraft) -> bool:
+    """Whether cases comply or not: something is required at the end, or the spin axis has cones to keep on the way."""
+    return bool(spacecraft.keep or required(spacecraft))
+
+
+def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
+    """The bounds `required`; for nutation and target axis, where none is, those within which they count as damped."""
+    found = required(spacecraft)
+    limited = {bound.part for bound in found}
+    if Part.NUTATION not in limited:
+        found += (Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),)
+    if Part.DISTANCE not in limited and spacecraft.goal.axis is not None:
+        found += (Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),)
+    return found
+
+
+def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
+    """What is left of a part, to be held against the ``most`` of its bound."""
+    if part is Part.NUTATION:
+        return left.nutation
+    if part is Part.SPIN:
+        assert spacecraft.goal.spin is not None
+        return abs(left.spin - spacecraft.goal.spin)
+    return left.aim
+
+
+def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
+    """What is left of one motion beside each of the `bounds`."""
+    return tuple(Held(bound, float(left_of(bound.part, left, spacecraft))) for bound in bounds(spacecraft))
+
+
+def unaided(spacecraft: Spacecraft) -> bool:
+    """Whether the body keeps all `bounds` up to the horizon when no pulse is fired.
+
+    Dissipation leaves H where it is and lets tan θ grow or decay. With I1 ≠ I2 nutation runs to and fro, and its
+    largest counts. False where it is not known: with disturbances, and with I1 ≠ I2 where there is dissipation or a
+    final spin.
+    """
+    varying = spacecraft.growth != 0.0 or spacecraft.goal.spin is not None
+    if spacecraft.disturbances or (varying and not spacecraft.inertia.symmetric):
+        return False
+    nutation = _idle(spacecraft, spacecraft.horizon)
+    aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
+    # H stays, and C ω3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
+    faster = math.cos(nutation) / math.cos(spacecraft.nutation)
+    most = max(nutation, spacecraft.nutation)
+    ends = [Left(most, aim, spin) for spin in (spacecraft.spin, spacecraft.spin * faster)]
+    return all(one.met for left in ends for one in held(spacecraft, left))
+
+
+def decayed(spacecraft: Spacecraft, t: float) -> float:
+    """To what nutation, rad, an oblate body damps itself by ``t`` s with nothing done; θ0 where it does not.
+
+    Also θ0 where it is not known: with disturbances or I1 ≠ I2.
+    """
+    if spacecraft.growth >= 0.0 or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return spacecraft.nutation
+    return _idle(spacecraft, t)
+
+
+def _idle(spacecraft: Spacecraft, t: float) -> float:
+    return math.atan(math.tan(spacecraft.nutation) * math.exp(min(spacecraft.growth * t, 700.0)))
+
+
+def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
+    """When a nutation (rad) is reached without firing, s: ln(tan θ/tan θ0)/κ; 0 where it is, infinite where never.
+
+    Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that at t = 0.
+    """
+    growth = spacecraft.growth
+    now = spacecraft.nutation if now is None else now
+    if (nutation <= now) if growth > 0.0 else (nutation >= now):
+        return 0.0
+    if growth == 0.0 or now == 0.0 or nutation == 0.0:
+        return math.inf
+    return math.log(math.tan(nutation) / math.tan(now)) / growth
+
+
+def only_nutation(spacecraft: Spacecraft) -> bool:
+    """Whether nutation is all that can keep a body on which no pulse is fired from its requirement.
+
+    H stays where it is and there is no final spin, no cone to keep; False where no pulse is needed anyway (`unaided`).
+    """
+    there = aim(spacecraft) is Part.SHIFT or all(bound.part is not Part.DISTANCE for bound in required(spacecraft))
+    return there and spacecraft.goal.spin is None and not spacecraft.keep and not unaided(spacecraft)
+
+
+def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
+    """When the ``nutation`` (rad) of a prolate body, with nothing done, exceeds the one that is required, s from then.
+
+    None where it does not grow, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    """
+    required = spacecraft.requirement
+    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return None
+    return reached(spacecraft, required.nutation, nutation) if spacecraft.growth > 0.0 else None
+
+
+def subsides(spacecraft: Spacecraft) -> float | None:
+    """When the nutation of an oblate body has decayed to the one that is required, s, with nothing done.
+
+    None where it does not decay, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    """
+    required = spacecraft.requirement
+    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
+        return None
+    return reached(spacecraft, required.nutation) if spacecraft.growth < 0.0 else None
+
+
+def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
+    """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more.
+
+    Numbers, or arrays over cases.
+    """
+    return nutation if spacecraft.goal.axis is None else np.maximum(nutation, aim)
+
+
+def severity(spacecraft: Spacecraft, left: Left, used: Sequence[Any] = ()) -> Any:
+    """The largest share of a bound that is `required` which is used up: 1 or less complies.
+
+    Without such bounds what is `missed`, rad. Where more than all of a cone, or of the propellant, is ``used`` (shares)
+    on the way, it is no less than that.
+    """
+    found = np.asarray(_severity_at_end(spacecraft, left), dtype=float)
+    if not len(used):
+        return found
+    worst = np.maximum.reduce(np.broadcast_arrays(*used))
+    return np.where(worst > 1.0, np.maximum(worst, found), found)
+
+
+def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:
+    limits = required(spacecraft)
+    if not limits:
+        return missed(spacecraft, left.nutation, left.aim)
+    shares = [left_of(bound.part, left, spacecraft) / bound.most for bound in limits]
+    return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))

@@ -1,0 +1,308 @@
+"""A schedule: which channel fires when, for how long, and what that costs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import numpy as np
+
+from nutdamp.spacecraft.equipment import Block, Channel, Steerable
+from nutdamp.spacecraft.model import Vector
+
+if TYPE_CHECKING:
+    from nutdamp.physics.thruster import Ramp
+
+
+STEERABLE = "steerable"
+"""Channel name of the pulses of a steerable torquer."""
+
+
+RESOLUTION = 1e-4
+"""Part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more."""
+
+TOUCHING = 1e-9
+"""s; pulses that overlap by less only touch, as do those that overlap by less than times can be distinguished."""
+
+Label = TypeVar("Label")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is loaded to fire a pulse through a valve, ``start`` and ``on_time`` s, and the thrust that follows.
+
+    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse.
+    """
+
+    start: float
+    on_time: float
+    ramps: tuple[Ramp, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Pulse:
+    """One rectangular torque pulse, or an ideal impulse (``on_time`` 0, ``torque`` None).
+
+    ``t`` is its centre in s; ``torque`` (3,) N m and ``impulse`` (3,) N m s are in principal body axes;
+    ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None. Through a valve it is what
+    the ``command`` gives: ``t`` is the centroid of its thrust and ``on_time`` the effective one, impulse over torque.
+    """
+
+    t: float
+    on_time: float
+    channel: str
+    impulse: Vector
+    torque: Vector | None = None
+    force: Vector | None = None
+    propellant: float | None = None
+    command: Command | None = None
+
+    @property
+    def loaded(self) -> tuple[float, float]:
+        """Start and on-time as they are commanded, s."""
+        return (self.start, self.on_time) if self.command is None else (self.command.start, self.command.on_time)
+
+    @property
+    def thrust(self) -> tuple[float, float]:
+        """When its thrust begins and ends, s."""
+        if self.command is None or not self.command.ramps:
+            return self.start, self.end
+        return self.command.ramps[0].begin, self.command.ramps[-1].end
+
+    @property
+    def over(self) -> float:
+        """When both command and thrust are over, s."""
+        return self.end if self.command is None else max(sum(self.loaded), self.thrust[1])
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Times (s) at which its thrust begins, ends, or begins or ends to rise or to fall."""
+        if self.command is None:
+            return self.start, self.end
+        return tuple(time for ramp in self.command.ramps for time in ramp[:2])
+
+    def push(self, start: float, end: float) -> tuple[Vector, Vector | None] | None:
+        """Torque (3,) N m at ``start`` and its slope, N m/s, None for none, up to ``end`` s, with no edge in between.
+
+        None where it does not fire then.
+        """
+        if self.torque is None or end <= start:
+            return None
+        if self.command is None:
+            return (self.torque, None) if self.start <= start and end <= self.end else None
+        for ramp in self.command.ramps:
+            if ramp.begin <= start and end <= ramp.end:
+                if ramp.first == ramp.last:
+                    return self.torque * ramp.first, None
+                slope = (ramp.last - ramp.first) / (ramp.end - ramp.begin)
+                return self.torque * (ramp.first + slope * (start - ramp.begin)), self.torque * slope
+        return None
+
+    def share(self, times: Vector) -> Vector:
+        """Share of its impulse that it has given by each of the ``times`` (n,) s; an ideal impulse at once."""
+        if self.on_time == 0.0:
+            return np.where(times >= self.t, 1.0, 0.0)
+        if self.command is None:
+            return np.clip((times - self.start) / self.on_time, 0.0, 1.0)
+        given = np.zeros(len(times))
+        for ramp in self.command.ramps:
+            since = np.clip(times, ramp.begin, ramp.end) - ramp.begin
+            given += since * (ramp.first + 0.5 * (ramp.last - ramp.first) * since / (ramp.end - ramp.begin))
+        return given / self.on_time
+
+    def moved(self, by: float) -> Pulse:
+        """The same ``by`` s later."""
+        command = self.command
+        if command is not None:
+            ramps = tuple(ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps)
+            command = Command(command.start + by, command.on_time, ramps)
+        return replace(self, t=self.t + by, command=command)
+
+    @property
+    def start(self) -> float:
+        """When it comes on, s."""
+        return self.t - 0.5 * self.on_time
+
+    @property
+    def end(self) -> float:
+        """When it goes off, s."""
+        return self.t + 0.5 * self.on_time
+
+    @property
+    def resolved(self) -> bool:
+        """Whether times can be distinguished finely enough to say how long it is; an ideal impulse has no length."""
+        return self.on_time == 0.0 or math.ulp(self.end) <= RESOLUTION * self.on_time
+
+    @property
+    def magnitude(self) -> float:
+        """|J| in N m s."""
+        return float(np.linalg.norm(self.impulse))
+
+
+def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Label]]:
+    """Labels of pulses that begin while their channel still fires an earlier one, each with the label of that."""
+    firing: dict[str, tuple[Label, float]] = {}
+    found = []
+    for label, pulse in sorted(pulses, key=lambda one: one[1].loaded[0]):
+        before, end = firing.get(pulse.channel, (label, -math.inf))
+        if pulse.loaded[0] < end - touching(end):
+            found.append((label, before))
+        if pulse.over > end:
+            firing[pulse.channel] = label, pulse.over
+    return found
+
+
+def touching(time: float) -> float:
+    """By how much two pulses may overlap at ``time`` s that only touch, s."""
+    return max(TOUCHING, math.ulp(time)) if math.isfinite(time) else 0.0
+
+
+def on_command(channel: Channel, start: float, on_time: float) -> Pulse:
+    """What ``channel`` gives when it is commanded on at ``start`` s for ``on_time`` s."""
+    valve = channel.valve
+    if valve is None:
+        return _rectangle(channel, start + 0.5 * on_time, on_time)
+    thrust = valve.thrust(on_time)
+    ramps = tuple(ramp._replace(begin=start + ramp.begin, end=start + ramp.end) for ramp in thrust.ramps)
+    command = Command(start, on_time, ramps)
+    if not ramps:
+        return Pulse(start, 0.0, channel.name, np.zeros(3), propellant=channel.mass_flow and 0.0, command=command)
+    return replace(_rectangle(channel, start + thrust.centroid, thrust.on_time), command=command)
+
+
+def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
+    """One firing of ``channel``, centred at ``t`` s and ``on_time`` s long, and the command that gives it."""
+    valve = channel.valve
+    if valve is None or on_time == 0.0:
+        return _rectangle(channel, t, on_time)
+    loaded = valve.on_time_for(float(on_time))
+    return on_command(channel, float(t) - valve.thrust(loaded).centroid, loaded)
+
+
+def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
+    flow = channel.mass_flow
+    return Pulse(
+        t=t,
+        on_time=on_time,
+        channel=channel.name,
+        impulse=channel.torque * on_time,
+        torque=channel.torque,
+        force=channel.force,
+        propellant=None if flow is None else flow * on_time,
+    )
+
+
+def steerable_pulse(
+    steerable: Steerable, t: float, angle: float, *, impulse: float | None = None, on_time: float = 0.0
+) -> Pulse:
+    """One firing of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
+
+    Either ``impulse`` N m s is given, or ``on_time`` s where the torquer has a torque; else it gives ideal impulses.
+    """
+    direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+    if steerable.torque is None:
+        on_time = 0.0
+    elif impulse is not None:
+        on_time = impulse / steerable.torque
+    if impulse is None:
+        impulse = 0.0 if steerable.torque is None else steerable.torque * on_time
+    rate = steerable.propellant_per_impulse
+    return Pulse(
+        t=t,
+        on_time=on_time,
+        channel=STEERABLE,
+        impulse=impulse * direction,
+        torque=None if steerable.torque is None else steerable.torque * direction,
+        propellant=None if rate is None else rate * impulse,
+    )
+
+
+class Bounds(NamedTuple):
+    """Costs that other schedules of the channels cannot go below ``within`` so many s, in ``unit`` (kg or N m s).
+
+    ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous`` holds at any angle
+    for all schedules that leave no more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation,
+    disturbances. ``keeping`` is the first-order one of schedules that keep H, where this one need not; None for others.
+    """
+
+    first_order: float | None
+    rigorous: float | None
+    unit: str
+    within: float
+    keeping: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """Pulses in the order of their centres, remarks of the scheme that chose them, and what others must cost.
+
+    ``blocks`` are the commands by which the pulses are fired, where it is not one by one.
+    """
+
+    pulses: tuple[Pulse, ...] = ()
+    notes: tuple[str, ...] = ()
+    bounds: Bounds | None = None
+    blocks: tuple[Block, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pulses", tuple(sorted(self.pulses, key=lambda pulse: pulse.t)))
+
+    def __len__(self) -> int:
+        return len(self.pulses)
+
+    def __iter__(self) -> Iterator[Pulse]:
+        return iter(self.pulses)
+
+    @property
+    def without_proof(self) -> Schedule:
+        """The same without its rigorous bound: for a motion that the bound was not derived for."""
+        return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
+
+    @property
+    def idealised(self) -> bool:
+        """Whether any of the pulses is an ideal impulse, which takes no time."""
+        return any(pulse.on_time == 0.0 for pulse in self.pulses)
+
+    @property
+    def through_valves(self) -> bool:
+        """Whether any of the pulses is not what it is commanded."""
+        return any(pulse.command is not None for pulse in self.pulses)
+
+    @property
+    def cost(self) -> float:
+        """Propellant in kg; where that is not known, impulse in N m s."""
+        propellant = self.propellant
+        return self.total_impulse if propellant is None else propellant
+
+    def cost_in(self, unit: str) -> float:
+        """Propellant where the ``unit`` is kg and it is known, else impulse in N m s."""
+        return self.cost if unit == "kg" else self.total_impulse
+
+    @property
+    def end(self) -> float:
+        """End of the last pulse, s; 0 without pulses."""
+        return max((pulse.over for pulse in self.pulses), default=0.0)
+
+    @property
+    def total_impulse(self) -> float:
+        """Σ |J| in N m s."""
+        return math.fsum(pulse.magnitude for pulse in self.pulses)
+
+    def used_by(self, times: Vector, *, at_once: bool = False) -> Vector:
+        """Propellant (n,) kg used by the ``times`` (n,) s, as far as it is known.
+
+        It flows as the thrust goes; ``at_once``: each pulse takes all of it at its centre.
+        """
+        used = np.zeros(len(times))
+        for pulse in self.pulses:
+            share = np.where(times >= pulse.t, 1.0, 0.0) if at_once else pulse.share(times)
+            used += (pulse.propellant or 0.0) * share
+        return used
+
+    @property
+    def propellant(self) -> float | None:
+        """kg; None where one pulse's is not known."""
+        known = [pulse.propellant for pulse in self.pulses if pulse.propellant is not None]
+        return math.fsum(known) if len(known) == len(self.pulses) else None

@@ -1,0 +1,209 @@
+"""The words of a decision: one place for what screens, pages and files say is met, by what margin, and how it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.errors import listed
+from nutdamp.planning.decision import TELLING, Comparison, Decision, Line, strays
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import SLACK
+from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.views import verdicts
+from nutdamp.views.end_tables import cone_margins, end_table
+from nutdamp.views.layout import columns
+from nutdamp.views.text import MISSING, degrees, lasting, mass, moment, most, quantity
+
+KEPT = {True: "kept", False: "NOT kept"}
+"""What is said of a cone about a direction that the spin axis has to keep."""
+
+COUNT = "cases that comply"
+"""What the row of the decision and the column of the comparison are called that count dispersed cases."""
+
+
+def verdict(decision: Decision) -> str:
+    """Whether the requirement is met, in words that leave no doubt for what."""
+    broken, cases = " and ".join(map(strays, decision.strays)), decision.cases
+    if not broken:
+        return _at_end(decision)
+    # Cases that break a cone do not comply: what is said of them is not of the end alone.
+    if cases is not None and cases.complying is not None:
+        return f"NOT met: {broken}; {verdicts.cases_share(cases.complying, cases.probability)}"
+    return f"NOT met: {broken}; otherwise {_at_end(decision)}"
+
+
+def statement(decision: Decision) -> Text:
+    """The verdict as a sentence."""
+    lead = "Requirement: " if decision.nominal is None and not decision.strays else "Requirement "
+    return Text.assemble(lead, coloured(verdict(decision), decision.met), ".")
+
+
+def _at_end(decision: Decision) -> str:
+    """What is said of the end, whatever the spin axis keeps on the way."""
+    cases, nominal = decision.cases, decision.nominal
+    if nominal is None:
+        what = "nutation is damped" if decision.plan.spacecraft.goal.axis is None else "target is reached"
+        what = what if decision.damped else what.replace(" is ", " is NOT ")
+        return f"nothing is required at the end; with nominal values the {what}"
+    if decision.unknown:
+        return f"NOT met{' with nominal values' * (not nominal)}: {verdicts.UNDECIDED}"
+    if cases is not None and cases.complying is not None:
+        if nominal:
+            return verdicts.cases_verdict(cases.complying, cases.probability)
+        return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
+    said = f"{'met' if nominal else 'NOT met'} with nominal values"
+    return f"{said}; dispersed cases were not flown" if decision.undispersed else said
+
+
+def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
+    """What must be known beside the verdict: what was idealised, what grows.
+
+    ``looped``: it is the flight of a closed loop, which goes on firing.
+    """
+    if ideal := verdicts.idealised(decision.plan):
+        yield ideal
+    if looped:
+        return
+    if turned := _turned(decision):
+        yield f"{decision.plan.scheme} {listed(turned)}."
+    if not decision.plan.commandable:
+        yield f"{decision.plan.scheme} cannot be commanded: no command block fires its pulses."
+    yield from _growing(decision)
+    if decision.plan.spacecraft.loop is not None:
+        yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
+
+
+def _turned(decision: Decision) -> list[str]:
+    """What a plan does to axis and spin that nothing asks of it, where that is more than is not worth a word."""
+    body, final, found = decision.plan.spacecraft, decision.flight.residual, []
+    if body.goal.axis is None and final.momentum_shift > TURNED:
+        found.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
+    change = decision.final.spin - body.spin
+    if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
+        found.append(f"changes the spin by {quantity(change, 'rad/s')}")
+    return found
+
+
+TURNED = math.radians(0.1)
+"""rad by which H turns, for that to be said."""
+
+
+def _growing(decision: Decision) -> Iterator[str]:
+    """How long nutation that grows keeps the requirement, or from when that which decays does."""
+    body = decision.plan.spacecraft
+    now, idle = body.nutation, requirements.outgrown(body, body.nutation)
+    most_of = {bound.part: most(bound.most) for bound in requirements.required(body)}
+    alone = requirements.only_nutation(body)
+    damped = requirements.subsides(body)
+    if alone and damped is not None and damped < body.horizon:
+        fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {most_of[Part.NUTATION]}"
+        sooner = ", before this plan ends" if decision.plan.end > damped else ""
+        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on{sooner}: {fallen}."
+    if idle and alone:
+        grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {most_of[Part.NUTATION]}"
+        yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
+    if not len(decision.plan.pulses):
+        return
+    left, whose, until = decision.final.nutation, "", decision.flight.until
+    if decision.cases is not None:
+        left = decision.cases.levels[Part.NUTATION]
+        whose = f" (not exceeded in {verdicts.exact_percent(decision.cases.probability)} of cases)"
+    again = requirements.outgrown(body, left)
+    if again and left > TELLING:
+        grows = f"from {degrees(left)}{whose} to {most_of[Part.NUTATION]} in {lasting(again)}"
+        yield f"After {'the last pulse' if until is None else moment(until)} what is left grows again: {grows}."
+
+
+def decision_table(decision: Decision, values: str = "nominal") -> Table:
+    """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads what is left."""
+    cases = decision.cases
+    heads = ["requirement", "limit", values]
+    if cases is not None:
+        heads.append(f"dispersed\n({verdicts.exact_percent(cases.probability)})")
+    table = columns(*heads, "margin", "verdict", text=("verdict",))
+    for line in decision.lines:
+        dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
+        cells = (limit(line.bound), size(line.bound, line.nominal), *dispersed, size(line.bound, line.margin))
+        table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
+    for one in decision.aspects:
+        for bound, angle, left in cone_margins(one):
+            kept, none = left >= -SLACK, [""] * (cases is not None)
+            said = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
+            table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
+    if cases is not None and cases.complying is not None:
+        least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
+        margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
+        said = coloured(verdicts.VERDICT[cases.met], cases.met)
+        table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
+    return table
+
+
+def coloured(text: str, met: bool | None) -> Text:
+    """A verdict in the colour of it."""
+    return Text(text, "" if met is None else "green" if met else "bold red")
+
+
+def limit(bound: Bound) -> str:
+    """The most that may be left of a part."""
+    return f"≤ {quantity(bound.most, 'rad/s') if bound.part is Part.SPIN else most(bound.most)}"
+
+
+def size(bound: Bound, value: float | None) -> str:
+    """What is left of a part, in rad/s or degrees."""
+    return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
+
+
+def _met(line: Line) -> str:
+    """What is said of a part: met or not; for one that is not required, whether that counts as damped or reached."""
+    if line.bound.required:
+        return verdicts.VERDICT[line.met]
+    done = "reached" if line.bound.part is Part.DISTANCE else "damped"
+    return MISSING if line.met is None else f"{done} (not required)" if line.met else f"NOT {done} (not required)"
+
+
+def cost(decision: Decision) -> Iterator[tuple[str, str]]:
+    """What the plan takes, and when it ends: names and values."""
+    pulses = decision.flight.schedule
+    count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
+    if pulses.propellant is None:
+        yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')} in {count}"
+    else:
+        yield "propellant", f"{mass(pulses.propellant)} in {count}"
+    yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
+
+
+def end_facts(decision: Decision) -> Table:
+    """Where the spin axis and H end, the spin, what it costs and when it ends."""
+    table = end_table(decision.flight, decision.aspects)
+    for name, value in cost(decision):
+        table.add_row(name, value)
+    return table
+
+
+def decision_screen(compared: Comparison, decision: Decision, reason: str) -> list[RenderableType]:
+    """The decision as the top of a screen: which plan and why, the verdict, its margins, and how it ends."""
+    plan, missed = decision.plan, verdicts.warnings(compared, beside_verdict=True)
+    return [
+        Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
+        *requirement(decision),
+        *[Text.assemble(("Warning: ", "bold red"), warning) for warning in missed],
+        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
+        *figures(decision),
+    ]
+
+
+def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
+    """The verdict as a line of a screen, and what must be known beside it; ``looped`` as in `notes`."""
+    yield statement(decision)
+    for note in notes(decision, looped=looped):
+        yield Text.assemble(("Note: ", "bold"), note)
+
+
+def figures(decision: Decision) -> list[RenderableType]:
+    """The numbers of a decision on a screen: margins, then how it ends."""
+    return [Text(), decision_table(decision), Text(), end_facts(decision)]

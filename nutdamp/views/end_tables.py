@@ -1,0 +1,106 @@
+"""Where it points: directions in words, and how a flight leaves the body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+from rich.table import Table
+
+from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.views.layout import facts
+from nutdamp.views.text import RPM, degrees, longitude, moment, most, pointing, quantity
+
+FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
+"""What the two angles of a direction are without an attitude in the file."""
+
+
+def angle_names(body: Spacecraft) -> tuple[str, str]:
+    """What the two angles of a direction are called: along and above the equator, or from H(0) and about it."""
+    return ("tilt", "azimuth") if body.attitude is None else ("right ascension", "declination")
+
+
+def angle_texts(body: Spacecraft, direction: Vector) -> tuple[str, str]:
+    """The two angles of an inertial direction (3,), in the order of `angle_names`."""
+    around, other = body.angles_of(direction)
+    return (pointing(other), longitude(around)) if body.attitude is None else (longitude(around), pointing(other))
+
+
+def direction_text(body: Spacecraft, direction: Vector) -> str:
+    """An inertial direction (3,) by name and number of its angles."""
+    names, texts = angle_names(body), angle_texts(body, direction)
+    return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
+
+
+def target_text(body: Spacecraft, direction: Vector) -> str:
+    """The target axis beside an inertial direction (3,) that was to come there, and the angle between them."""
+    if body.goal.axis is None:
+        return ""
+    off = float(attitude.angle_between(direction, body.goal.axis))
+    return f"target: {direction_text(body, body.goal.axis)}; {degrees(off)} off"
+
+
+def spin_text(spin: float) -> str:
+    """A spin rate given in rad/s, in rpm too."""
+    return f"{spin * RPM:.6g} rpm ({quantity(spin, 'rad/s')})"
+
+
+def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
+    """Spin axis and angular momentum after the last pulse, beside the target, and what the body does from then on.
+
+    ``watched``: how near the axis came to directions in space.
+    """
+    body, final = flown.spacecraft, flown.final
+    table = facts()
+    table.add_row("spin axis ends at", direction_text(body, final.axis))
+    table.add_row("H ends at", direction_text(body, final.momentum))
+    if body.goal.axis is not None:
+        off = degrees(flown.residual.axis_error)
+        table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
+    table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
+    if lasting(flown):
+        table.add_row("", lasting(flown))
+    add_aspects(table, watched)
+    if body.attitude is None:
+        table.add_row("", FRAME_N)
+    elif body.attitude.frame is not None:
+        table.add_row("frame", body.attitude.frame)
+    return table
+
+
+def lasting(flown: Flight) -> str:
+    """Of when the end is told where it does not last, and what changes it further; empty where nothing does."""
+    body = flown.spacecraft
+    causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
+    end = "as the last pulse ends, at " + moment(flown.schedule.end)
+    end = end if flown.until is None else f"at {moment(flown.until)}"
+    return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
+
+
+def add_aspects(table: Table, found: Iterable[Aspect]) -> None:
+    """How near the spin axis comes to each direction that is watched, and what it is to keep; ✗ where it does not."""
+    for one in found:
+        keep = one.keep
+        mark, bounds = "" if one.kept else "✗ ", bounds_text(keep)
+        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (one[1:3], one[3:5]))
+        seen = f"{near} to {far}" if one.largest_at > 0.0 or one.least_at > 0.0 else f"{degrees(one.least)} at t = 0"
+        table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
+
+
+def bounds_text(keep: Keep) -> str:
+    """What the spin axis has to keep to a direction; empty where it is only watched."""
+    least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
+    largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
+    return " and ".join(filter(None, (least, largest)))
+
+
+def cone_margins(one: Aspect) -> Iterator[tuple[str, float, float]]:
+    """Each bound of a cone, the angle that comes nearest to it, and by how much it keeps it, rad."""
+    keep = one.keep
+    if keep.least > 0.0:
+        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
+    if keep.most < math.pi:
+        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest

@@ -1,0 +1,170 @@
+"""The screen of ``fit``: what the telemetry tells, how well, and what it does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.forecast import Outlook
+from nutdamp.estimation.parameters import untold
+from nutdamp.estimation.results import SHARED, TOLD, Estimate, correlated, doubts, estimates
+from nutdamp.views.layout import columns, facts
+from nutdamp.views.text import MISSING, degrees, mass, sentence
+from nutdamp.views.verdicts import exact_percent, percent
+
+SHOWN = {
+    "axis": ("deg", 180.0 / math.pi),
+    "acceleration": ("m/s²", 1.0),
+    "sun_pulse": ("ms", 1e3),
+}
+"""Units of signals for people, and their factors; of all others deg/s."""
+
+FAR = 4.0
+"""Sigmas of the file from which on a change is remarked upon."""
+
+NOTHING = 1e-3
+"""Sigmas below which a value, or a change, is zero."""
+
+MOST_PAIRS = 6
+"""Correlations that are named."""
+
+SOURCES = {TOLD: "data", SHARED: "both", "file": "file"}
+
+
+def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> RenderableType:
+    """Everything that ``fit`` shows; the motion is that at ``time`` s, ``ahead`` what more telemetry would give."""
+    rows = estimates(found, time)
+    parts: list[RenderableType] = [Text(found.model.spacecraft.name, style="bold"), Text(), _record(found), Text()]
+    parts += [Text(f"Estimates; the motion is that at t = {time:g} s", style="bold"), _table(rows), Text()]
+    parts += [Text(sentence(line)) for line in told(found, rows)]
+    if ahead is not None:
+        parts += [Text(), _prospects(ahead), Text(), *(Text(sentence(line)) for line in advice(ahead))]
+    return Group(*parts)
+
+
+def _prospects(ahead: Outlook) -> Table:
+    """A row for each coast and probe pulse that was looked at."""
+    nutation = f"nutation\n{exact_percent(ahead.probability)}, deg"
+    table = columns("coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", nutation, "comply\n%")
+    for one in (*ahead.coasts, *ahead.probes):
+        probe = f"{one.probe}, {one.on_time:.3g} s" if one.probe else MISSING
+        thrust = f"{100.0 * one.thrust:.2g} %" if one.probe else MISSING
+        met = MISSING if one.met is None else f"{100.0 * one.met:.4g}"
+        length = f"{one.length:.4g}" + " (now)" * (one is ahead.now)
+        table.add_row(length, probe, f"{one.ratio:.2g}", thrust, f"{math.degrees(one.nutation):.3g}", met)
+    return table
+
+
+def advice(ahead: Outlook) -> Iterator[str]:
+    """Whether more telemetry would pay: clauses."""
+    now, longer, probe = ahead.now, ahead.longer, ahead.probe
+    level = exact_percent(ahead.probability)
+    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
+    if ahead.enough:
+        met = percent(now.met or 0.0, ahead.probability)
+        yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
+        return
+    if longer is None:
+        last = ahead.coasts[-1]
+        yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"
+    else:
+        yield f"{today}; a coast of {longer.length:.4g} s would leave {degrees(longer.nutation)}: it pays"
+    if probe is not None:
+        pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
+        yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
+        if probe.propellant is not None and ahead.propellant is not None:
+            spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
+            yield f"the probe pulse takes {spent}"
+    elif ahead.probes:
+        yield "no single probe pulse of a channel of the plan pays"
+
+
+def in_shown(signal: str) -> tuple[str, float]:
+    """Unit in which a signal is shown, and its factor from SI."""
+    return SHOWN.get(signal, ("deg/s", 180.0 / math.pi))
+
+
+def _record(found: Fit) -> Table:
+    model = found.model
+    record, table = model.record, facts()
+    period = 2.0 * math.pi / abs(_rate(found)) if _rate(found) else math.inf
+    turns = f", {record.length / period:.3g} nutation periods" if math.isfinite(period) else ""
+    table.add_row("record", f"{record.start:g} s to {record.end:g} s{turns}")
+    if len(record.schedule):
+        count = len(record.fired)
+        table.add_row("schedule", f"{count} pulse{'s' * (count != 1)} fired meanwhile")
+    for index, name in enumerate(model.signals):
+        rows = model.signal == index
+        unit, factor = in_shown(name)
+        count, out = int(rows.sum()), int((rows & ~found.used).sum())
+        left = f", {out} outliers left out" if out else ""
+        white = ", residuals white" if found.white(index) else ", residuals NOT white: the sigmas are too small"
+        if not found.resolved[index]:
+            white = ", the least that its digits or steps allow"
+        table.add_row(name, f"{count} samples{left}; noise {found.noise[index] * factor:.3g} {unit}{white}")
+    return table
+
+
+def _rate(found: Fit) -> float:
+    """Rate of the nutation in the body, rad/s, for small angles."""
+    values = found.named
+    return (1.0 - values["C/A"]) * values.get("omega_3", found.model.spacecraft.spin)
+
+
+def _table(rows: tuple[Estimate, ...]) -> Table:
+    table = columns("quantity", "value", "sigma", "unit", "file", "change\nsigmas", "from", text=("unit", "from"))
+    for one in rows:
+        digits = _digits(one)
+        file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
+        change = MISSING if one.change is None else _changed(one.change) if abs(one.change) > NOTHING else "0"
+        shown = one.value if math.isinf(one.sigma) or abs(one.value) > NOTHING * one.sigma else 0.0
+        value, sigma = (
+            f"{shown * one.factor:.{digits}g}",
+            f"{one.sigma * one.factor:.2g}" if math.isfinite(one.sigma) else MISSING,
+        )
+        table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
+    return table
+
+
+def _changed(change: float) -> str:
+    """A change in sigmas, to two digits or to whole ones."""
+    return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
+
+
+def _digits(one: Estimate) -> int:
+    """Significant digits of a value that its sigma leaves, and one more."""
+    if one.value == 0.0 or one.sigma <= 0.0 or math.isinf(one.sigma):
+        return 4
+    return min(max(2 + math.ceil(math.log10(max(abs(one.value) / one.sigma, 1.0))), 2), 9)
+
+
+def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
+    """What the data do not tell, what is known together only, and what the file does not expect: clauses."""
+    yield from doubts(found)
+    yield from untold(found.model.record)
+    kept = [one.label for one in rows if one.source == "file"]
+    if kept:
+        yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
+    tied = [f"{one} and {other} {value:+.4f}" for one, other, value in _moments(found)]
+    tied += [f"{one} and {other} {value:+.3f}" for one, other, value in correlated(found)[:MOST_PAIRS]]
+    if tied:
+        yield f"correlated: {', '.join(tied)}"
+    far = [f"{one.label} ({_changed(one.change)})" for one in rows if one.change is not None and abs(one.change) > FAR]
+    if far:
+        yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
+    if found.model.unequal and found.model.spacecraft.inertia.symmetric:
+        yield "I1 and I2 differ: the file has one A for both"
+
+
+def _moments(found: Fit) -> Iterator[tuple[str, str, float]]:
+    """The correlation of A and C, where both are estimated."""
+    from nutdamp.estimation.results import carried
+
+    known = carried(found, found.model.start)
+    if known.sigmas[0] > 0.0:
+        yield "A", "C", float(known.correlation[0, 1])

@@ -1,0 +1,79 @@
+"""What ``loop --json`` and ``verify --loop --json`` give."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
+from nutdamp.control_loop.stability import Margin
+from nutdamp.views.plan_json import final_json, heading, pulses_json, requirement_json, residual_json, target_json
+
+
+def loop_json(plan: LoopPlan) -> dict[str, Any]:
+    """Firings with what was seen, how it ends, the dead band, and how far each channel is from feeding."""
+    run, body = plan.flown_run, plan.spacecraft
+    seen = [{"decided_s": one.decided, "seen_deg": math.degrees(one.seen)} for one in run.fired]
+    return {
+        **heading(body),
+        "law": run.loop.law,
+        "seed": run.seed,
+        "case": run.case,
+        "until_s": run.until,
+        "stopped": run.stop.name.lower(),
+        "channel": run.channel,
+        "meets_requirement": False if run.stop.fault else plan.meets_requirement,
+        "requirement": requirement_json(plan),
+        "quiet_s": list(run.quiet),
+        "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
+        "dead_band_deg": math.degrees(plan.band.most),
+        "pulses": [{**pulse, **more} for pulse, more in zip(pulses_json(run.flight), seen, strict=True)],
+        "total_impulse_Nms": plan.total_impulse,
+        "propellant_kg": plan.propellant,
+        "end_s": plan.end,
+        "flown": residual_json(plan.flight.residual),
+        "final": final_json(plan.flight),
+        "target": target_json(body),
+        "margins": margins_json(plan.margins),
+    }
+
+
+def verified_json(found: LoopVerification) -> dict[str, Any]:
+    """What ``verify --loop --json`` gives: of each firing how far DOP853 differs."""
+    run = found.run
+    return {
+        **heading(run.spacecraft),
+        "scheme": "loop",
+        "agree": None if found.missing else found.agree,
+        "missing": found.missing or None,
+        "evaluations": found.evaluations,
+        "until_s": run.until,
+        "firings": [
+            {
+                "channel": one.pulse.channel,
+                "start_s": one.pulse.loaded[0],
+                "on_time_s": one.pulse.loaded[1],
+                "start_difference_s": start,
+                "on_time_difference_s": lasts,
+                "nutation_difference_deg": math.degrees(nutation),
+            }
+            for one, (start, lasts, nutation) in zip(run.fired, found.pairs, strict=False)
+        ],
+    }
+
+
+def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
+    """How far each channel is from feeding the nutation, at the start threshold."""
+    return [
+        {
+            "channel": one.channel,
+            "late_deg": math.degrees(one.late),
+            "latest_deg": math.degrees(one.latest) if math.isfinite(one.latest) else None,
+            "gain": one.gain,
+            "growth": one.growth,
+            "delay_margin_s": one.delay if math.isfinite(one.delay) else None,
+            "damps": one.damps,
+            "reversed": one.cause.turned,
+        }
+        for one in found
+    ]

@@ -1,0 +1,207 @@
+"""Plans, flights and spacecraft as JSON-ready dictionaries; vectors in the axes of the file, angles in degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from nutdamp import __version__
+from nutdamp.common.numerics import cleaned
+from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.propagation import Flight, Residual
+from nutdamp.planning.decision import Comparison, infeasibility, remarks
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Pulse
+
+RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
+"""Angles of a `Residual`."""
+
+
+def heading(spacecraft: Spacecraft) -> dict[str, Any]:
+    """How the JSON of every command begins: the version, and the spacecraft."""
+    return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
+
+
+def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
+    """What the JSON file of any command holds where nothing that was asked for is feasible."""
+    return {**heading(spacecraft), "feasible": False, "why": why}
+
+
+def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
+    return {
+        **heading(compared.spacecraft),
+        "plans": [compared_json(compared, plan) for plan in compared.plans],
+        "recommended": None if compared.recommended is None else compared.recommended.scheme,
+        **spoken,
+    }
+
+
+def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
+    """One of the plans compared; ``cases``: the share of dispersed cases that comply, null where not all have flown."""
+    data, share, cases = plan_json(plan), compared.shares.get(plan), compared.cases(plan)
+    data["meets_requirement"] = compared.meets(plan)
+    if plan.spacecraft.commands is not None:
+        data["can_be_commanded"] = plan.commandable if plan.feasible else None
+    if compared.shares:
+        data["cases"] = share and {
+            "samples": 0 if cases is None else cases.samples,
+            "met_fraction": share.exact,
+            "low": share.low,
+            "high": share.high,
+            "probability": share.probability,
+            "met": share.met,
+        }
+    return data
+
+
+def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """Derived quantities of a spacecraft at t = 0."""
+    inertia = spacecraft.inertia
+    found = spacecraft.widest
+    return {
+        "name": spacecraft.name,
+        "A_kgm2": inertia.A,
+        "C_kgm2": inertia.C,
+        "a": inertia.a,
+        "shape": inertia.shape,
+        "moments_kgm2": list(inertia.moments),
+        "principal_axes": cleaned(inertia.axes.T).tolist(),
+        "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
+        "nutation_deg": math.degrees(found.nutation),
+        "body_cone_deg": math.degrees(found.body),
+        "space_cone_deg": math.degrees(found.space),
+        "nutation_at_start_deg": math.degrees(spacecraft.tilt),
+        "body_nutation_period_s": spacecraft.body_period,
+        "inertial_nutation_period_s": spacecraft.inertial_period,
+        "target_axis": cleaned(spacecraft.target_axis).tolist(),
+        "target_angle_deg": math.degrees(spacecraft.to_turn),
+        "target_spin_rad_s": spacecraft.goal.spin,
+    }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """One plan; an infeasible one has no pulses, nulls, and why."""
+    schedule, body = plan.schedule, plan.spacecraft
+    return {
+        "scheme": plan.scheme,
+        "feasible": plan.feasible,
+        "why": infeasibility(plan) or None,
+        "meets_requirement": plan.meets_requirement,
+        "requirement": requirement_json(plan),
+        "pulses": [pulse_json(pulse, body) for pulse in plan.pulses],
+        "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
+        "least_impulse_Nms": None if schedule is None else body.least_impulse,
+        "propellant_kg": None if schedule is None else schedule.propellant,
+        "end_s": None if schedule is None else schedule.end,
+        "delta_v_m_s": None if plan.delta_v is None else cleaned(plan.delta_v).tolist(),
+        "spin_change_rad_s": plan.spin_change,
+        "residual": residual_json(plan.residual),
+        "flown": residual_json(plan.flown),
+        "final": None if schedule is None else final_json(plan.flight),
+        "target": target_json(body),
+        **aspects_json(plan.aspects if plan.feasible else ()),
+        "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
+        "notes": list(remarks(plan)),
+    }
+
+
+def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
+    """What is required, part by part, and what is left of it; None where nothing is, or without a schedule."""
+    found = []
+    for one in plan.held:
+        if one.bound.required:
+            unit, scale = ("rad_s", 1.0) if one.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            left, most = scale * one.left, scale * one.bound.most
+            found.append({"part": one.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": one.met})
+    return found or None
+
+
+def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
+    """One pulse of ``body``; with an epoch ``utc`` is when it starts.
+
+    Through a valve start and on-time are those of the command, and the effective ones are there too.
+    """
+    start, on_time = pulse.loaded
+    utc = body.utc(start)
+    effective = {"effective_start_s": pulse.start, "effective_on_time_s": pulse.on_time}
+    return {
+        "t_s": pulse.t,
+        "start_s": start,
+        **({} if utc is None else {"utc": utc}),
+        "on_time_s": on_time,
+        **({} if pulse.command is None else effective),
+        "channel": pulse.channel,
+        "torque_Nm": None if pulse.torque is None else body.inertia.in_file(pulse.torque).tolist(),
+        "impulse_Nms": body.inertia.in_file(pulse.impulse).tolist(),
+        "propellant_kg": pulse.propellant,
+    }
+
+
+def final_json(flown: Flight) -> dict[str, Any]:
+    """Where spin axis and angular momentum end, and what the body does from then on."""
+    body, final = flown.spacecraft, flown.final
+    return {
+        "axis": direction_json(body, final.axis),
+        "momentum": direction_json(body, final.momentum),
+        "spin_rad_s": final.spin,
+        "nutation_deg": math.degrees(final.nutation),
+    }
+
+
+def target_json(body: Spacecraft) -> dict[str, Any] | None:
+    """What is required of the end, in the form of `final_json`; None where nothing is."""
+    axis, spin = body.goal.axis, body.goal.spin
+    if axis is None and spin is None:
+        return None
+    return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
+
+
+def aspects_json(found: tuple[Aspect, ...]) -> dict[str, Any]:
+    """How near the spin axis comes to each direction that is watched; nothing for a file that names none."""
+    entries = [
+        {
+            "name": one.keep.name,
+            "least_deg": math.degrees(one.least),
+            "least_s": one.least_at,
+            "largest_deg": math.degrees(one.largest),
+            "largest_s": one.largest_at,
+            "min_deg": math.degrees(one.keep.least),
+            "max_deg": math.degrees(one.keep.most),
+            "kept": one.kept,
+        }
+        for one in found
+    ]
+    return {"aspects": entries} if entries else {}
+
+
+def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | None]:
+    """The two angles that name an inertial direction (3,), as `Spacecraft.angles_of`."""
+    around, other = (None if angle is None else math.degrees(angle) for angle in body.angles_of(direction))
+    if body.attitude is None:
+        return {"tilt_deg": other, "azimuth_deg": around}
+    return {"right_ascension_deg": around, "declination_deg": other}
+
+
+def residual_json(residual: Residual | None) -> dict[str, float | None]:
+    """Cone angles and shifts in degrees; nulls where there is no schedule."""
+    return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
+
+
+def pulses_json(flown: Flight) -> list[dict[str, Any]]:
+    """The pulses of a flight with the cone angles before and after each."""
+    before, after = flown.around_pulses()
+    return [
+        {
+            **pulse_json(pulse, flown.spacecraft),
+            **{
+                f"{cone}_{when}_deg": math.degrees(getattr(track, cone)[index])
+                for when, track in (("before", before), ("after", after))
+                for cone in ("nutation", "body_cone", "space_cone")
+            },
+        }
+        for index, pulse in enumerate(flown.schedule)
+    ]

@@ -1,0 +1,106 @@
+"""The screen of ``simulate``: cone angles around each pulse, residuals, extremes of the axis track."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.flight.end_state import aspects
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Extremes
+from nutdamp.planning.decision import Simulation
+from nutdamp.views.block_tables import blocks_screen, shown_pulses
+from nutdamp.views.decisions import decision_table, requirement
+from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
+from nutdamp.views.layout import columns, facts
+from nutdamp.views.plan_tables import channel_text, header
+from nutdamp.views.text import degrees, in_degrees, longitude, moment, pointing, quantity
+from nutdamp.views.verdicts import model_warnings
+
+
+def simulation_screen(simulation: Simulation) -> RenderableType:
+    """Everything that ``simulate`` shows."""
+    flight, found, decided = simulation.shown, simulation.extremes, simulation.decision
+    impulses, flown, pulses = simulation.impulses, simulation.flown, len(simulation.plan.pulses)
+    how = f"{simulation.plan.scheme}, propagated by the {flight.model}"
+    parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
+    if len(flight.schedule) < pulses:
+        begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
+        parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
+    if flight.schedule.blocks:
+        parts += [Text(), blocks_screen(flight, simulation.plan.delta_v)]
+    if len(flight.schedule):
+        shown = shown_pulses(flight.schedule)
+        parts += [Text(), _pulses(flight, shown)]
+        if len(shown) < len(flight.schedule):
+            parts.append(Text(f"{len(shown)} of {len(flight.schedule)} pulses; --json writes all.", style="dim"))
+    parts += [Text(), _ends(impulses, flown, found.until)]
+    if flight.spacecraft.attitude is None:
+        parts.append(Text(f"{FRAME_N}.", style="dim"))
+    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
+    parts += [Text(), *requirement(decided), decision_table(decided)]
+    parts += [Text(), _extremes(found, flight)]
+    return Group(*parts)
+
+
+def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
+    before, after = flight.around_pulses()
+    cones = ("nutation\ndeg", "body cone\ndeg", "space cone\ndeg")
+    table = columns("pulse\n", "centre\ns", "on-time\ns", "channel\n", "\n", *cones, text=("channel\n", "\n"))
+    for index in shown:
+        pulse = flight.schedule.pulses[index]
+        on_time = "ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}"
+        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
+        for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
+            angles = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
+            table.add_row(*cells, when, *map(in_degrees, angles))
+    return table
+
+
+def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
+    """What both models leave, and where they point, at ``until`` s."""
+    body = flown.spacecraft
+    table = columns(f"at {moment(until)}", "by impulses (17)", "flown, real widths")
+    rows = [
+        ("nutation", "nutation"),
+        ("body cone", "body_cone"),
+        ("space cone", "space_cone"),
+        ("shift of H", "momentum_shift"),
+    ]
+    if body.goal.axis is not None:
+        rows.append(("off the target", "axis_error"))
+    both = (impulses, flown)
+    for name, key in rows:
+        table.add_row(Text(name, style="dim"), *(degrees(getattr(one.residual, key)) for one in both))
+    for what, key in (("spin axis", "axis"), ("H", "momentum")):
+        angles = (angle_texts(body, getattr(one.final, key)) for one in both)
+        for name, *texts in zip(angle_names(body), *angles, strict=True):
+            table.add_row(Text(f"{what}: {name}", style="dim"), *texts)
+    table.add_row(Text("spin", style="dim"), *(quantity(one.final.spin, "rad/s", 6) for one in both))
+    return table
+
+
+def _extremes(found: Extremes, flight: Flight) -> Table:
+    table = facts()
+    far, near = found.farthest, found.nearest
+    table.add_row(
+        "spin axis from H(0)", f"{degrees(near[0])} at {moment(near[1])} to {degrees(far[0])} at {moment(far[1])}"
+    )
+    table.add_row("spin axis in x, in y", f"{_range(found.x)}, {_range(found.y)} of the inertial frame")
+    given = flight.spacecraft.attitude
+    if given is not None:
+        frame = given.frame or "the frame of the file"
+        west, east = map(longitude, found.right_ascension)
+        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
+        table.add_row("declination", _range(found.declination))
+    add_aspects(table, aspects(flight, found.until))
+    table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
+    return table
+
+
+def _range(values: tuple[float, float]) -> str:
+    low, high = map(pointing, values)
+    return f"{low.removesuffix(' deg')} to {high}"

@@ -1,0 +1,50 @@
+"""What ``simulate --json`` gives."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from nutdamp.flight import end_state
+from nutdamp.flight.end_state import aspects
+from nutdamp.physics.attitude import full_turn
+from nutdamp.planning.decision import Simulation
+from nutdamp.views.decision_json import decision_json
+from nutdamp.views.plan_json import aspects_json, final_json, heading, pulses_json, residual_json, target_json
+
+
+def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
+    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees."""
+    flight, found, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
+    attitude = flight.spacecraft.attitude
+    return {
+        **heading(flight.spacecraft),
+        "scheme": simulation.plan.scheme,
+        "propagated": "flown" if simulation.real else "residual",
+        "pulses": pulses_json(flight),
+        "residual": residual_json(impulses.residual),
+        "flown": residual_json(flown.residual),
+        "final": final_json(flown),
+        "final_by_impulses": final_json(impulses),
+        "differ": [one.part.value for one in end_state.deviations(impulses, flown)],
+        "target": target_json(flight.spacecraft),
+        **aspects_json(aspects(flight, found.until)),
+        "decision": decision_json(simulation.decision, verdict),
+        "until_s": found.until,
+        "axis_track": {
+            "frame": "N" if attitude is None else attitude.frame,
+            "farthest_from_momentum_deg": math.degrees(found.farthest[0]),
+            "farthest_s": found.farthest[1],
+            "nearest_to_momentum_deg": math.degrees(found.nearest[0]),
+            "nearest_s": found.nearest[1],
+            "x_deg": [math.degrees(value) for value in found.x],
+            "y_deg": [math.degrees(value) for value in found.y],
+            "right_ascension_deg": None if attitude is None else _turns(found.right_ascension),
+            "declination_deg": None if attitude is None else [math.degrees(v) for v in found.declination],
+        },
+    }
+
+
+def _turns(angles: tuple[float, float]) -> list[float]:
+    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, whatever lies between."""
+    return [math.degrees(full_turn(angle)) for angle in angles]

@@ -1,0 +1,266 @@
+"""What the actuators can do, before any plan: steps of each channel, and how well two of them suit a pair."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.physics import body as rigid_body
+from nutdamp.physics import precession, response
+from nutdamp.schemes import block_model
+from nutdamp.schemes.block_model import acts
+from nutdamp.spacecraft.constraints import (
+    commandable_widths,
+    effective_on_time,
+    effective_on_times,
+    longest_useful,
+    shortest_on_time,
+    usable,
+)
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Disturbance, Spacecraft
+
+SHORTEST, GRID = 1e-6, 600
+"""Part of the longest on-time from which on, and number of on-times among which, the largest step is looked for."""
+
+
+DIGITS = 9
+"""Of misses in rad, those that are no rounding: among equals the pair that is named first."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSteps:
+    """A channel and the nutation angles (rad) that its pulses take out or put in.
+
+    ``smallest`` is that of the shortest on-time that can be commanded, `limits.shortest_on_time`, and is 0 without any;
+    ``largest`` the most of on-times up to `limits.longest_useful`, a right angle where nothing bounds it.
+    """
+
+    channel: Channel
+    smallest: float
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class SunClock:
+    """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
+
+    ``first`` is None where there is none, and ``refusal`` then says why.
+    """
+
+    turn: float
+    first: float | None
+    refusal: str = ""
+
+
+def sun_clock(spacecraft: Spacecraft) -> SunClock | None:
+    """When Sun pulses come; None where the file says nothing of Sun and sensor."""
+    if spacecraft.sun is None or spacecraft.sun_sensor is None:
+        return None
+    turn = block_model.spin_turn(spacecraft)
+    try:
+        return SunClock(turn, block_model.first_sun_pulse(spacecraft))
+    except Infeasible as reason:
+        return SunClock(turn, None, str(reason))
+
+
+@dataclass(frozen=True, slots=True)
+class Turns:
+    """By how much one pulse of a command block turns H at the spin of t = 0: least and most, rad, of which width, s."""
+
+    channel: Channel
+    smallest: float
+    smallest_width: float
+    largest: float
+    largest_width: float
+
+
+def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
+    """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
+    found, commands, spin = [], spacecraft.commands, spacecraft.spin
+    for channel in () if commands is None else usable(spacecraft):
+        assert commands is not None
+        widths = commandable_widths(commands, channel)
+        if len(widths):
+            given, momentum = acts(channel, widths), spacecraft.inertia.C * abs(spin)
+            each = precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
+            least, most = int(np.argmin(each)), int(np.argmax(each))
+            ends = (float(value[at]) for at in (least, most) for value in (each, widths))
+            found.append(Turns(channel, *ends))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class PairFit:
+    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is how far the second is off the direction needed."""
+
+    first: Channel
+    second: Channel
+    miss: float
+
+
+def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
+    """Smallest and largest step of each channel, in the order of the file."""
+    period = spacecraft.body_period
+    steps = []
+    for channel in spacecraft.channels:
+        shortest = effective_on_time(channel, shortest_on_time(spacecraft, channel))
+        longest = longest_useful(effective_on_times(channel)[1], period)
+        most = max(_step(spacecraft, channel, on_time) for on_time in _on_times(channel, shortest, longest))
+        steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), most))
+    return tuple(steps)
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """What a command of ``on_time`` s gives: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
+
+    The centroid counts from the start of the command.
+    """
+
+    channel: Channel
+    on_time: float
+    effective: float
+    impulse: float
+    centroid: float
+
+
+def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
+    """What the shortest and the longest command of each channel give, of those that have valves."""
+    found = []
+    for channel in spacecraft.channels:
+        if channel.valve is None:
+            continue
+        for on_time in dict.fromkeys((shortest_on_time(spacecraft, channel), channel.max_on_time)):
+            if 0.0 < on_time < math.inf:
+                thrust = channel.valve.thrust(on_time)
+                impulse = channel.strength * thrust.on_time
+                found.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
+    return tuple(found)
+
+
+def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
+    """Those among which the largest step is, s: the longest, but where the spin changes during the pulse."""
+    if channel.axial == 0.0 or math.isinf(longest) or not 0.0 < longest > shortest:
+        return [longest]
+    return [*np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist(), longest]
+
+
+def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
+    if math.isinf(on_time):
+        return 0.5 * math.pi
+    inertia, spin = spacecraft.inertia, spacecraft.spin
+    factor = abs(response.width_factor(inertia.a, spin, channel.axial / inertia.C, on_time))
+    return math.atan2(abs(channel.transverse) * on_time * factor, inertia.C * abs(spin))
+
+
+def mounting_angle(spacecraft: Spacecraft) -> float:
+    """`damping.mounting_angle` of the spacecraft, rad."""
+    inertia = spacecraft.inertia
+    return rigid_body.mounting_angle(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+
+
+def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
+    """The two channels whose directions come nearest to the turn between two half pulses; None without channels."""
+    needed = cmath.rect(
+        1.0,
+        rigid_body.turn_between_halves(
+            spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.transverse_rate, spacecraft.spin
+        ),
+    )
+    usable = [channel for channel in spacecraft.channels if channel.damps]
+    torques = np.array([channel.transverse for channel in usable])
+    best: PairFit | None = None
+    for first, torque in zip(usable, torques, strict=True):  # a row at a time: many channels have very many pairs
+        misses = np.angle(torques * np.conj(torque * needed))
+        index = int(np.argmin(np.abs(misses).round(DIGITS)))
+        if best is None or round(abs(misses[index]), DIGITS) < round(abs(best.miss), DIGITS):
+            best = PairFit(first, usable[index], float(misses[index]))
+    return best
+
+
+@dataclass(frozen=True, slots=True)
+class Consequence:
+    """What one disturbance does in the long run.
+
+    ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
+    ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14).
+    From rest the nutation swells to ``beat`` (rad) and back within ``beat_period`` s, (27). At resonance, (25), these
+    are None and ``resonant`` holds the times (s) at which it has driven the nutation to `MARKS`. An axial
+    part changes the spin at ``spin_rate`` rad/s².
+    """
+
+    disturbance: Disturbance
+    precession: float | None
+    tilt: float | None
+    beat: float | None
+    beat_period: float
+    resonant: tuple[tuple[float, float], ...]
+    spin_rate: float
+
+
+MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
+"""Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
+
+
+RESONANT = 3.0
+"""Beat period over horizon from which a disturbance counts as resonant."""
+
+
+def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
+    """What each disturbance does, in the order of the file."""
+    return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
+
+
+def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
+    inertia, spin = spacecraft.inertia, spacecraft.spin
+    A, C = inertia.A, inertia.C
+    spin_rate = one.axial / C
+    if one.transverse == 0.0:
+        return Consequence(one, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+    largest, period = response.beat(A, C, spin, one.transverse, one.rate)
+    # A beat that takes longer than everything planned, several times over, is a resonance for the user.
+    if period > RESONANT * spacecraft.horizon:
+        omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
+        times = tuple(
+            (mark, response.resonant_time(A, C, omega0, spin, one.transverse, mark))
+            for mark in MARKS
+            if mark > spacecraft.nutation
+        )
+        return Consequence(one, None, None, None, period, times, spin_rate)
+    steady = abs(response.steady_response(A, C, spin, one.transverse, one.rate))
+    tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
+    return Consequence(one, steady, float(tilt), float(swell), period, (), spin_rate)
+
+
+@dataclass(frozen=True, slots=True)
+class SpinAxis:
+    """Axis 3 as nature sees it.
+
+    ``kind`` of `stability.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `stability.growth`; ``tilt``
+    (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the
+    despun frame and inertially, K(7), K(10), K(13), rad/s.
+    """
+
+    kind: str
+    exponent: float
+    growth_time: float
+    tilt: float
+    rates: rigid_body.NutationRates
+
+
+def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
+    """Class, stability and nutation rates of the spin axis."""
+    inertia = spacecraft.inertia
+    grows = rigid_body.growth(inertia.moments, spacecraft.spin)
+    return SpinAxis(
+        rigid_body.axis_class(inertia.moments),
+        grows.squared_exponent,
+        grows.growth_time,
+        rigid_body.principal_tilt(inertia.axes),
+        rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin),
+    )

@@ -1,0 +1,129 @@
+"""Numbers as people read them: four digits, units, degrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from nutdamp.common.numerics import cleaned
+
+MISSING = "–"
+"""Shown where a number is not known."""
+
+RPM = 30.0 / math.pi
+"""Turns a minute of one rad/s."""
+
+LONG = (
+    ("s", 1.0, 3600.0),
+    ("hours", 3600.0, 172_800.0),
+    ("days", 86_400.0, 63_115_200.0),
+    ("years", 31_557_600.0, math.inf),
+)
+"""Units of long times: their length, s, and up to which time, s, they are used."""
+
+
+def quantity(value: float | None, unit: str, digits: int = 4) -> str:
+    """A number with its unit; what is not known or infinite says so."""
+    if value is None or math.isnan(value):
+        return MISSING
+    if math.isinf(value):
+        return "infinite" if value > 0 else "-infinite"
+    return f"{value:.{digits}g} {unit}"
+
+
+def digits(value: float, count: int) -> str:
+    """A number to ``count`` figures, final zeros too, for columns and labels where the others have as many."""
+    return f"{value:#.{count}g}".rstrip(".")
+
+
+def sentence(clause: str) -> str:
+    """A clause with a capital letter, unless it begins with a key of the file, and a full stop, unless it asks."""
+    first, _, _ = clause.partition(" ")
+    begun = clause if "." in first else clause[:1].upper() + clause[1:]
+    return begun if begun.endswith("?") else f"{begun}."
+
+
+def degrees(angle: float | None) -> str:
+    """An angle given in rad, in degrees; what is below 1e-9 deg is rounding and shown as such."""
+    if angle is None or math.isnan(angle):
+        return MISSING
+    shown = math.degrees(angle)
+    if abs(shown) < 1e-9:
+        return "< 1e-9 deg" if shown != 0.0 else "0 deg"
+    return f"{shown:.4g} deg"
+
+
+def in_degrees(angle: float | None) -> str:
+    """`degrees` without the unit, for columns that name it: with final zeros, as `digits` has them."""
+    if angle is None or not abs(math.degrees(angle)) >= 1e-9:  # not known, or rounding
+        return degrees(angle).removesuffix(" deg")
+    return digits(math.degrees(angle), 4)
+
+
+def most(angle: float) -> str:
+    """The most that an angle may be, given in rad, in degrees: as it was given, however small."""
+    return f"{math.degrees(angle):.4g} deg"
+
+
+def mass(value: float | None) -> str:
+    """Propellant given in kg, in g below a kilogram."""
+    return MISSING if value is None else quantity(*_in_grams(value))
+
+
+def _in_grams(value: float) -> tuple[float, str]:
+    """A mass given in kg, and its unit: g below a kilogram."""
+    return (1e3 * value, "g") if value < 1.0 else (value, "kg")
+
+
+def cost(value: float | None, unit: str) -> str:
+    """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
+    if value is None or value == 0.0 or not math.isfinite(value):
+        return mass(value) if unit == "kg" else quantity(value, unit)
+    size, name = _in_grams(value) if unit == "kg" else (value, unit)
+    return f"{digits(size, 4)} {name}"
+
+
+def duration(value: float | None) -> str:
+    """A time given in s, in ms below a tenth of a second."""
+    if value is None or not math.isfinite(value) or value == 0.0 or value >= 0.1:
+        return quantity(value, "s")
+    return quantity(1e3 * value, "ms")
+
+
+def lasting(value: float | None) -> str:
+    """A time given in s that may be long: in s, hours, days or years."""
+    if value is None or not math.isfinite(value):
+        return quantity(value, "s")
+    unit, size = next(one for one in LONG if value < one[2])[:2]
+    return quantity(value / size, unit)
+
+
+def moment(value: float) -> str:
+    """A point in time given in s, to the millisecond."""
+    return f"{value:.3f} s"
+
+
+def vector(components: Iterable[float]) -> str:
+    """Components in brackets, without what is rounding."""
+    return "(" + ", ".join(f"{part:.4g}" for part in cleaned(list(components)).tolist()) + ")"
+
+
+def pointing(angle: float | None) -> str:
+    """An angle of a direction given in rad, in degrees to four decimals, as every place shows it."""
+    return MISSING if angle is None else f"{fixed(math.degrees(angle), 4)} deg"
+
+
+def longitude(angle: float | None) -> str:
+    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; what is at the pole has none."""
+    return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
+
+
+def steering(impulse: Sequence[float]) -> str:
+    """Direction of a transverse torque in the 1-2 plane, from axis 1 towards axis 2: 0 to below 360 degrees."""
+    return f"{fixed(math.degrees(math.atan2(impulse[1], impulse[0])) % 360.0, 2, 360.0)}°"
+
+
+def fixed(value: float, digits: int, period: float = math.inf) -> str:
+    """A number with so many decimals, without -0; what rounds up to ``period`` is 0."""
+    rounded = round(value, digits)
+    return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"
