@@ -1,7 +1,8 @@
-"""What is rounding and no result: the one place that says which numbers are shown as 0."""
+"""Quadrature, and rounding that is no result: the one place that says which numbers are shown as 0."""
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -13,6 +14,13 @@ NOISE = 1e-13
 
 SAME_ANGLE = 1e-11
 """rad; angles that differ by less count as equal, and a direction this near a pole has no longitude."""
+
+
+@functools.cache
+def gauss_legendre(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Nodes and weights, (count,) each, of quadrature on [-1, 1]."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return nodes, weights
 
 
 def cleaned(vectors: ArrayLike) -> NDArray[np.float64]:

@@ -456,12 +456,12 @@ class _Reader:
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
         torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
         self._compare(line, cells, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
-        length = "on_time_s" if pulse.command is None else "effective_on_time_s"
+        length = "effective_on_time_s" if pulse.through_valve else "on_time_s"
         self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
         if pulse.propellant is not None:
             used = f"{pulse.propellant:g} by the spacecraft file"
             self._compare(line, cells, ("propellant_kg",), [pulse.propellant], used)
-        if pulse.command is not None:
+        if pulse.through_valve:
             meant = f"what the valve of {named} makes of the command"
             for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
                 self._compare(line, cells, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -9,11 +10,22 @@ from typing import Any
 
 import numpy as np
 
+from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import lightened
+from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel
 from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, VALVES, Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
+from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
+
+EVEN = 0.01
+"""Share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse."""
+
+NODES = 6
+"""Of the quadrature in each of them."""
+
+REPEATED, CLOSE = 60, 1e-14
+"""Repetitions, and the share by which an on-time may still change, where one is found for an impulse."""
 
 
 class Supply:
@@ -59,15 +71,45 @@ class Supply:
         if channel is None or pulse.torque is None or self.steady:
             share = self.draw(pulse.propellant or 0.0)
             return pulse if share == 1.0 else weakened(pulse, share)
-        level, propellant = self.take(channel, pulse.on_time)
+        made = pulse if pulse.command is None else on_command(channel, *pulse.loaded)
+        before, flow = self.used, self.full_flow(channel)
+        level, propellant = self.take(channel, made.on_time)
         torque, force = channel.torque * level, channel.force
+        if self.spacecraft.tank is not None and flow is not None and propellant:
+            cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
+            made = falling(made, self.spacecraft.tank, before, flow * cold)
         return replace(
-            pulse,
+            made,
             torque=torque,
-            impulse=torque * pulse.on_time,
+            impulse=torque * made.on_time,
             force=None if force is None else force * level,
             propellant=propellant,
         )
+
+    def on_time_for(self, channel: Channel, effective: float) -> float:
+        """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s of the thrust of the file.
+
+        Found by repeating: each step errs by the share by which the thrust falls, of the error before it.
+        """
+        cold, tank, flow = self.spacecraft.cold, self.spacecraft.tank, self.full_flow(channel)
+        warm = effective / (1.0 if cold is None else cold.factor(self.fired[channel.name]))
+        if tank is None:
+            return warm
+        on_time = warm / float(tank.thrust_factor(self.used))
+        for _ in range(REPEATED if flow is not None else 0):
+            before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
+            if abs(on_time - before) <= CLOSE * on_time:
+                break
+        return on_time
+
+    def full_flow(self, channel: Channel) -> Any:
+        """Propellant of a second of the thrust of the file, kg; times the specific impulse where the tank has it."""
+        tank = self.spacecraft.tank
+        if tank is None or tank.isp is None or any(one.thrust is None for one in channel.thrusters):
+            return channel.mass_flow
+        if channel.mass_flow is None:
+            return None
+        return sum(one.thrust or 0.0 for one in channel.thrusters) / STANDARD_GRAVITY
 
     def draw(self, propellant: Any) -> Any:
         """Draws so many kg; returns the share of them that there is."""
@@ -76,16 +118,18 @@ class Supply:
         return 1.0 if tank is None else tank.share(before, propellant)
 
     def take(self, channel: Channel, on_time: Any) -> tuple[Any, Any]:
-        """Level of a pulse of effective ``on_time`` s and its propellant, kg or None; it counts for those after it.
+        """Mean level of a pulse of effective ``on_time`` s and its propellant, kg or None, which counts for later ones.
 
         No level once the tank is empty.
         """
-        level, tank = self.level(channel.name), self.spacecraft.tank
-        isp = None if tank is None else tank.isp_after(self.used)
-        flow: Any = channel.mass_flow
-        if flow is not None and isp is not None and all(one.thrust is not None for one in channel.thrusters):
-            flow = sum(one.thrust or 0.0 for one in channel.thrusters) / (isp * STANDARD_GRAVITY)
-        propellant = None if flow is None else flow * on_time * level
+        flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
+        warmth = 1.0 if cold is None else cold.factor(self.fired[channel.name])
+        if flow is None or tank is None:
+            level = self.level(channel.name)
+            propellant = None if flow is None else flow * on_time * level
+        else:
+            propellant, level = tank.burn(self.used, flow * warmth, on_time)
+            level = warmth * level
         self.fired[channel.name] += 1
         share = self.draw(0.0 if propellant is None else propellant)
         return level * share, None if propellant is None else propellant * share
@@ -115,6 +159,36 @@ def weakened(pulse: Pulse, factor: float) -> Pulse:
     torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
     used = None if pulse.propellant is None else abs(factor) * pulse.propellant
     return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
+
+
+def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
+    """A pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone as it began.
+
+    ``flow`` as `Tank.burn` takes it. Its ramps are straight pieces, each with the impulse and the centroid of the
+    thrust there; its mean level is left to the torque.
+    """
+    start, on_time = pulse.loaded
+    command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
+    gone, mean = tank.burn(used, flow, pulse.on_time)
+    first, last = (float(tank.thrust_factor(used + one) / mean) for one in (0.0, gone))
+    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
+    nodes, weights = gauss_legendre(NODES)
+    for ramp in command.ramps:
+        length = (ramp.end - ramp.begin) / pieces
+        for number in range(pieces):
+            begin, middle = ramp.begin + number * length, ramp.begin + (number + 0.5) * length
+            rise = (ramp.last - ramp.first) / pieces
+            ahead = ramp.first + number * rise
+            along = 0.5 * length * (1.0 + nodes)
+            opened = passed + ahead * along + 0.5 * rise / length * along**2
+            factors = tank.thrust_factor(used + tank.burn(used, flow, opened)[0]) / mean
+            levels = (ahead + rise * along / length) * factors
+            even, lean = 0.5 * float(weights @ levels), 1.5 * float(weights @ (nodes * levels))
+            ramps.append(Ramp(begin, begin + length, even - lean, even + lean))
+            moment += even * length * (middle - pulse.t) + lean * length**2 / 6.0
+            passed += (ahead + 0.5 * rise) * length
+    shaped = replace(command, ramps=tuple(ramps), fall=first - last)
+    return replace(pulse, t=pulse.t + moment / pulse.on_time, command=shaped)
 
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:

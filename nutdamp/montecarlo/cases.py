@@ -384,7 +384,8 @@ class Model:
             parts = {name: each.acts for name, each in opened.items()}
             longer = {name: acts / one.pulse.on_time for name, (acts, _, _) in parts.items()}
             centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
-            lead = centroid - 0.5 * width
+            fall = 0.0 if one.pulse.command is None else one.pulse.command.fall
+            lead = centroid - fall * width / 12.0 - 0.5 * width
         factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
         torque, mean, flow = nominal if not opened else self._torque(one.source, draws, longer)
         if one.source == STEERABLE and not self._members[STEERABLE]:

@@ -19,6 +19,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import gauss_legendre
 from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, plus, rotated, times
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.batch import cos_sin
@@ -245,7 +246,7 @@ def nodes_for(phase: float) -> int:
 @cache
 def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
     """The nodes above zero of an even Gauss-Legendre rule, with weights for the mean of an even function."""
-    places, weights = np.polynomial.legendre.leggauss(nodes)
+    places, weights = gauss_legendre(nodes)
     half = nodes // 2
     return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
 

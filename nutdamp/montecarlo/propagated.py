@@ -195,7 +195,7 @@ class RealWidths:
             starts = _whole(cases.starts, count)
             impulses = np.array([_whole(impulse, count) for impulse in cases.impulses]).reshape(-1, 3, count)
             pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=_sheds(cases, count))
-            if self.model.schedule.through_valves:
+            if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses)
             settled, turned = batch.fly(self._bodies(moments), rates, _upright(count), pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
@@ -248,12 +248,16 @@ class RealWidths:
                     add(begin, ramp.end - ramp.begin, impulse * share, lean, number, share)
                 continue
             command = start - cases.leads[number]
+            fall = 0.0 if pulse.command is None else pulse.command.fall  # of the nominal pulse, evenly
             for one in thrust:
-                acts = one.opened.acts[0]
+                acts, passed = one.opened.acts[0], 0.0
                 for begin, length, level, lean in one.opened.pieces:
                     area = level * length
-                    part = area / np.where(acts == 0.0, 1.0, acts) / len(thrust)
-                    add(command + begin, length, _whole(one.torque, count) * area, lean, number, part)
+                    part = area / np.where(acts == 0.0, 1.0, acts)
+                    area = area * (1.0 + fall * (0.5 - passed - 0.5 * part))
+                    lean = lean - 0.5 * fall * part
+                    add(command + begin, length, _whole(one.torque, count) * area, lean, number, part / len(thrust))
+                    passed = passed + part
         return batch.Pulses(
             np.array(begins).reshape(-1, count),
             np.array(lengths).reshape(-1, count),

@@ -12,7 +12,6 @@ dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C.
 from __future__ import annotations
 
 import cmath
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -20,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import gauss_legendre
 from nutdamp.physics import energy_sink
 
 Array = NDArray[np.float64]
@@ -175,13 +175,6 @@ PANEL = 2.0
 """Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
 
 
-@functools.cache
-def _gauss() -> tuple[Array, Array]:
-    """Nodes and weights of ten-point Gauss-Legendre quadrature, made when first used: numpy.polynomial loads slowly."""
-    nodes, weights = np.polynomial.legendre.leggauss(10)
-    return nodes, weights
-
-
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
     """∫ exp(i(slope s + bend s²)) ds from 0 to ``length``, (n,) each, to rounding, by Gauss-Legendre panels.
 
@@ -195,7 +188,7 @@ def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
     firsts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     number = np.arange(len(owner)) - firsts[owner]
     width = length[owner] / counts[owner]
-    nodes, weights = _gauss()
+    nodes, weights = gauss_legendre(10)
     s = (number + 0.5)[:, None] * width[:, None] + 0.5 * width[:, None] * nodes
     phase = (slope[owner][:, None] + bend[owner][:, None] * s) * s
     panels = 0.5 * width * (np.exp(1j * phase) @ weights)

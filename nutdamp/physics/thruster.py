@@ -9,7 +9,6 @@ What thrust depends on besides commands: how cold the nozzle is, and the pressur
 
 from __future__ import annotations
 
-import functools
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
@@ -18,6 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from nutdamp.common.numerics import gauss_legendre
 
 SMALL = 1e-9
 """Share of a pressure by which the slope of a table is taken."""
@@ -47,6 +48,17 @@ class Cold:
     def decay(self, before: int) -> Any:
         """What is left of the difference to a warm nozzle then, over that of the first pulse."""
         return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
+
+
+PIECES = 16
+"""Parts of a pulse in which the specific impulse is that of their middle."""
+
+
+def expanded(rise: Any, power: Any) -> Any:
+    """((1 + rise)^(1/power) - 1) power/rise, 1 at 0: numbers or arrays, complex ones too."""
+    still = rise == 0.0
+    safe = np.where(still, 1.0, rise)
+    return np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +98,31 @@ class Tank:
     def thrust_factor(self, used: Any) -> Any:
         """Thrust over that of a full tank."""
         return (self.pressure_after(used) / self.pressure) ** self.exponent
+
+    def burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
+        """Propellant (kg) of ``time`` s of full thrust after ``used`` kg, and its mean thrust over that of a full tank.
+
+        ``flow`` is that of a full tank, kg/s; where the tank has the specific impulse, this times it. The pressure
+        falls as the gas expands, p = p0/(1 + κu/U) with κ = p0/p1 - 1, and the thrust with its power x, so that
+        (1 + κu/U)^(x+1) grows evenly in time. Past the last of the propellant it goes on falling.
+        """
+        if self.isp is None:
+            return self._burn(used, flow, time)
+        gone, acts, step = 0.0 * time, 0.0 * time, time / PIECES
+        for _ in range(PIECES):
+            half, _ = self._burn(used + gone, flow / self.isp_after(used + gone), 0.5 * step)
+            more, level = self._burn(used + gone, flow / self.isp_after(used + gone + half), step)
+            gone, acts = gone + more, acts + level / PIECES
+        return gone, acts
+
+    def _burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
+        """`burn` with one specific impulse."""
+        full, power = self.pressure / self.final_pressure - 1.0, self.exponent + 1.0
+        grown = 1.0 + full * np.minimum(used, self.propellant) / self.propellant
+        level = grown ** (-self.exponent)
+        rise = power * full * flow * level * time / (grown * self.propellant)
+        share = expanded(rise, power)
+        return flow * level * time * share, level * share
 
     def share(self, used: Any, more: Any) -> Any:
         """Share of a pulse that is fired which takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
@@ -349,13 +386,6 @@ Valve = Trapezoid | Measured
 """What leads from commands to thrust. Times of commands are on-times as they are loaded."""
 
 
-@functools.cache
-def _gauss() -> tuple[Array, Array]:
-    """Nodes and weights on [-1, 1], made when first used."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    return nodes, weights
-
-
 def shape_factor(
     a: float,
     spin: float,
@@ -371,7 +401,7 @@ def shape_factor(
     of the ``ramps``, their impulse E, and times from the beginning of the first: with the whole spin change at the
     centroid ω3 turns the body by the end as far as it does. ``spin`` is ω3 as the first begins, rad/s.
     """
-    nodes, weights = _gauss()
+    nodes, weights = gauss_legendre(NODES)
     origin = ramps[0].begin
     centre = centroid - origin
     total, given, turned = 0.0 + 0.0j, 0.0, 0.0  # ∫ f exp, ∫ f, ∫∫ f up to here

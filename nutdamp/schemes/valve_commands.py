@@ -231,13 +231,14 @@ def _translated(
         if channel is None:
             pulses.append(supply.fire(pulse, None))
             continue
-        level = supply.level(channel.name)
-        on_time = pulse.on_time / level
+        on_time = supply.on_time_for(channel, pulse.on_time)
         if on_time > spacecraft.horizon:
+            level = pulse.on_time / on_time
             text = f"a pulse at {level:.2g} times the thrust, cold or at low pressure, would take {on_time:.4g} s"
             raise Infeasible(f"{text}, longer than limits.horizon")
         given = replace(pulse, on_time=on_time) if unbounded else channel_pulse(channel, pulse.t, on_time)
-        pulses.append(supply.fire(given, channel))
+        fired = supply.fire(given, channel)
+        pulses.append(fired.moved(pulse.t - fired.t))
     return tuple(pulses)
 
 

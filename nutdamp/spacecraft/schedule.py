@@ -31,14 +31,18 @@ Label = TypeVar("Label")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is loaded to fire a pulse through a valve, ``start`` and ``on_time`` s, and the thrust that follows.
+    """What is loaded to fire a pulse, ``start`` and ``on_time`` s, and the thrust that follows.
 
-    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse.
+    ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse. ``valve``: one makes
+    another on-time of it; else the thrust is as long as commanded, and falls with the pressure of the tank. ``fall``:
+    by which share of its mean that lowers it from the begin to the end.
     """
 
     start: float
     on_time: float
     ramps: tuple[Ramp, ...]
+    valve: bool = True
+    fall: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,11 @@ class Pulse:
     def loaded(self) -> tuple[float, float]:
         """Start and on-time as they are commanded, s."""
         return (self.start, self.on_time) if self.command is None else (self.command.start, self.command.on_time)
+
+    @property
+    def through_valve(self) -> bool:
+        """Whether a valve makes another on-time of the command."""
+        return self.command is not None and self.command.valve
 
     @property
     def thrust(self) -> tuple[float, float]:
@@ -117,7 +126,7 @@ class Pulse:
         command = self.command
         if command is not None:
             ramps = tuple(ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps)
-            command = Command(command.start + by, command.on_time, ramps)
+            command = replace(command, start=command.start + by, ramps=ramps)
         return replace(self, t=self.t + by, command=command)
 
     @property
@@ -267,7 +276,12 @@ class Schedule:
 
     @property
     def through_valves(self) -> bool:
-        """Whether any of the pulses is not what it is commanded."""
+        """Whether any of the pulses is not as long as it is commanded."""
+        return any(pulse.through_valve for pulse in self.pulses)
+
+    @property
+    def shaped(self) -> bool:
+        """Whether the thrust of any of the pulses is no rectangle."""
         return any(pulse.command is not None for pulse in self.pulses)
 
     @property

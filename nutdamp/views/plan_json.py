@@ -133,7 +133,7 @@ def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
         "start_s": start,
         **({} if utc is None else {"utc": utc}),
         "on_time_s": on_time,
-        **({} if pulse.command is None else effective),
+        **(effective if pulse.through_valve else {}),
         "channel": pulse.channel,
         "torque_Nm": None if pulse.torque is None else body.inertia.in_file(pulse.torque).tolist(),
         "impulse_Nms": body.inertia.in_file(pulse.impulse).tolist(),

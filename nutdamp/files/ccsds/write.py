@@ -162,7 +162,7 @@ def unsaid(body: Spacecraft) -> list[str]:
 def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
     """What is said of the manoeuvre of a pulse: its channel, and through a valve what is commanded for it."""
     found = [f"pulse {number}: {pulse.channel}"]
-    if pulse.command is not None:
+    if pulse.through_valve:
         start, on_time = pulse.loaded
         found.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
         found.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")

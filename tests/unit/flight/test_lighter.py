@@ -62,21 +62,19 @@ def independent(body: Spacecraft, made: Schedule) -> tuple[np.ndarray, np.ndarra
     """Rates (3,), rotation (3, 3) and moments (3,) after the last pulse, from commands and pressure alone."""
     assert body.tank is not None
     start, per_kg = np.asarray(body.inertia.moments), np.asarray(body.tank.inertia_per_kg)
-    channels, used, swells = {one.name: one for one in body.channels}, 0.0, []
+    channels, swells = {one.name: one for one in body.channels}, []
     for pulse in sorted(made, key=lambda one: one.loaded[0]):
         one = channels[pulse.channel]
-        pressure = 22e5 / (1.0 + (22.0 / 16.0 - 1.0) * used / 0.002)
         slow = dict(zip(("opening", "closing", "rise", "fall"), (0.015, 0.012, 0.005, 0.010), strict=True))
         times = slow if isinstance(one.valve, Trapezoid) else dict.fromkeys(slow, 0.0)
-        torques = reference.through_valve(*pulse.loaded, pressure / 22e5 * one.torque, **times)
-        swells += torques
-        impulse = sum(0.5 * (each.end - each.start) * float(np.linalg.norm(each.first + each.last)) for each in torques)
-        used += impulse / float(np.linalg.norm(one.torque)) * 10.0 / (220.0 * 9.80665)
+        swells += reference.through_valve(*pulse.loaded, one.torque, **times)
 
     def slope(t: float, y: np.ndarray, firing: list[reference.Swell]) -> np.ndarray:
         moments, rotation, w = start - y[12] * per_kg, y[3:12].reshape(3, 3), y[:3]
-        torque = sum((one.at(t) for one in firing), np.zeros(3))
-        flow = sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3) * 10.0 / (220.0 * 9.80665)
+        level = 1.0 / (1.0 + (22.0 / 16.0 - 1.0) * y[12] / 0.002)
+        torque = level * sum((one.at(t) for one in firing), np.zeros(3))
+        thrust = level * sum(float(np.linalg.norm(one.at(t))) for one in firing) / math.hypot(8.0, 0.3)
+        flow = thrust * 10.0 / (220.0 * 9.80665)
         spins = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
         return np.concatenate([(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]])
 
@@ -97,7 +95,8 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed,
     assert moments[0] < 0.98 * 120.0
     assert by_flight.last_moments == pytest.approx(moments, rel=1e-12)
     assert by_flight.settled.rates == pytest.approx(rates, abs=1e-12)
-    assert by_flight.final.momentum == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-12)
+    # Straight pieces of falling thrust err by a little more than the integration.
+    assert by_flight.final.momentum == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-11)
     assert by_flight.sampled(50, made.end).momentum[-1] == pytest.approx(momentum, abs=1e-9)
     # The impulse sum takes each pulse at its centre: what it leaves out is of second order.
     assert by_impulses(body, made).motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
@@ -133,6 +132,8 @@ def missed_by_cases(body: Spacecraft, made: Schedule) -> float:
 def test_what_is_left_out_is_of_second_order(missed: Callable[[Spacecraft, Schedule], float]) -> None:
     """Pulses of half the length: each errs by a quarter of what whole ones do, or less."""
     body = craft(AXIAL, None, axial=0.0)
+    assert body.tank is not None
+    body = replace(body, tank=replace(body.tank, final_pressure=body.tank.pressure))  # rectangles
     long, short = (missed(body, fires(body, 0, on_time=on_time)) for on_time in (0.05, 0.025))
     assert long > 1e-9
     assert short < 0.3 * long

@@ -145,7 +145,10 @@ def test_a_case_of_another_tank_is_the_flight_of_such_a_body(change: str) -> Non
     assert abs(expected - nominal) > math.radians(1e-4)
     # Half of what a ramp takes off the moments counts as it begins: of second order.
     assert nutation(RealWidths, model, draws) == pytest.approx(expected, abs=1e-6)
-    assert flown_outputs(model, dict(draws))[[0, 4]] == pytest.approx([expected, given.propellant], rel=1e-9)
+    # A pulse falls as the nominal one does, whatever the tank of the case: of second order, too.
+    own = flown_outputs(model, dict(draws))
+    assert own[0] == pytest.approx(expected, abs=2e-7)
+    assert own[4] == pytest.approx(given.propellant, rel=1e-9)
 
 
 STEADY = replace(TANK, exponent=0.0, isp=None, inertia_per_kg=None)

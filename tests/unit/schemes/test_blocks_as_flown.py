@@ -252,11 +252,15 @@ TANK = Tank(propellant=0.3, pressure=22e5, final_pressure=8e5, exponent=1.0)
 
 
 def levels(count: int, *, each: float = 0.0, cold: Cold | None = None) -> list[float]:
-    """Levels of pulses, added up here: 1 - (1 - first) exp(-k/n), p = p0/(1 + (p0/p1 - 1) used/propellant)."""
+    """Levels of pulses, added up here: 1 - (1 - first) exp(-k/n), p = p0/(1 + (p0/p1 - 1) used/propellant).
+
+    The pressure is that of the middle of a pulse.
+    """
     used, found = 0.0, []
     for number in range(count):
         warmth = 1.0 if cold is None else 1.0 - (1.0 - cold.first) * math.exp(-number / cold.pulses)
-        found.append(warmth / (1.0 + (22.0 / 8.0 - 1.0) * used / 0.3))
+        half = 0.5 * each * warmth / (1.0 + (22.0 / 8.0 - 1.0) * used / 0.3)
+        found.append(warmth / (1.0 + (22.0 / 8.0 - 1.0) * (used + half) / 0.3))
         used += each * found[-1]
     return found
 
