@@ -36,7 +36,7 @@ from nutdamp.physics import attitude, energy_sink, sky, triaxial
 from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -202,10 +202,8 @@ class Model:
     def _shown(self, name: str, values: Values, rates: Vector, quaternion: Vector) -> Vector:
         """A signal at the motion of its samples."""
         if name in GYROS:
-            first, second = values.get("misalignment_1", 0.0), values.get("misalignment_2", 0.0)
-            x, y, z = rates.T
-            # What gyros turned by the small angles (first, second, 0) read: ω - tilt × ω.
-            shown = (x - second * z, y + first * z, z - first * y + second * x)[GYROS.index(name)]
+            tilt = np.array([values.get("misalignment_1", 0.0), values.get("misalignment_2", 0.0), 0.0])
+            shown = attitude.rotate(_turned(-tilt), rates)[:, GYROS.index(name)]  # of gyros that are turned by it
             return np.asarray(shown + values.get(f"bias_{name}", 0.0))
         if name == ACCELERATION:
             assert self.spacecraft.loop is not None
@@ -273,13 +271,23 @@ class Model:
         spacecraft = self._as_spacecraft(body)
         made = make_dynamics(spacecraft)
         dynamics = Dynamics(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
-        return _Flown(flown(spacecraft, fired, until - self.start, dynamics=dynamics))
+        pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
+        return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
+
+    def _in_axes(self, body: Body, pulse: Pulse) -> Pulse:
+        """A pulse, which is in the principal axes of the file, in those of the ``body``."""
+        turn = body.axes.T @ self.spacecraft.inertia.axes
+        torque = None if pulse.torque is None else turn @ pulse.torque
+        return replace(pulse, torque=torque, impulse=turn @ pulse.impulse)
 
     def _as_spacecraft(self, body: Body) -> Spacecraft:
         to_file = attitude.multiply(body.state.quaternion, attitude.from_matrix(body.axes.T))
+        turn = body.axes.T @ self.spacecraft.inertia.axes
+        about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
         return replace(
             self.spacecraft,
             inertia=Inertia(body.moments, body.axes),
+            disturbances=tuple(replace(one, transverse=about * one.transverse) for one in self.spacecraft.disturbances),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from support import reference
 
 import nutdamp
@@ -76,7 +77,7 @@ def gyro_case(seed: int) -> Case:
     bias = GYRO_BIAS * draw.normal(size=3)
     truth |= {"misalignment_1": float(tilt[0]), "misalignment_2": float(tilt[1])}
     truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
-    turned = rates_ - np.cross(np.array([tilt[0], tilt[1], 0.0]), rates_)
+    turned = Rotation.from_rotvec([-tilt[0], -tilt[1], 0.0]).apply(rates_)
     noise = math.radians(10.0 ** draw.uniform(-2.5, -1.3))
     shown = turned + bias + noise * draw.normal(size=turned.shape)
     outliers = draw.uniform(size=shown.shape) < draw.choice([0.0, 0.01, 0.03])

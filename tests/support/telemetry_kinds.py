@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 from support import reference
 
 import nutdamp
@@ -223,7 +224,7 @@ def _columns(
     sense = math.copysign(1.0, body.spin)
     if any(one.startswith("omega") for one in kind):
         tilt, bias = TILT * draw.normal(size=2), BIAS * draw.normal(size=3)
-        shown = rates - np.cross(np.array([*tilt, 0.0]), rates) + bias
+        shown = Rotation.from_rotvec([*-tilt, 0.0]).apply(rates) + bias
         which = next(one for one in kind if one.startswith("omega")).removeprefix("omega_")
         if "3" not in which or which == "3":  # without misalignment, which is no parameter then
             shown = rates + bias

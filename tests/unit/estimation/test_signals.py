@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support import reference
 from support.cases import deep, spread
 from support.golden import check_text
@@ -19,6 +20,7 @@ from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record, quantisation
 from nutdamp.estimation.results import Estimate, carried, doubts, estimates
+from nutdamp.flight import propagation
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -167,11 +169,12 @@ def test_gyros_and_axis_together_tell_bias_misalignment_and_wobble_apart() -> No
     times = np.linspace(0.05, 60.0, 500)
     motions = flown(times, BODY)
     rates, bias = np.array([one.rates for one in motions]), np.array([3e-4, -2e-4, 2e-4])
-    signals = gyros(motions, 2, bias - np.cross([0.004, -0.003, 0.0], rates))
+    turned = Rotation.from_rotvec([-0.034, 0.026, 0.0]).apply(rates)  # two degrees: no small angles
+    signals = gyros(motions, 2, bias + turned - rates)
     wobble = np.array([[1, 0, 0.002], [0, 1, -0.001], [0, 0, 1]])
     wobbling = [one._replace(rotation=one.rotation @ wobble) for one in motions]
     fitted = fit(BODY, Record(times, signals | axes(wobbling, 1.0, np.random.default_rng(3))))
-    truth = {"misalignment_1": 0.004, "misalignment_2": -0.003, "wobble_1": 0.001, "wobble_2": 0.002}
+    truth = {"misalignment_1": 0.034, "misalignment_2": -0.026, "wobble_1": 0.001, "wobble_2": 0.002}
     truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}
     expect_close(fitted, truth | {"C/A": C / A, "omega_3": float(rates[0, 2])})
     assert fitted.sigmas[fitted.index("bias_omega_3") or 0] < 0.1 * math.radians(0.02)  # which gyros alone do not tell
@@ -212,6 +215,23 @@ def test_pulses_in_a_record_tell_thrust_and_delay_of_their_channels() -> None:
     expect_close(fitted, {"A": A, "C/A": C / A, **{f"delay {name}": late[name] for name in late}})
     after = flown(np.array([40.0]), BODY, events)[0].rates
     assert carried(fitted, 40.0).values[2:5] == pytest.approx(after, abs=6.0 * NOISE)
+
+
+def test_of_unequal_moments_pulses_and_disturbances_push_in_the_axes_of_the_file() -> None:
+    """The principal axes that are estimated are turned against those of the file: by 90 deg where I1 < I2."""
+    tensor = {"tensor": [[118.0, 1.0, 0], [1.0, 123.0, 0], [0, 0, 84.0]]}
+    leak = [{"name": "leak", "torque": [0.05, 0.02, 0.01]}, {"name": "drag", "torque": [0.03, 0, 0], "rate": 0.4}]
+    body = nutdamp.load(FILE | {"inertia": tensor, "disturbances": leak})
+    pulses = Schedule(tuple(channel_pulse(one, at, 0.5) for one, at in zip(body.channels, (4.0, 9.0), strict=True)))
+    times = np.linspace(0.0, 20.0, 50)
+    record = Record(times, {name: np.zeros(50) for name in GYROS}, schedule=pulses)
+    model = Model(body, record)
+    assert model.unequal
+    rates, turned = model.motion({one.name: one.file for one in model.parameters}, times)
+    there = propagation.flown(body, pulses, 20.0).motion(times)
+    assert rates == pytest.approx(there[0] @ body.inertia.axes.T, abs=1e-9)
+    of_file = attitude.multiply(there[1], attitude.from_matrix(body.inertia.axes.T))
+    assert np.abs(np.sum(turned * of_file, axis=1)) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.deep
