@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Model, Values, Vector
+from nutdamp.estimation.model import Model, Values, Vector, tilted
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, Record
 from nutdamp.physics import attitude
 
@@ -58,6 +58,8 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
     rate = _peak(model, spin, share)
     if rate is not None:
         values |= _moments(model, rate, spin)
+    if model.record.has(*AXIS) and not model.record.has(*GYROS[:2]):
+        yield values | _cone(model, values)
     values |= _towards(model, values)
     if "attitude_3" not in values:
         yield _linear(model, values)
@@ -183,10 +185,36 @@ def _towards(model: Model, values: Values) -> dict[str, float]:
     record = model.record
     if not record.has(*AXIS):
         return {}
-    mean = np.nanmean(np.column_stack([record.signals[name] for name in AXIS]), axis=0)
+    return _tilted(model, values, np.nanmean(np.column_stack([record.signals[name] for name in AXIS]), axis=0))
+
+
+def _cone(model: Model, values: Values) -> dict[str, float]:
+    """Attitude and transverse rates from the circle on which the axis goes round H, as wide as it may be.
+
+    Its plane is square to H; with H = A ω_t + C ω3 e the transverse rate ω_t is along what H has across the axis e.
+    """
+    axis = np.column_stack([model.record.signals[name] for name in AXIS])
+    axis = axis[np.isfinite(axis).all(axis=1)]
+    momentum = np.linalg.svd(axis - axis.mean(axis=0), full_matrices=False)[2][2]
+    momentum *= math.copysign(1.0, float(momentum @ axis.mean(axis=0)))
+    cosine = float(np.clip(np.mean(axis @ momentum), 0.05, 1.0))
+    made = _tilted(model, values, axis[0])
+    across = momentum - float(momentum @ axis[0]) * axis[0]
+    size = float(np.linalg.norm(across))
+    if size == 0.0:
+        return made
+    spin = values.get("omega_3", model.spacecraft.spin)
+    rate = values[RATIO] * abs(spin) * math.sqrt(1.0 - cosine**2) / cosine
+    turned = attitude.multiply(model.reference.quaternion, tilted(made["attitude_1"], made["attitude_2"]))
+    in_body = attitude.rotate(attitude.conjugate(turned), rate / size * across)
+    return made | {"omega_1": float(in_body[0]), "omega_2": float(in_body[1])}
+
+
+def _tilted(model: Model, values: Values, axis: Vector) -> dict[str, float]:
+    """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any length."""
     quaternion = model.reference.quaternion
     sense = math.copysign(1.0, model.spacecraft.spin)
-    wanted = sense * attitude.rotate(attitude.conjugate(quaternion), mean / np.linalg.norm(mean))
+    wanted = sense * attitude.rotate(attitude.conjugate(quaternion), axis / np.linalg.norm(axis))
     across = np.cross([0.0, 0.0, 1.0], wanted)
     size = float(np.linalg.norm(across))
     angle = math.atan2(size, wanted[2])

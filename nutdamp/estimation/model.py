@@ -335,6 +335,11 @@ def _sinking(momentum: Vector, growth: float) -> Vector:
     return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
 
 
+def tilted(first: float, second: float) -> Vector:
+    """Quaternion (4,) of the tilt of an attitude by two angles about axes 1 and 2, rad."""
+    return _turned(np.array([first, second, 0.0]))
+
+
 def _turned(angles: Vector) -> Vector:
     """Quaternion of the turn by a vector of angles (3,), rad."""
     size = float(np.linalg.norm(angles))

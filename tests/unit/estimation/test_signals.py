@@ -119,9 +119,11 @@ def expect_close(fitted: Fit, truth: Mapping[str, float]) -> None:
     assert not {name: value for name, value in off.items() if not abs(value) < 4.0}
 
 
-@pytest.mark.parametrize("spin", [3.0, deep(-2.0)])
-def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float) -> None:
-    body, times = nutdamp.load(FILE, set={"state.spin": spin}), np.linspace(0.05, 60.0, 200)
+@pytest.mark.parametrize(("spin", "nutation"), [(3.0, 4.0), (-2.7, 41.0), deep(-2.0, 4.0), deep(3.0, 65.0)])
+def test_the_axis_tells_its_cone_and_the_ratio_as_well_as_the_spin_is_known(spin: float, nutation: float) -> None:
+    """However wide the cone is."""
+    change = {"state.spin": spin, "state.nutation": f"{nutation} deg"}
+    body, times = nutdamp.load(FILE, set=change), np.linspace(0.05, 60.0, 200)
     motions, up = flown(times, body), np.array([0.0, 0.0, math.copysign(1.0, spin)])
     fitted = fit(body, Record(times, axes(motions, up[2], np.random.default_rng(1))))
     size = math.hypot(fitted.named["omega_1"], fitted.named["omega_2"])
