@@ -32,7 +32,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import HalfConeOptions, OptimalOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.optimal import multistart, refinement
+from nutdamp.schemes.optimal import continuous, multistart, refinement
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, Unrepairable, as_pulses, repaired, thinned
@@ -304,7 +304,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
         return search.with_bounds(search.preferred(simple))
     try:
         if options.least == "time":
-            made = search.sooner().schedule()
+            made = search.soonest()
         else:
             made = _fewest(search) if options.least == "pulses" else search.schedule()
     except Infeasible:
@@ -351,6 +351,19 @@ class _Found(NamedTuple):
 
 class _Search(Problem):
     """The search for the cheapest schedule."""
+
+    def soonest(self) -> Schedule:
+        """The schedule that ends first: of one channel after another, or another one that ends before it."""
+        early = continuous.earliest(self)
+        if early is None:
+            return self.sooner().schedule()
+        begin, body = self.spacecraft.limits.earliest, self.within(early.end)
+        if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
+            return self.with_bounds(early)
+        try:
+            return self.preferred([early, _Search(body, self.options).sooner().schedule()])
+        except Infeasible:
+            return self.with_bounds(early)
 
     def sooner(self) -> _Search:
         """The same search with the shortest horizon in which a schedule is found."""
@@ -418,6 +431,8 @@ class _Search(Problem):
             return self.with_bounds(Schedule(made.pulses, made.notes), first)
         with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
             best = self.whole_or_shorter(first)
+        if best is None or self.dear(best, first.cost):
+            best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
             kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             still = kept.whole_or_shorter(kept.program().solve())

@@ -210,13 +210,13 @@ def test_nothing_feasible_ends_with_status_3_and_a_reason(run: Run) -> None:
 
 @pytest.mark.deep
 def test_the_searches_of_all_points_share_a_limit_of_work(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The fastest point of the example is cut at 500 units, of which all three searches together would take 600."""
-    monkeypatch.setattr(work, "FRONTS", 500.0)
+    """The fastest point of the example is cut at 200 units, of which all three searches together would take 400."""
+    monkeypatch.setattr(work, "FRONTS", 200.0)
     with work.budget("test", 1e9) as spent:
         done = run("trade", "--points", "3", "--allow", "0deg")
     assert done.returncode == 0
     check_text("plan.trade-cut", "\n".join(line for line in done.stderr.splitlines() if "point" in line))
-    assert spent.done < 1.2 * work.FRONTS
+    assert spent.done < work.FRONTS + 150.0  # with bounds and what other schemes plan
     monkeypatch.setattr(work, "FRONTS", 5.0)
     none = run("trade", "--points", "3", "--allow", "0deg", "--csv", "-")
     assert none.returncode == 0
