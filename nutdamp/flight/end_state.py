@@ -191,7 +191,8 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     if flown.legs[-1].end < end:
         fly = propagation.by_impulses if flown.model == propagation.IMPULSE_SUM else propagation.flown
         flown = fly(body, flown.schedule, end)
-    period = min(body.inertial_period, body.body_period)
+    symmetric = body.inertia.symmetric  # else the axis wobbles on its way round H as the body turns, too
+    period = body.inertial_period if symmetric else min(body.inertial_period, body.body_period)
     pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
     times = np.concatenate([piece.t for piece in pieces])
     axis = np.concatenate([piece.axis for piece in pieces])

@@ -148,7 +148,7 @@ def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:
     return in_body(model.spacecraft, cases.tilt, count, model.spacecraft.sun)
 
 
-CASE, STEPPED, LOOKED = 2e-3, 1e-2, 4e-3
+CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
 """Units of work: of a case and of each of its pulses, of a step of a coast that is no arc, of a look at its axis."""
 
 

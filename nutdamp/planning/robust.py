@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, Results, run, study_of, threads_here
 from nutdamp.planning import chance_plan
@@ -200,17 +201,17 @@ Attempt = Callable[[], Iterable[tuple[str, Plan]]]
 def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
     """What `compare` is to try: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    found: list[Attempt] = []
+    planned, found = list[Attempt](), list[Attempt]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
-        found.append(partial(list, [("as planned", base)]))
+        planned.append(partial(list, [("as planned", base)]))
         found.append(partial(_alignments, body, base.scheme, options))
         found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
             found.append(partial(_early, body, options))
             found.append(partial(chance_plan.plans, body, options))
-    return found
+    return [*planned, *found]
 
 
 def compare(
@@ -228,18 +229,19 @@ def compare(
     body = comparison.spacecraft
     probability = required_share(body.requirement)
     found: dict[object, Candidate] = {}
-    for number, trial in enumerate(trials):
-        watch(number)
-        for variant, plan in trial():
-            kind = _kind(plan)
-            # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
-            if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
-                continue
-            own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
-            if comparison.only_commanded and not own.commandable:
-                continue
-            with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
+    with work.budget("the robust plans", work.FRONTS):
+        for number, trial in enumerate(trials):
+            watch(number)
+            for variant, plan in () if work.exhausted() else trial():
+                kind = _kind(plan)
+                # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
+                if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
+                    continue
+                own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
+                if comparison.only_commanded and not own.commandable:
+                    continue
+                with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
+                    found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
     candidates = list(found.values())
     usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
     always = [one for one in candidates if one is usual]

@@ -173,6 +173,9 @@ def fly_compared(
         first = _undecided(plans, flown, samples, choose)
         if first is None:
             break
+        done = first.cases.samples
+        if not affordable(study_of(first.plan.spacecraft, first.plan.pulses), _stage(done, samples) - done):
+            break
         try:
             _further(first, samples)
         except Infeasible:
@@ -220,10 +223,15 @@ def _bound(one: Candidate, samples: int) -> None:
         one.low, one.high = (one.met, one.met) if known else binomial_interval(count, one.cases.samples, CERTAIN)
 
 
+def _stage(done: int, samples: int) -> int:
+    """Cases after which it is looked next whether a plan can still be chosen."""
+    return next((count for count in STAGES if done < count < samples), samples)
+
+
 def _further(one: Candidate, samples: int) -> None:
     """Fly the cases of the next stage."""
     assert one.results is not None
-    stage = next((count for count in STAGES if one.cases.samples < count < samples), samples)
+    stage = _stage(one.cases.samples, samples)
     exact = stage <= EXACT_CASES  # beyond, cases are counted and not kept: from the first one on
     one.results = _run(one.results.extended(stage) if exact else Results(one.results.study, stage))
     one.cases = cases_of(one.results, samples)

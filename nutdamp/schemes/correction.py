@@ -172,6 +172,10 @@ def correct(
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
 
 
+MOST_CORRECTED = 1_000
+"""Pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times."""
+
+
 @dataclass(frozen=True, slots=True)
 class Correction:
     """Corrects schedules of a ``scheme`` on the motion of a true spacecraft."""
@@ -191,7 +195,7 @@ class Correction:
 
     def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:
         """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        if self.options.uncorrected or not made.pulses:
+        if self.options.uncorrected or not made.pulses or len(made) > MOST_CORRECTED or work.exhausted():
             return made
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable

@@ -85,9 +85,6 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     return _corrected(scheme, model, made, chosen)
 
 
-MOST_CORRECTED = 1_000
-"""Pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times."""
-
 LONGER = 4.0
 """Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
 
@@ -162,7 +159,7 @@ def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: S
         made = made.without_proof
     if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
         made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
-    if model.exact or len(made) > MOST_CORRECTED:
+    if model.exact:
         return made
     from nutdamp.schemes import correction
 

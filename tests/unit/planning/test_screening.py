@@ -136,7 +136,7 @@ def test_more_cases_than_are_kept_one_by_one_are_counted_and_have_the_budget_of_
     kept = compare(body, ["two-pulse"], samples=samples)
     monkeypatch.setattr(dispersion, "EXACT_CASES", 20_000)
     monkeypatch.setattr(screening, "EXACT_CASES", 20_000)
-    monkeypatch.setattr(work, "CASES", 45.0)  # 8,192 cases take 49 units, so that it is known that enough comply
+    monkeypatch.setattr(work, "CASES", 305.0)  # for 20,000 cases; so many take 360 units
     counted = compare(body, ["two-pulse"], samples=samples)
     told = [one.shares[one.plans[0]].exact for one in (kept, counted)]
     assert told[0] is not None
