@@ -246,6 +246,7 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
 def test_no_number_lies_under_the_star_of_the_recommended_plan(front: int) -> None:
     for point in traded()[front].points:
         (axes,) = trade.trade_figure(BODY, traded(), point.plan).axes
+        assert axes.xaxis.get_major_formatter()(2.0) == "2"  # no powers of ten
         check_star(axes, np.array([point.plan.end, point.cost]), 0.36 * style.STAR)
 
 

@@ -252,6 +252,7 @@ def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bo
     body = looping(Requirement(momentum_shift=math.radians(most)))
     figure = loop_cases_figure(run_loops(LoopResults(loop_study(body, 60.0), 20)))
     check_layout(figure)
+    assert "propellant, g" in {axes.get_xlabel() for axes in figure.axes}
     (shift,) = (axes for axes in figure.axes if axes.get_xlabel() == "shift of H, deg")
     levels = [float(np.asarray(one.get_xdata())[0]) for one in shift.lines if one.get_label() == "required"]
     assert levels == ([pytest.approx(most)] if beside else [])

@@ -233,3 +233,8 @@ for topic in {["", *guide.NAMES]!r}:
 print("LOADED", *{{"numpy", "scipy", "matplotlib", "yaml"}} & set(sys.modules))
 """
     assert python(tmp_path, code).stdout.endswith("LOADED\n")
+
+
+def test_no_unit_is_said_to_be_one_of_another() -> None:
+    """Names of the SI unit stand without a factor."""
+    assert not re.search(r"= 1 ", explained("units"))

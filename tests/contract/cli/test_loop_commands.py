@@ -363,3 +363,9 @@ def test_without_a_loop_a_budget_says_what_is_missing(run: Run) -> None:
     check_text("budget.without-loop", run(*growing).stdout.partition("requirement")[2])
     written = run(*growing, "--csv", "-")
     assert (written.returncode, written.stdout.count("\n")) == (0, 1)
+
+
+def test_thresholds_without_a_unit_are_read_and_said(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    follow_few_cycles(monkeypatch)
+    done = run("budget", STAGE, "--thresholds", "1,0.5")
+    assert "--thresholds: warning:" in done.stderr

@@ -251,6 +251,9 @@ def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, 
     assert (alone.returncode, "No recommendation" in alone.stdout) == (1, True)
     assert "Traceback" in alone.stderr
     assert "ZeroDivisionError: float division by zero" in alone.stderr
+    written(tmp_path, x_yaml=EXACT)
+    simulated = run("simulate", "x.yaml", "--samples", "2")  # the recommended plan of the others
+    assert "two-pulse: internal error" in simulated.stderr
 
 
 @pytest.mark.deep

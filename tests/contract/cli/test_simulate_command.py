@@ -124,3 +124,8 @@ def test_a_broken_cone_is_exit_4_and_said_once(run: Run, tmp_path: Path) -> None
             ended = run(*named, *outputs, stdin=KEEPER)
             said = " ".join((ended.stderr + ended.stdout * (not outputs)).split())
             assert said.lower().count("the spin axis comes to") == 1
+
+
+def test_with_a_target_the_screen_says_how_far_off_it_ends(run: Run) -> None:
+    done = run("simulate", "--scheme", "none", "--target", "10deg,45deg", "--samples", "2")
+    assert "off the target" in done.stdout

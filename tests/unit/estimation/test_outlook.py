@@ -51,7 +51,10 @@ def test_estimates_file_and_json_are_one(fitted: Fitted, tmp_path: Path) -> None
     rows, data = {one.key: one for one in fitted.estimates(at)}, fitted.to_dict(at)
     ratio = rows["C/A"]
     assert ratio.value == pytest.approx(0.67, abs=4.0 * ratio.sigma)
-    assert {one["quantity"]: one["value"] for one in data["estimates"]}["C/A"] == pytest.approx(ratio.value, rel=1e-12)
+    written = {one["quantity"]: one for one in data["estimates"]}
+    assert written["C/A"]["value"] == pytest.approx(ratio.value, rel=1e-12)
+    for key, one in rows.items():
+        assert written[key]["sigma"] == pytest.approx(one.sigma * one.factor)
     fitted.write(tmp_path / "now.yaml", at)
     assert (tmp_path / "now.yaml").read_text() == fitted.text(at)
     body = fitted.spacecraft(at)

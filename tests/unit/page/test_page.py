@@ -11,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
 from support import places
 from support.cases import deep, weekly
 from support.markup import Node
@@ -24,7 +27,7 @@ from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.page.content import Repeat, report_page
 from nutdamp.page.craft import spacecraft_facts
-from nutdamp.page.document import Prose
+from nutdamp.page.document import Prose, Sheet, blocks_of
 from nutdamp.page.html import block_html, number_in, page_html
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
@@ -306,3 +309,12 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     assert "sheet sortable" in kinds
     assert bool(part.all("svg")) == good  # of the good one pictures are made
     assert "A" in {row[0].text for row in cells(part.all("table")[1])}
+
+
+def test_of_several_lines_above_a_table_the_last_is_its_title() -> None:
+    table = Table("name", "value")
+    table.add_row("nutation", "1")
+    first, sheet_, last = blocks_of("usual", Group(Text("a line"), Text("a title"), table, Text("below")))
+    assert (first, last) == (Prose("a line"), Prose("below"))
+    assert isinstance(sheet_, Sheet)
+    assert sheet_.title == "a title"

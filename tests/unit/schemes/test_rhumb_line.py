@@ -20,6 +20,7 @@ from nutdamp.physics import precession
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import infeasibility, remarks
 from nutdamp.schemes.catalogue import Options, RhumbLineOptions
+from nutdamp.schemes.rhumb_line import Train
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Limits, Spacecraft
 
@@ -247,3 +248,10 @@ def test_in_a_short_horizon_pulses_are_long_but_less_than_half_a_turn(
     made = train(still(80.0, 120.0, 3.0, 45.0, limits=Limits(horizon=turns * TURN), **actuators)).pulses
     assert len(made) == pulses
     assert all(0.35 * TURN < pulse.on_time < 0.5 * TURN for pulse in made)
+
+
+def test_a_train_keeps_the_narrowest_bounds_of_its_channels() -> None:
+    jets = cross(8.0)
+    bounded = (jets[0].of(min_on_time=0.02, max_on_time=0.9), jets[1].of(min_on_time=0.05, max_on_time=1.0), *jets[2:])
+    train = Train(aimed(spinner(channels=bounded), 5.0, 0.0), RhumbLineOptions(per_turn=len(jets)))
+    assert (train.shortest, train.longest) == (0.05, 0.9)
