@@ -283,7 +283,7 @@ def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
 def _searched(
     spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
 ) -> list[tuple[Plan, float]] | str:
-    """The schedule of the whole horizon, the fastest, and those of horizons between, evenly by their ratios.
+    """The schedule of the whole horizon, the fastest, and those of horizons between their ends, evenly by their ratios.
 
     Each with its horizon, s; or why there is none.
     """
@@ -295,9 +295,9 @@ def _searched(
     if fastest.schedule is None or not len(fastest.schedule):
         return found
     found.append((fastest, spacecraft.horizon))
-    begin, end = spacecraft.limits.earliest, fastest.pulses.end
+    begin, end, last = spacecraft.limits.earliest, fastest.pulses.end, max(whole.pulses.end, fastest.pulses.end)
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
-        horizon = begin + (end - begin) * ((spacecraft.horizon - begin) / (end - begin)) ** float(share)
+        horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
         made = searches(body, options)
         if made.schedule is not None and made.schedule.bounds is not None:

@@ -61,6 +61,7 @@ def equipped(seed: int) -> dict[str, Any]:
     _surroundings(draws, file, level, turn)
     _demands(draws, file, degrees, turn)
     if draws.chance(0.35):
+        file.get("tank", {}).pop("inertia_per_kg", None)  # a loop flies with constant moments
         file["loop"] = _loop(draws, degrees, turn, abs(spin), "+M1" if "channels" in file else "T1")
     if draws.chance(0.8):
         file["dispersions"] = _dispersions(draws, file, turn, abs(spin))

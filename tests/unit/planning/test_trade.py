@@ -64,7 +64,7 @@ def figures(points: tuple[tradeoff.Point, ...]) -> list[tuple[float, float]]:
 def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Searches: the whole horizon, the fastest, and horizons between evenly by their ratios; from strict to free."""
+    """Searches: the whole horizon, the fastest, and horizons between their ends evenly by their ratios; from strict to free."""
     results = iter(
         [
             *(given(30.0, 1.0), given(10.0, 3.0), given(16.0, 2.0), given(25.0, 2.1)),
@@ -84,8 +84,8 @@ def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beat
     # The fastest of the free front keeps H too; what saves less than a thousandth is no point.
     assert figures(made[0].points) == [(8.0, 2.5), (16.0, 2.0), (30.0, 1.0)]
     assert figures(made[1].points) == [(8.0, 2.5), (16.0, 2.0), (18.0, 1.5), (28.0, 0.9)]
-    for free, first in ((False, 10.0), (True, 8.0)):
-        horizons = [40.0, 40.0, first * (40.0 / first) ** (1 / 3), first * (40.0 / first) ** (2 / 3)]
+    for free, first, last in ((False, 10.0, 30.0), (True, 8.0, 28.0)):
+        horizons = [40.0, 40.0, first * (last / first) ** (1 / 3), first * (last / first) ** (2 / 3)]
         leasts = ["propellant", "time", "propellant", "propellant"]
         searches = asked[4 * free : 4 * free + 4]
         assert [(least, freed) for least, freed, _ in searches] == [(least, free) for least in leasts]
