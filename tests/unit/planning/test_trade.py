@@ -64,7 +64,7 @@ def figures(points: tuple[tradeoff.Point, ...]) -> list[tuple[float, float]]:
 def test_each_front_has_what_any_search_found_that_keeps_its_shift_and_none_beats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Searches: the whole horizon, the fastest, and horizons between their ends evenly by their ratios; from strict to free."""
+    """Searches: the whole horizon, the fastest, horizons evenly between their ends by ratios; from strict to free."""
     results = iter(
         [
             *(given(30.0, 1.0), given(10.0, 3.0), given(16.0, 2.0), given(25.0, 2.1)),
