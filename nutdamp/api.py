@@ -1,4 +1,6 @@
-"""What the commands trade, disperse, verify and export do, for plans in memory; the numbers are those of their JSON.
+"""nutdamp as a library: load, plan, compare, fly, trade, disperse, verify, fit, report, export.
+
+What the commands trade, disperse, verify and export do, for plans in memory; the numbers are those of their JSON.
 
 The page of ``nutdamp report``, from Python and for the command.
 
@@ -400,7 +402,7 @@ class Fitted:
         return fit_figure(self.core)
 
     def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
-        """What ``fit --json`` gives; with an `outlook`, what ``fit --next --json`` gives."""
+        """What ``fit --json`` gives; with an `forecast`, what ``fit --next --json`` gives."""
         from nutdamp.views.fit_json import fit_json
 
         return finite(fit_json(self.core, results.carried(self.core, at), ahead, self.warnings))

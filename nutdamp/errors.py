@@ -1,4 +1,6 @@
-"""What can go wrong, as data: the command line turns it into messages and exit statuses in one place.
+"""Exceptions and faults with their place, as data.
+
+What can go wrong, as data: the command line turns it into messages and exit statuses in one place.
 
 Lists and spans as sentences have them.
 """

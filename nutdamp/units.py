@@ -1,4 +1,6 @@
-"""Units of the files and of the command line: one small table that leads from "60 rpm" to 6.283… rad/s.
+"""Quantities: units, parsing, ranges; arguments of Python users checked.
+
+Units of the files and of the command line: one small table that leads from "60 rpm" to 6.283… rad/s.
 
 A quantity is a number, which is SI, or a text with a unit. What is not in the table is refused with the units
 that are: revolutions are left out on purpose, and Hz is for sampling rates alone, since nobody can tell whether they

@@ -1,4 +1,6 @@
-"""``nutdamp verify``: fly a schedule by independent means, with an error budget.
+"""``nutdamp check``, ``verify``, ``explain``, ``init`` and ``schema``.
+
+``nutdamp verify``: fly a schedule by independent means, with an error budget.
 
 ``nutdamp check``: validate spacecraft files and show what follows from them.
 

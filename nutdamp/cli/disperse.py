@@ -1,4 +1,6 @@
-"""``nutdamp disperse``: fly one schedule in many dispersed cases.
+"""``nutdamp disperse``, of a schedule or of a closed loop.
+
+``nutdamp disperse``: fly one schedule in many dispersed cases.
 
 What ``nutdamp disperse --loop`` does: fly the closed loop of the file in many dispersed cases.
 """

@@ -1,4 +1,6 @@
-"""``nutdamp export``: a plan in the formats that flight dynamics reads.
+"""``nutdamp export`` and ``import``.
+
+``nutdamp export``: a plan in the formats that flight dynamics reads.
 
 ``nutdamp import``: a spacecraft file from a message of flight dynamics.
 """

@@ -1,4 +1,6 @@
-"""How a command begins and ends: its files checked and its spacecraft read; its results written and shown.
+"""A command from its spacecraft file to what it delivers: output files, screen, progress.
+
+How a command begins and ends: its files checked and its spacecraft read; its results written and shown.
 
 What several commands share: the spacecraft argument, options of pictures, what a file must have.
 

@@ -1,4 +1,6 @@
-"""``nutdamp loop``: fire from what a sensor shows, in a closed loop.
+"""``nutdamp loop`` and ``budget``.
+
+``nutdamp loop``: fire from what a sensor shows, in a closed loop.
 
 ``nutdamp budget``: what it takes to hold the nutation against energy dissipation.
 """

@@ -1,4 +1,6 @@
-"""The one place that turns errors into messages and exit statuses; a real bug keeps its traceback.
+"""The ``nutdamp`` command: its subcommands, and errors as messages and exit statuses.
+
+The one place that turns errors into messages and exit statuses; a real bug keeps its traceback.
 
 The ``nutdamp`` command: its subcommands, loaded when they are used.
 """

@@ -1,4 +1,6 @@
-"""Options that plan: the goal, which every command that plans takes, and those of each scheme, of `plan` alone.
+"""Options and kinds of parameters: the goal, those of schemes, files, quantities, directions.
+
+Options that plan: the goal, which every command that plans takes, and those of each scheme, of `plan` alone.
 
 The latter are made from the fields of the scheme's options; the help page shows them under a heading per scheme.
 

@@ -1,4 +1,6 @@
-"""``nutdamp simulate``: propagate a scheme or a schedule file.
+"""``nutdamp simulate`` and ``animate``.
+
+``nutdamp simulate``: propagate a scheme or a schedule file.
 
 ``nutdamp animate``: the cones rolling on each other, as a film.
 """

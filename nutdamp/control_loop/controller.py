@@ -1,4 +1,6 @@
-"""The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+"""On-board logic of one loop, sample by sample.
+
+The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
 
 The coast of a closed loop: what the law sees of it sample by sample, and when it decides to fire.
 """

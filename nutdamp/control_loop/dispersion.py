@@ -1,4 +1,6 @@
-"""Loops of many dispersed cases: how many settle, when, where they end, what they use, and which are the worst.
+"""Dispersed loops.
+
+Loops of many dispersed cases: how many settle, when, where they end, what they use, and which are the worst.
 
 The dispersed cases of a loop: the body, the thrusters, the valves and the sensor as they are in truth.
 

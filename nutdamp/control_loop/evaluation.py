@@ -1,4 +1,6 @@
-"""The same loop flown by DOP853, its events found on the interpolants of that: firing by firing, do they agree?
+"""A flown loop judged; the same by DOP853.
+
+The same loop flown by DOP853, its events found on the interpolants of that: firing by firing, do they agree?
 
 A closed loop as a plan: what it fired, judged by the motion from when it was first down to its stop threshold.
 """

@@ -1,4 +1,6 @@
-"""Whether firings do what they shall: what each added to the rate that is seen, against what it was to add.
+"""Firing law, fault detection.
+
+Whether firings do what they shall: what each added to the rate that is seen, against what it was to add.
 
 When to fire, and for how long: a channel of torque direction d while arg ω = arg d + π (Magnus 1970, section 4).
 

@@ -1,4 +1,6 @@
-"""The limit cycle of a closed loop from event to event: coasts in closed form, the firings by the law itself.
+"""Limit cycle, propellant a year.
+
+The limit cycle of a closed loop from event to event: coasts in closed form, the firings by the law itself.
 
 Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ. Noise decides in
 which sample a threshold is first reached: see `Odds`. Only the few samples in which a channel may come to fire are

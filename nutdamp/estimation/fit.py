@@ -1,4 +1,6 @@
-"""Estimates of a spacecraft from telemetry: robust least squares, and what their covariance means.
+"""Robust least squares, noise estimation, residual tests.
+
+Estimates of a spacecraft from telemetry: robust least squares, and what their covariance means.
 
 With noise of one sigma s on each sample, residuals r = measured - predicted, and the tolerances of the file as priors,
 

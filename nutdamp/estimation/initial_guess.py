@@ -1,4 +1,6 @@
-"""Where a fit begins: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
+"""Starting values, aliases.
+
+Where a fit begins: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
 
 A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
 spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.

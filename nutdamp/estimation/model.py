@@ -2,7 +2,7 @@
 
 A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
 pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What an accelerometer feels is
-`loop.sensor.felt`, when the Sun passes a sensor `sun_clock.ahead`.
+`loop.sensor.felt`, when the Sun passes a sensor `sky.ahead`.
 
 Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the file's principal axes:
 regular at e = 0, where principal axes are any.

@@ -1,4 +1,6 @@
-"""Which parameters telemetry is fitted with: what the file says of each, and how far it may be off.
+"""Telemetry record, parameters and priors.
+
+Which parameters telemetry is fitted with: what the file says of each, and how far it may be off.
 
 What was measured in flight, and what was fired meanwhile.
 """

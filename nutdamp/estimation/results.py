@@ -1,4 +1,6 @@
-"""What a fit says in quantities people know, with their standard deviations; and the spacecraft carried to an epoch.
+"""Estimates, covariance, consistency checks.
+
+What a fit says in quantities people know, with their standard deviations; and the spacecraft carried to an epoch.
 
 What makes a fit doubtful though its sigmas are small: in words, or as the reason why there is none.
 """

@@ -1,10 +1,12 @@
-"""A spacecraft file with what a fit of telemetry found: values, how well they are known, and the motion at an epoch.
+"""Values replaced in a file, comments kept; fitted file.
+
+A spacecraft file with what a fit of telemetry found: values, how well they are known, and the motion at an epoch.
 
 Only values change: comments, the order of the keys and units stay as they were.
 
 Values of a YAML text replaced in place, so that its comments and the order of its keys stay.
 
-Works on a text that `yaml_tree.read_tree` has read, and so is neither a bomb nor of other than core values.
+Works on a text that `yaml.read_tree` has read, and so is neither a bomb nor of other than core values.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""A script that flies a schedule in Basilisk and prints what is left: for whoever has Basilisk and not nutdamp.
+"""STK, Basilisk script, epochs and frames.
+
+A script that flies a schedule in Basilisk and prints what is left: for whoever has Basilisk and not nutdamp.
 
 When and in which axes: what exchange formats need besides the plan, and the motion in the axes of the file.
 

@@ -1,4 +1,6 @@
-r"""Sections of a file, declared as classes: what may be at their keys, read and checked, and as JSON Schema.
+r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once.
+
+Sections of a file, declared as classes: what may be at their keys, read and checked, and as JSON Schema.
 
 A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of what YAML and
 JSON hold, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s.

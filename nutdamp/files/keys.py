@@ -1,10 +1,12 @@
-"""The keys of a spacecraft file, their types and ranges; also the source of the JSON Schema.
+"""The keys of a spacecraft file, their types and ranges.
+
+The keys of a spacecraft file, their types and ranges; also the source of the JSON Schema.
 
 What needs more than one key to judge is in `rules`.
 
 The keys below ``dispersions`` in a spacecraft file, and what they say as `Dispersions`.
 
-The sizes of tolerances stay as they are written here: `dispersion_rules` finds what is wrong with them.
+The sizes of tolerances stay as they are written here: `study_rules` finds what is wrong with them.
 
 The keys of a spacecraft file that describe a closed loop: its sensor, its law, faults to fly with.
 

@@ -1,4 +1,6 @@
-"""Numbers without a unit that are hardly what was meant, with the unit that was: for warnings.
+"""Missing-unit warnings, foreign file types.
+
+Numbers without a unit that are hardly what was meant, with the unit that was: for warnings.
 
 What a file given as a spacecraft file is instead: kinds that nutdamp writes or imports, by their first lines.
 """

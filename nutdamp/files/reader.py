@@ -1,4 +1,6 @@
-"""Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians.
+"""File -> Spacecraft, all faults at once; JSON Schema; shipped examples.
+
+Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians.
 
 Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
 

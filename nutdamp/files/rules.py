@@ -1,4 +1,6 @@
-"""What must hold between several keys of a spacecraft file.
+"""Constraints between keys.
+
+What must hold between several keys of a spacecraft file.
 
 The rules read the raw tree and skip what cannot be read, so that they speak up whatever else is wrong.
 

@@ -1,4 +1,6 @@
-"""Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
+"""Schedules and command blocks as CSV, written and read.
+
+Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
 
 Those are start_s (or t_s, the centre), on_time_s and channel. What a channel of the spacecraft file does follows from
 there; the columns of torque, impulse, propellant and date are looked at only to say where they contradict. Pulses of
@@ -6,7 +8,7 @@ the steerable torquer, and of channels that the file does not know, take their t
 
 Command blocks as CSV: ``plan --blocks`` writes them, ``simulate --blocks`` fires them, edited or not.
 
-Schedules as CSV, as ``plan`` writes them; `schedule_file` reads them.
+Schedules as CSV, as ``plan`` writes them; `schedules` reads them.
 """
 
 from __future__ import annotations

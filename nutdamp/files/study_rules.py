@@ -1,4 +1,6 @@
-"""What must hold for the dispersions of a spacecraft file and the probability that it requires.
+"""Constraints of valves, tank, dispersions and loop.
+
+What must hold for the dispersions of a spacecraft file and the probability that it requires.
 
 Like `rules`, these read the raw tree and skip what cannot be read.
 

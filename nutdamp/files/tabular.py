@@ -1,4 +1,6 @@
-"""Writing: whole files or none, and numbers that read back as they were.
+"""Atomic writing, CSV reading, tracks.
+
+Writing: whole files or none, and numbers that read back as they were.
 
 Tables in CSV files that people write: rows by the names of columns, all faults at once, warnings once each.
 

@@ -1,4 +1,6 @@
-"""YAML text -> plain values that remember where they are, by the core schema of YAML 1.2.
+"""YAML with positions; bounded.
+
+YAML text -> plain values that remember where they are, by the core schema of YAML 1.2.
 
 Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a bomb of aliases
 is refused before it unfolds. JSON is read by the same path. Whatever is wrong becomes `FaultyFile` with its place.

@@ -1,4 +1,6 @@
-"""How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included.
+"""End state, extreme angles to exclusion cones, velocity change.
+
+How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included.
 
 What has become of a body by a given time, and how far two models of the same flight are apart.
 

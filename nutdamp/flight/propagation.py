@@ -1,4 +1,6 @@
-"""Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
+"""A schedule propagated: impulse sum, and real pulse widths.
+
+Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
 
 Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
 impulses. `flown` is the judge: real widths, true moments. Both give legs that tell the motion at any time.

@@ -1,4 +1,6 @@
-"""Fly a schedule by independent means, and tell what each imperfection costs: an error budget a reviewer can sign.
+"""Cross-check by DOP853, conservation, error budget.
+
+Fly a schedule by independent means, and tell what each imperfection costs: an error budget a reviewer can sign.
 
 Euler's equations by scipy's DOP853: written apart from everything else that flies, so that it can judge it.
 

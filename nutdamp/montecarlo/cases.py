@@ -1,4 +1,6 @@
-"""The dispersed cases: what body flies, how it moves at t = 0, and which impulses it really gets.
+"""The realised spacecraft and pulses of each case.
+
+The dispersed cases: what body flies, how it moves at t = 0, and which impulses it really gets.
 
 The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
 rates, and in what each pulse does. Everything here is elementwise over cases (structure of arrays); a quantity that

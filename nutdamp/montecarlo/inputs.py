@@ -1,4 +1,6 @@
-"""Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
+"""Dispersed inputs, random draws, correlation.
+
+Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
 
 Every drawn quantity is one `Input` with a name of its own. A tolerance that cannot touch the outcome is not dropped
 in silence: it becomes an `Unused` with its reason.

@@ -1,4 +1,6 @@
-"""Cases flown through real pulse widths, with the true tensor and the disturbances, many at once.
+"""Cases by real pulse widths, and blocks fired by the Sun.
+
+Cases flown through real pulse widths, with the true tensor and the disturbances, many at once.
 
 Command blocks in dispersed cases: each case fires from the Sun pulses of its own nutating body, many at once.
 """
@@ -223,7 +225,7 @@ class RealWidths:
         return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
 
     def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> batch.Pulses:
-        """The pulses by the ramps of their thrust, each as one of its own; as in `rigid_cases.Pulses`."""
+        """The pulses by the ramps of their thrust, each as one of its own; as in `batch.Pulses`."""
         count, sheds = starts.shape[1], _sheds(cases, starts.shape[1])
         begins, lengths, parts, leans, falls = [], [], [], [], []
 

@@ -1,4 +1,6 @@
-"""Which tolerance matters: first-order sensitivities of the outcome, and the shares that the drawn cases show.
+"""Percentiles, Clopper-Pearson, sensitivities.
+
+Which tolerance matters: first-order sensitivities of the outcome, and the shares that the drawn cases show.
 
 First order is analytic: the kernel itself runs on numbers with an infinitesimal imaginary part (complex-step
 differentiation, Squire & Trapp 1998), which carries each input's derivative through every operation to rounding,

@@ -1,4 +1,6 @@
-"""Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped.
+"""A study and its threads.
+
+Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped.
 
 Some cases of a study flown by several threads, that take one portion after the other.
 

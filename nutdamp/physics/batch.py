@@ -1,11 +1,13 @@
-"""Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
+"""Taylor integration of many bodies.
+
+Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
 
 Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
 between two edges is an arc in closed form where the body is symmetric and no torque from outside acts, with energy
 dissipation too; else a Taylor series, as in `rigid`, of an order and a number of steps common to a block of cases that
 stays in the cache.
 
-Taylor series of Euler's equations and the attitude for many bodies at once, as `rigid_cases` sums them.
+Taylor series of Euler's equations and the attitude for many bodies at once, as `batch` sums them.
 """
 
 from __future__ import annotations
@@ -271,7 +273,7 @@ class Stretch(NamedTuple):
 
 
 class Watch(Protocol):
-    """Sees the motion of cases on the way; see `axis_watch`."""
+    """Sees the motion of cases on the way; see `sky`."""
 
     def some(self, cases: Any) -> Watch:
         """That of some of the cases (an index of arrays)."""

@@ -1,4 +1,6 @@
-"""Nutation angle, body cone, space cone, and the periods of the nutation.
+"""Moments, stability, cone angles, nutation periods, half pulses.
+
+Nutation angle, body cone, space cone, and the periods of the nutation.
 
 ``omega`` is the transverse rate |ω| = |ω1 + iω2| >= 0 in rad/s, ``spin`` for ω3 in rad/s, signed. The
 sources print (12), (18)-(20), (22) for positive signs; here |ω3| and |a| make them hold for both spin directions.

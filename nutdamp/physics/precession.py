@@ -1,4 +1,6 @@
-"""Turning the angular momentum H and the spin axis S of a symmetric body to a target axis by transverse impulses.
+"""Turning the angular momentum: impulses, half cones, rhumb lines.
+
+Turning the angular momentum H and the spin axis S of a symmetric body to a target axis by transverse impulses.
 
 Such an impulse is square to S, so that H·S = C|ω3| = h never changes; between impulses S goes round H at |H|/A. All
 that follows from these two sentences is exact at any angle, and the same for both spin directions.
@@ -211,7 +213,7 @@ def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, fl
     """Unit vector (3,) square to H = ``momentum`` (3,) in which H is to go to ``target`` (3,), and the way, rad.
 
     Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle to the direction
-    of the Sun (`sun_train.rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
+    of the Sun (`precession.rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
     """
     here = momentum / float(np.linalg.norm(momentum))
     if sun is None:

@@ -1,4 +1,6 @@
-"""Body rates under torques that last: the general solution Magnus 1970 (8)-(10) and its special cases.
+"""Effect of pulses and of lasting torques on the body rates.
+
+Body rates under torques that last: the general solution Magnus 1970 (8)-(10) and its special cases.
 
 Everything in time, ω̇ = -i a ω3(t) ω + M(t)/A and ω̇3 = M3/C, so that nothing is divided by ω3 (Magnus' m = M/(Aω3)
 breaks where the spin passes zero) or by a (a sphere is no exception). M = M1 + iM2 in N m, body-fixed unless said.

@@ -1,14 +1,16 @@
-"""How near the spin axis comes to directions in space, and how far from them, in many cases at once.
+"""Sun direction, Sun pulses, extreme angles of the spin axis from directions.
+
+How near the spin axis comes to directions in space, and how far from them, in many cases at once.
 
 On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
 axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
 those turns that count are followed in steps, and any other motion all the way. Arrays carry the case last, as in
-`rigid_cases`.
+`batch`.
 
 Sun pulses of nutating bodies and what fires from them, many at once: each pulse moves the Sun pulses after it.
 
 A Sun pulse comes when the Sun passes the azimuth of the sensor in the body: as the body moves, not as it would without
-nutation. Arrays carry the case last, as in `rigid_cases`, by which everything moves.
+nutation. Arrays carry the case last, as in `batch`, by which everything moves.
 
 Where the Sun is seen, to 0.01 deg between 1972 and 2100: enough for the phase of a Sun pulse and for cones.
 """
@@ -100,7 +102,7 @@ class AxisWatch:
         return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
 
     def motion(self, here: Stretch, duration: Array) -> None:
-        """Take the motion that `rigid_cases.advance` makes with these arguments, which stay as they are."""
+        """Take the motion that `batch.advance` makes with these arguments, which stay as they are."""
         bodies = here.bodies
         if here.torque is not None or not bodies.free:
             self._steps(here, duration)

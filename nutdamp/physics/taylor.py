@@ -1,4 +1,6 @@
-"""Euler's equations and the attitude, integrated by Taylor series for piecewise constant body torques.
+"""Taylor integration of one body.
+
+Euler's equations and the attitude, integrated by Taylor series for piecewise constant body torques.
 
 The equations are polynomials in rates and quaternion, so the Taylor coefficients of a solution follow from one
 another by products of series. One step spans about two radians at rounding accuracy, for any principal moments, and

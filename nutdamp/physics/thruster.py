@@ -1,4 +1,6 @@
-"""What a valve makes of a command: the thrust that a nozzle gives, its impulse and its centroid, and back.
+"""Valve, impulse bit, cold nozzle, blowdown tank.
+
+What a valve makes of a command: the thrust that a nozzle gives, its impulse and its centroid, and back.
 
 Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse is a time, the
 *effective on-time*: impulse over full thrust. A rectangular pulse of that length about the centroid has the same

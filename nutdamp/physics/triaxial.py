@@ -1,4 +1,6 @@
-"""Torque-free motion of a body with three different principal moments, in closed form.
+"""Torque-free motion with three moments.
+
+Torque-free motion of a body with three different principal moments, in closed form.
 
 Euler's equations I1 dω1/dt = (I2 - I3) ω2 ω3 and round ("Kreiseltheorie" 24.2) are solved by Jacobi's functions. Here
 c is the axis, of largest or least moment, that the motion goes about; b that of the middle moment, a the other

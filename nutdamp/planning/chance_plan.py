@@ -1,4 +1,6 @@
-"""The plan that meets a requirement most surely, or surely enough for the least propellant, by optimisation.
+"""Chance-constrained plans, tolerance allocation.
+
+The plan that meets a requirement most surely, or surely enough for the least propellant, by optimisation.
 
 `schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
 made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.

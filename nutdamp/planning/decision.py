@@ -1,4 +1,6 @@
-"""What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
+"""Plans compared, the decision on one of them line by line, and remarks.
+
+What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
 
 Also why there is no schedule, and which limits a schedule breaks. The plan gives the data; what is said of several
 plans together is in `nutdamp.views.verdicts`.

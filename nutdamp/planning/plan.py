@@ -1,4 +1,6 @@
-"""Plan by a scheme, fly what it gives, judge it against limits and requirement.
+"""Plan one scheme, judge it, route it round exclusion cones.
+
+Plan by a scheme, fly what it gives, judge it against limits and requirement.
 
 Ways round the cones that the spin axis has to keep: a scheme that points is planned leg by leg over way points.
 

@@ -1,4 +1,6 @@
-"""Which of several plans to fly: the rule, on what the plans leave when flown and on what they cost.
+"""Ranking rules, limiting factors.
+
+Which of several plans to fly: the rule, on what the plans leave when flown and on what they cost.
 
 It gives data; `nutdamp.views.verdicts` has the words.
 

@@ -1,8 +1,10 @@
-"""Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
+"""Robust plans: selection by the share of cases that comply, and on-times shortened to it.
+
+Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
 
 Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
 and, where `optimal` is among the schemes, its earliest ends, for errors of the rates grow with time, and those that
-`surest` makes for the dispersions.
+`chance_plan` makes for the dispersions.
 All of them fly the same draws through real widths, so that what is compared is the plans and not their luck.
 
 On-times of a robust plan shortened until just as many dispersed cases comply as must.
@@ -130,7 +132,7 @@ class RobustComparison:
     """Candidates from the best down; ``usual`` is what the comparison recommends, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
-    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``tightening``: with which tolerances
+    propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``chance_plan``: with which tolerances
     enough cases would comply with the robust plan, where too few do.
     ``fresh``: how the robust plan fares in as many cases by which it was not chosen; None where nothing is required.
     """

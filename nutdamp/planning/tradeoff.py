@@ -1,4 +1,6 @@
-"""What time costs: schedules of the scheme optimal from the shortest that is found to the longest that still saves.
+"""Pareto fronts, optimality certificates.
+
+What time costs: schedules of the scheme optimal from the shortest that is found to the longest that still saves.
 
 The proof of a least cost, to be checked by others: the prices of a program of small angles, and its primer curve.
 

@@ -1,6 +1,8 @@
-"""What blocks of pulses fired from the Sun pulse do, in closed form, for very many blocks at once.
+"""What a command block does, closed form; Sun pulses of a flight.
 
-H follows a rhumb line about the Sun (`physics.sun_train`), and the nutation is the impulse sum (17) over pulses at even
+What blocks of pulses fired from the Sun pulse do, in closed form, for very many blocks at once.
+
+H follows a rhumb line about the Sun (`precession`), and the nutation is the impulse sum (17) over pulses at even
 times. Commands count by the impulse, the centroid and the spread of the thrust that they give; cold nozzles and falling
 pressure by the impulse of each pulse, but for the nutation, which takes the mean pressure along a block. What is left
 out: that the nutation jitters the Sun pulses, and what is of second order in the turn by one pulse.

@@ -1,4 +1,6 @@
-"""What may be chosen of each scheme: one frozen class a scheme, checked when it is made.
+"""The schemes by name, what each can do, and its options.
+
+What may be chosen of each scheme: one frozen class a scheme, checked when it is made.
 
 The command line makes its options, their help and their headings from the fields.
 

@@ -1,8 +1,10 @@
-"""The search for command blocks in closed form: which there are, and the best few of up to so many in a row.
+"""Search over command blocks.
+
+The search for command blocks in closed form: which there are, and the best few of up to so many in a row.
 
 Blocks of pulses as spinners are commanded: channel, delay after the Sun pulse, width, number of pulses.
 
-All blocks that can be commanded are looked at in closed form (`tools.block_model`): of one block every channel, width,
+All blocks that can be commanded are looked at in closed form (`block_model`): of one block every channel, width,
 number of pulses and interval, each at the delays next to the two that serve best, one for the heading of H and one for
 the nutation. Where one does not do, a second and a third are looked for behind the most promising. The best dozen are
 flown from the Sun pulses of the nutating body, and the best of these is the schedule.

@@ -1,4 +1,6 @@
-"""Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
+"""Schedules corrected by least squares on the flown motion, whole or stage by stage.
+
+Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
 
 A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
 takes longer than a whole plan.

@@ -54,7 +54,7 @@ def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOpt
 def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Schedule:
     """Pulses of the scheme ``name``, disturbances and all.
 
-    The scheme plans on the symmetric, undisturbed `symmetric_model` of the spacecraft; where that is not exact, the
+    The scheme plans on the symmetric, undisturbed `sequential` of the spacecraft; where that is not exact, the
     last pulse (the last four of schemes that keep or turn H) is corrected on the true motion. Raises Infeasible with
     the reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
     """
@@ -136,7 +136,7 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
 
 
 def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
-    """A schedule ``made`` for the `commanding.plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+    """A schedule ``made`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
 
     Raises KeyError for a name not in `NAMES`.
     """

@@ -1,4 +1,6 @@
-"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
+"""Two pulses to a target axis.
+
+Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
 
 A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
 says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
@@ -7,7 +9,7 @@ widths.
 
 Where a steerable torquer is to push so that H and the spin axis come to the target axis: exact at any angle.
 
-The two pulses of an acquisition, and the first pulse of a row of half cones, are placed by `physics.pointing`; what is
+The two pulses of an acquisition, and the first pulse of a row of half cones, are placed by `precession`; what is
 free, the moment of the first pulse and how far aside H goes between two, is chosen for least impulse.
 """
 

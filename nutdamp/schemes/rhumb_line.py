@@ -1,4 +1,6 @@
-"""What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
+"""Sun-synchronous pulse train.
+
+What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
 
 From one pulse to the next the phasor that a pulse gives the nutation turns by 2πC/(AK) for K pulses a turn; the sum of
 the phasors says which numbers of pulses leave no nutation.

@@ -1,4 +1,6 @@
-"""A schedule laid pulse by pulse along the closed-form motion; what the body-fixed schemes share.
+"""The equivalent symmetric body; schedules built on it pulse by pulse; reasons of infeasibility.
+
+A schedule laid pulse by pulse along the closed-form motion; what the body-fixed schemes share.
 
 The body that schemes plan on: symmetric, and moving as the true one does at small angles.
 

@@ -1,6 +1,6 @@
 """Plans through valves: schemes lay rectangular pulses, and here they become the commands that give them.
 
-What a command gives is known by its effective on-time and the centroid of its thrust (`physics.valve`). So schemes plan
+What a command gives is known by its effective on-time and the centroid of its thrust (`thruster`). So schemes plan
 for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
 limits that leave room for the delays. Each of its pulses becomes the command with the same impulse and centroid, cold
 and blowdown included; what the shape of the thrust changes besides is corrected on the flown motion.

@@ -1,4 +1,6 @@
-"""What a spacecraft can fire: thrusters, channels of them, and Magnus' steerable torquer. SI, in principal axes.
+"""Thrusters, channels, Sun sensor, command blocks, loop sensor.
+
+What a spacecraft can fire: thrusters, channels of them, and Magnus' steerable torquer. SI, in principal axes.
 
 What a spinner is commanded with: a Sun sensor that starts the clock of each spin, and blocks of pulses.
 

@@ -1,4 +1,6 @@
-"""The spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement.
+"""Spacecraft, Inertia, Attitude, Disturbance, Goal, Limits, Dispersions.
+
+The spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement.
 
 Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan. ``Inertia.axes``
 leads back to the axes of the file, which is where vectors and quaternions are shown to people.

@@ -1,4 +1,6 @@
-"""What a message on attitude or orbit holds, whatever its notation: blocks of keywords, and the tables that rule them.
+"""Blocks and keywords; KVN and XML.
+
+What a message on attitude or orbit holds, whatever its notation: blocks of keywords, and the tables that rule them.
 
 The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
 502.0-B-3: 3-1 to 3-3 (OPM).

@@ -1,4 +1,6 @@
-"""Reads attitude parameter messages in KVN: state, inertia and manoeuvres, with every fault and its line.
+"""Attitude parameter messages read: state, inertia, manoeuvres, every fault with its line.
+
+Reads attitude parameter messages in KVN: state, inertia and manoeuvres, with every fault and its line.
 
 Other readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here
 nothing is guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.

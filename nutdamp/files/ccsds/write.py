@@ -1,4 +1,6 @@
-"""The attitude parameter message: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse.
+"""APM, AEM, OPM.
+
+The attitude parameter message: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse.
 
 Everything is given in the axes of the spacecraft file, which the message calls `message.BODY_FRAME`.
 

@@ -1,4 +1,6 @@
-"""What no schedule can beat: lower bounds of the cost, by duality and by the length of the way.
+"""Lower bounds, primer function.
+
+What no schedule can beat: lower bounds of the cost, by duality and by the length of the way.
 
 The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
 schedules that leave no more than `Allowed`, and none of them knows of gaps, ticks and on-times, which can only raise

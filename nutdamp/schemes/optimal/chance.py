@@ -1,4 +1,6 @@
-"""Least-cost firing that meets a requirement with a margin of so many sigmas: the cones of `chance_model`, cut by cut.
+"""Chance-constrained program and its dual bound.
+
+Least-cost firing that meets a requirement with a margin of so many sigmas: the cones of `chance`, cut by cut.
 
 The linear program has tangents of the cones, added where its solution breaks them (Kelley 1960), and columns by price.
 

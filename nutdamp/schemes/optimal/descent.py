@@ -1,4 +1,6 @@
-"""Many sequences of pulses at once, each brought to the cheapest schedule near it: its channels, in its order.
+"""Interior-point descent of many pulse sequences at once.
+
+Many sequences of pulses at once, each brought to the cheapest schedule near it: its channels, in its order.
 
 Unknown are starts and on-times; what the flight leaves of the equations must vanish, and on-times, gap, windows and
 horizon bound them linearly. A primal-dual interior-point iteration with quasi-Newton curvature (Nocedal and Wright

@@ -1,4 +1,6 @@
-"""A small linear program that grows by columns, solved by HiGHS in whichever way gets to its end.
+"""HiGHS, reachability test.
+
+A small linear program that grows by columns, solved by HiGHS in whichever way gets to its end.
 
 Whether firings for at most so long each supply a goal: the nearest point of what they can supply.
 

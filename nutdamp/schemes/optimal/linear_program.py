@@ -1,4 +1,6 @@
-"""Least-cost firing of body-fixed channels as a linear program over channels and firing times.
+"""Column generation.
+
+Least-cost firing of body-fixed channels as a linear program over channels and firing times.
 
 Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
 and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at

@@ -1,4 +1,6 @@
-"""What the scheme optimal is to do: channels, costs, equations; their program of small angles, bounds and reasons.
+"""Costs, equations, burns made feasible.
+
+What the scheme optimal is to do: channels, costs, equations; their program of small angles, bounds and reasons.
 
 Burns of the linear program that can be fired: few of them, within on-times, gap and number, as pulses.
 """

@@ -1,4 +1,6 @@
-"""What a short firing at one moment does to what is left at the end: the equations of the linear program.
+"""Residual equations, Newton refinement, rounding to ticks.
+
+What a short firing at one moment does to what is left at the end: the equations of the linear program.
 
 Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), shift of H
 (two, square to the target axis) and spin (one). Before anything is planned they are those of small angles; after that
@@ -11,7 +13,7 @@ two pulses at a time, by the linear model of what is left, which is taken anew a
 
 The last digits of a schedule: move and lengthen its pulses until the flown motion leaves nothing.
 
-A quasi-Newton iteration for the nearest solution. The slopes are those of `residual_equations`, which cost no
+A quasi-Newton iteration for the nearest solution. The slopes are those of `refinement`, which cost no
 flights, corrected by what each step shows (Broyden 1965).
 Room is shared between neighbours beforehand, so that no limit can be broken.
 

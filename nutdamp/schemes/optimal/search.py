@@ -1,9 +1,11 @@
-"""Least propellant over channels and firing times: no nutation left, H on its target, and the spin as requested.
+"""The search for the least-cost schedule.
+
+Least propellant over channels and firing times: no nutation left, H on its target, and the spin as requested.
 
 The program of `linear_program` finds the burns, at first with small angles. The schedule is flown, the program's
 equations are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres
 and on-times are refined on it. Where that finds nothing, where the horizon is no longer than a few nutation periods
-and where the schedule is dear, `starting_points` looks for a cheaper one from very many starts. Two bounds go with the
+and where the schedule is dear, `multistart` looks for a cheaper one from very many starts. Two bounds go with the
 plan: the program's first least cost, of first order, and a rigorous one.
 
 Other ends than those the search over the whole horizon comes to.
