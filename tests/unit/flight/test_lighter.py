@@ -28,8 +28,8 @@ from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Tank, Trapezoid
 from nutdamp.planning import plan as planning
 from nutdamp.schemes import command_block
-from nutdamp.schemes.block_model import BlockModel
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.schemes.catalogue import CommandBlockOptions
+from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
@@ -200,7 +200,10 @@ def test_what_cannot_have_falling_moments_says_so() -> None:
         fly(body, body.loop)
     blocks = read_spacecraft(SPINNER, "f.yaml")
     lighter = replace(blocks, tank=Tank(10.0, 22e5, 16e5, 1.0, inertia_per_kg=(0.3, 0.3, 0.2)))
-    cures = [command_block.cures(BlockModel(one), one.channels, {}, Schedule(), []) for one in (blocks, lighter)]
+    within = Requirement(nutation=1e-9)
+    nutating = np.array([0.01, 0.0, blocks.spin])
+    bodies = [replace(body, omega0=nutating, requirement=within) for body in (blocks, lighter)]
+    cures = [command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1] for body in bodies]
     check_text("flight.cures-of-blocks", "\n".join(cures))
 
 

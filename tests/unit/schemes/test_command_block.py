@@ -27,8 +27,9 @@ from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
+from nutdamp.schemes.block_search import FLOWN, BlockSearch, Flown, Found
 from nutdamp.schemes.catalogue import Options
-from nutdamp.schemes.command_block import FLOWN, Flown, Found, Search
+from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
@@ -92,7 +93,7 @@ def test_no_single_block_of_the_whole_grid_is_better_in_closed_form(seed: int) -
         requirement=within(0.5, 0.5 if aim else None),
     )
     assert body.commands is not None
-    best = Search(body, body.channels, body.commands).best(1)[0]
+    best = BlockSearch(body, body.channels, body.commands).best(1)[0]
     assert best.rank[:2] == pytest.approx(scanned(body), rel=1e-9)
 
 
@@ -134,7 +135,7 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     """
     body = replace(some_body(seed), requirement=within(nutation, shift))
     assert body.commands is not None
-    search = Search(body, usable(body), body.commands)
+    search = BlockSearch(body, usable(body), body.commands)
 
     def shares() -> Iterator[float]:
         single = search._single(Found((), search.model.start, (math.inf,) * 3))
@@ -156,13 +157,13 @@ def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(mo
     assert len(single.pulses.blocks) == 1
     assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
     assert plan.severity <= single.severity
-    severities, flown = list[float](), Search.flown
+    severities, flown = list[float](), BlockSearch.flown
 
-    def counted(self: Search, found: Found) -> Flown:
+    def counted(self: BlockSearch, found: Found) -> Flown:
         severities.append(flown(self, found).rank[1])
         return flown(self, found)
 
-    monkeypatch.setattr(Search, "flown", counted)
+    monkeypatch.setattr(BlockSearch, "flown", counted)
     plan = planned(replace(some_body(2), requirement=within(0.1, 0.1)), met=False)
     assert len(severities) > FLOWN
     assert plan.severity == pytest.approx(min(severities))
@@ -284,11 +285,11 @@ def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
     """Where another was taken because it does better when flown, the note says no more than that."""
     for body in (a_turn(), replace(a_turn(), requirement=within(0.5, 0.02))):
         assert body.commands is not None
-        search = Search(body, body.channels, body.commands)
+        search = BlockSearch(body, body.channels, body.commands)
         best, plan = search.best(1), planned(body, ONE, met=False)
         flights = [search.flown(found) for found in best]
-        assert "no other single block does better in closed form" in search.note(flights[0], first=True)
-        assert "no other" not in search.note(flights[-1], first=False)
+        assert "no other single block does better in closed form" in scope_note(search, flights[0], first=True)
+        assert "no other" not in scope_note(search, flights[-1], first=False)
         assert plan.pulses.blocks == min(flights, key=lambda made: made.rank).found.blocks
         assert (plan.pulses.blocks == best[0].blocks) <= ("no other single block" in plan.pulses.notes[0])
 
