@@ -177,8 +177,6 @@ def command(
         _expect_loop(flown, {"threads": threads, "figure": figure != FIGURES[0]})
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, figure=figure, csv=csv, json=json, plot=plot)
     if looped:
-        pass  # MERGED
-
         disperse_loop(job, Requested(samples, seed, until, case, worst, csv, json, plot))
         return
     require_dispersions(job.spacecraft)

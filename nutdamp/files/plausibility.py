@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from nutdamp.files.fields import KeyPath
-from nutdamp.files.keys import VALVE_TIMES
 from nutdamp.files.rules import Facts, Finding, inertia_of, spin_of
+from nutdamp.files.study_keys import VALVE_TIMES
 from nutdamp.files.yaml import Node
 from nutdamp.physics.body import momentary
 from nutdamp.units import KINDS

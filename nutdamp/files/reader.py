@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest
+from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.keys import (
     AttitudeSection,
@@ -33,19 +34,17 @@ from nutdamp.files.keys import (
     InertiaSection,
     KeepSection,
     LimitsSection,
-    LoopSection,
     OrbitSection,
     RequirementSection,
     SpacecraftFile,
     SunSensorSection,
     ThrusterSection,
-    by_name,
-    dispersions,
 )
 from nutdamp.files.overrides import Setting, overlay
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
-from nutdamp.files.study_rules import dispersion_findings, thrust_findings
+from nutdamp.files.study_keys import LoopSection, by_name, dispersions
+from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
 from nutdamp.physics.body import principal_axes
@@ -108,7 +107,7 @@ def read_contents(
     faults += unplaced
     found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
-        from nutdamp.files.study_rules import loop_findings  # few files have one
+        from nutdamp.files.loop_rules import loop_findings  # few files have one
 
         found += loop_findings(root)
     problems: Problems = []

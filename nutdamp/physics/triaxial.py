@@ -322,6 +322,5 @@ def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: floa
     """
     if moments[0] == moments[1]:
         return momentary(moments, rates, sense)
-    pass  # MERGED
 
     return widest_cones(moments, np.asarray(rates, dtype=float), sense)

@@ -413,7 +413,6 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
 
 def _routed(astray: Plan, options: catalogue.SchemeOptions) -> Plan:
     """A plan of the same scheme by another way, on which the spin axis keeps its cones; else the one that does not."""
-    pass  # MERGED
 
     body = astray.spacecraft
     for made in schedules(known(body, options), astray.scheme, options):

@@ -8,7 +8,8 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from nutdamp.errors import BadRequest
 from nutdamp.files import fields
 from nutdamp.files.fields import Quantity, Section, section_of
-from nutdamp.files.keys import QUANTITIES, SpacecraftFile, ToleranceSection, unit_kinds
+from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
 from nutdamp.views.guide import FILE, Part, Rows, Topic, meant
 

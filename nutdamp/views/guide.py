@@ -199,7 +199,6 @@ def found(requested: str) -> Topic:
 
 def _equation(source: str, number: str) -> Topic:
     """The topic of the equation of that ``source`` (m, k or §, empty: Magnus) and ``number``; raises BadRequest."""
-    pass  # MERGED
 
     section = "." in number
     name = number if section else f"{source.upper() if source == 'k' else 'M'}({number})"

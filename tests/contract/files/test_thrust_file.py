@@ -15,11 +15,11 @@ from support.broken import BASE
 from support.contract import Write, check_faults, faults, known
 from support.golden import check_text
 
-from nutdamp.files import study_rules
+from nutdamp.files import dispersion_rules, thruster_rules
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.files.rules import Facts
 from nutdamp.files.schedules import EFFECTIVE, pulses_csv, read_pulses
-from nutdamp.files.study_rules import thrusts
+from nutdamp.files.thruster_rules import thrusts
 from nutdamp.flight.propellant import supplied
 from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid
@@ -140,7 +140,8 @@ def test_the_thrusts_of_a_file_are_looked_up_once(monkeypatch: pytest.MonkeyPatc
         calls.append(facts)
         return thrusts(facts)
 
-    monkeypatch.setattr(study_rules, "thrusts", counted)
+    for rules in (dispersion_rules, thruster_rules):
+        monkeypatch.setattr(rules, "thrusts", counted)
     read(body=with_table())
     assert len(calls) == 1
 

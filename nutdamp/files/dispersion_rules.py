@@ -1,0 +1,390 @@
+"""Constraints between the dispersions of a spacecraft file, their correlations, and what they vary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from nutdamp.errors import nearest
+from nutdamp.files.fields import RIGHT_ANGLE, KeyPath
+from nutdamp.files.rules import (
+    Facts,
+    Finding,
+)
+from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, READING, VALVE_TIMES, by_name, size_of
+from nutdamp.files.thruster_rules import instead, moments_of, thrusts
+from nutdamp.files.yaml import Node
+from nutdamp.montecarlo.inputs import Pair, grouped, positive_definite
+from nutdamp.spacecraft.equipment import ACCELEROMETER
+from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.spacecraft.tolerances import KINDS
+from nutdamp.units import bar, shown
+
+PARTS = {"thrust_direction": ("direction", "ab"), "position": ("position", "xyz"), "attitude": ("attitude", "xy")}
+"""Tolerances of which several inputs are drawn: their first word and their last letters."""
+
+EACH_PULSE = ("thrust_per_pulse", "timing")
+"""Tolerances that each pulse draws anew."""
+
+
+def correlation_findings(facts: Facts, entries: Iterable[Entry], thrusters: Iterable[str]) -> Iterator[Finding]:
+    """Pairs of what is not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
+
+    ``entries`` are the tolerances of the file, ``thrusters`` the names that may have some of their own.
+    """
+    path = ("dispersions", "correlation")
+    pairs: dict[frozenset[str], Pair] = {}
+    drawn, sound = _drawn(facts, entries, list(thrusters)), True
+    for index, node in facts.children(*path):
+        names = [facts.text(*path, index, place) for place in (0, 1)]
+        size = facts.number("ratio", *path, index, 2)
+        if len(node.value if isinstance(node.value, list) else ()) != 3 or None in names or size is None:
+            sound = False
+            continue  # said already
+        first, second = (name or "" for name in names)
+        for place, name in enumerate((first, second)):
+            problem = _unknown(name, drawn)
+            if problem:
+                yield Finding((*path, index, place), problem)
+        if first == second:
+            yield Finding((*path, index, 1), f"{shown(first)} again; expected two different inputs")
+        elif frozenset((first, second)) in pairs:
+            yield Finding((*path, index), f"{first} and {second} are given before; keep one of the two")
+        elif abs(size) == 1.0:
+            yield Finding((*path, index, 2), f"{size:g}: one would follow from the other; expected less than 1 in size")
+        elif abs(size) < 1.0:
+            pairs[frozenset((first, second))] = (first, second, size)
+            continue
+        sound = False
+    for group in grouped(pairs.values()) if sound else ():
+        if not positive_definite(group):
+            problem = f"not positive definite for {', '.join(group.names)}: no numbers have these correlations"
+            yield Finding(path, f"{problem}; pairs that are not given count as 0")
+
+
+def _unknown(name: str, drawn: dict[str, bool]) -> str:
+    """Why an input cannot be correlated; empty where it can. ``drawn``: whether it varies, by name."""
+    if name in drawn:
+        return "" if drawn[name] else f"{shown(name)} is a fixed offset (bias), which does not vary"
+    if name.replace(" ", "_") in EACH_PULSE:
+        return f"{shown(name)} is drawn by each pulse anew; expected an input that is the same for all pulses"
+    close = nearest(name, list(drawn))
+    known = f"did you mean {shown(close)}?" if close else f"known here: {', '.join(drawn) or 'none'}"
+    return f"the dispersions have no input called {shown(name)}; {known}"
+
+
+def _drawn(facts: Facts, entries: Iterable[Entry], thrusters: list[str]) -> dict[str, bool]:
+    """Names of all inputs that any schedule could draw once, as `montecarlo.inputs` has them, and whether they vary."""
+    found = {}
+    for entry in entries:
+        key, *rest = entry.path[1:]
+        node = facts.root.get(*entry.path)
+        varies = node is not None and isinstance(node.value, dict) and "bias" not in node.value
+        for name in _names(facts, str(key), rest, thrusters):
+            found[name] = varies
+    return found
+
+
+def _names(facts: Facts, key: str, one: list[str | int], thrusters: list[str]) -> list[str]:
+    """Of a tolerance, which may be of ``one`` thruster or axis alone."""
+    if key in EACH_PULSE:
+        return []
+    if key == "omega0":
+        return [f"omega0_{int(axis) + 1}" for axis in one or range(3)]
+    word, letters = PARTS.get(key, (key, ""))
+    if key in BY_THRUSTER:
+        return [
+            f"{word} {name} {letter}".rstrip()
+            for name in one or thrusters
+            for letter in (letters if name != STEERABLE else "") or " "
+        ]
+    if key in ("sensor_bias", "sensor_scale") and facts.text("loop", "sensor", "kind") != ACCELEROMETER:
+        return [f"{key.replace('_', ' ')} {axis}" for axis in (1, 2)]
+    if letters:
+        return [f"{word} {letter}" for letter in letters]
+    spaced = key.startswith(("tank_", "sensor_", "timing_"))
+    return [key.replace("_", " ", 1) if spaced else key]
+
+
+LARGEST_SIGMA = 0.5
+"""One sigma of a normal distribution, relative to the nominal value, that is still believed: beyond, more than one
+draw in forty would turn its sign."""
+
+LARGEST_OFFSET = 1.0
+"""Half widths and fixed offsets must stay below this, relative to the nominal value, which would otherwise turn its
+sign. Of an angle the nominal value is 90 deg."""
+
+
+class Entry(NamedTuple):
+    """One tolerance: where it is, what kind of quantity it holds, the least nominal value and what that is."""
+
+    path: KeyPath
+    kind: str
+    nominal: float | None = None
+    of: str = ""
+
+
+def dispersion_findings(root: Node) -> Iterator[Finding]:
+    """Everything wrong between the keys of the dispersions and with what else the file says."""
+    facts = Facts(root)
+    yield from _probability(facts)
+    if not facts.has("dispersions"):
+        return
+    yield from _thruster_names(facts)
+    for entry in _entries(facts):
+        yield from _kinds(facts, entry)
+    yield from _shifted_moments(facts)
+    yield from _of_sensor(facts)
+    yield from _below_zero(facts)
+    yield from correlation_findings(facts, _entries(facts), thrusts(facts))
+
+
+def _below_zero(facts: Facts) -> Iterator[Finding]:
+    """Times of valves and numbers of the tank that draws would turn negative."""
+    for key in VALVE_TIMES:
+        for path in _each(facts, key):
+            for name, nominal in _valve_times(facts, key, path[2:]).items():
+                size = _size_of(facts, path, "time")
+                if size is not None and size[1] > (1.0 + 1e-12) * nominal:
+                    yield _negative(path, size, f"the {key} of {name}, {nominal:g} s")
+                    break
+    low = facts.number("pressure", "tank", "final_pressure")
+    for key in ("tank_propellant", "tank_pressure", "tank_final_pressure"):
+        nominal_, path_ = facts.number(QUANTITIES[key], "tank", key.removeprefix("tank_")), ("dispersions", key)
+        size = _size_of(facts, path_, QUANTITIES[key], nominal_) if nominal_ is not None else None
+        if size is None or nominal_ is None:
+            continue
+        floor = low if key == "tank_pressure" and low is not None else 0.0
+        if size[1] > (1.0 + 1e-12) * (nominal_ - floor):
+            value, least = (f"{one:g} kg" if key == "tank_propellant" else bar(one) for one in (nominal_, floor))
+            below = f"less than final_pressure, {least}" if floor else "negative"
+            yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {value}", below)
+
+
+def _negative(path: KeyPath, size: tuple[str, float], of: str, below: str = "negative") -> Finding:
+    reach = "draws beyond three sigma" if size[0] == "normal" else "draws"
+    problem = f"{reach} would make {of}, {below}; expected a smaller spread, or a larger nominal value"
+    return Finding((*path, size[0]), problem)
+
+
+def _each(facts: Facts, key: str) -> list[KeyPath]:
+    """Where the tolerances of ``key`` are: one, or one a thruster."""
+    path: KeyPath = ("dispersions", key)
+    node = facts.root.get(*path)
+    if node is None or not isinstance(node.value, dict):
+        return []
+    return [(*path, name) for name, _ in node.children()] if by_name(node.value) else [path]
+
+
+def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
+    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``.
+
+    One in % is that of the ``nominal`` value, where that is known.
+    """
+    for name in KINDS:
+        size = facts.number(kind, *path, name)
+        share = None if size is not None or nominal is None else facts.number("ratio", *path, name)
+        if share is not None and nominal is not None:
+            out_of_range = abs(share) > (LARGEST_SIGMA if name == "normal" else LARGEST_OFFSET)  # said by `_kinds`
+            size = None if out_of_range else share * nominal
+        if size is not None:
+            return name, -size if name == "bias" else 3.0 * size if name == "normal" else size
+    return None
+
+
+def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
+    """The time of ``key`` of the valve of each thruster that a tolerance concerns, s."""
+    found = {}
+    for index, _ in facts.children("thrusters"):
+        path: KeyPath = ("thrusters", index)
+        name = facts.text(*path, "name")
+        valve: KeyPath = (*path, "valve") if facts.has(*path, "valve") else ("valve",)
+        if name is None or facts.has(*path, "impulse_bit") or not facts.has(*valve) or (named and named[0] != name):
+            continue
+        time = facts.number("time", *valve, key) if facts.has(*valve, key) else 0.0
+        if time is not None:
+            found[name] = time
+    return found
+
+
+def _probability(facts: Facts) -> Iterator[Finding]:
+    if facts.has("requirement", "probability") and not (
+        facts.has("requirement", "nutation") or facts.has("requirement", "momentum_shift")
+    ):
+        problem = "given alone; name what must be met with it: nutation, momentum_shift or both"
+        yield Finding(("requirement", "probability"), problem, True)
+
+
+def _entries(facts: Facts) -> Iterator[Entry]:
+    """All tolerances in the file."""
+    forces = thrusts(facts)
+    for key, kind in QUANTITIES.items():
+        path: KeyPath = ("dispersions", key)
+        node = facts.root.get(*path)
+        if node is None:
+            continue
+        if key == "omega0" and isinstance(node.value, list):
+            for index, _ in node.children():
+                yield Entry((*path, index), kind, _spin(facts) if index == 2 else None, "the spin")
+        elif key in BY_THRUSTER and isinstance(node.value, dict) and by_name(node.value):
+            for name, _ in node.children():
+                nominal = forces.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
+                yield Entry((*path, name), kind, nominal, f"the thrust of {name}" if kind == "force" else "")
+        elif key == "thrust":
+            known = [(thrust, name) for name, thrust in forces.items() if thrust is not None]
+            least = min(known, default=(None, ""))
+            yield Entry(path, kind, least[0], f"the thrust of {least[1]}")
+        else:
+            yield Entry(path, kind, *_nominal(facts, key))
+
+
+def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
+    """The value that a tolerance is compared with, and what it is; None where it cannot be read, or nothing bounds."""
+    if key in ("A", "C"):
+        moments = moments_of(facts)
+        return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
+    if key == "omega0":
+        return _spin(facts), "the spin"
+    if QUANTITIES[key] == "ratio":
+        return 1.0, ""
+    return (RIGHT_ANGLE, "a right angle") if QUANTITIES[key] == "angle" else (None, "")
+
+
+def _spin(facts: Facts) -> float | None:
+    """|ω3| about the third axis of the file; None where it is zero or cannot be read."""
+    spin = facts.number("rate", "omega0", 2) if facts.has("omega0") else facts.number("rate", "state", "spin")
+    return abs(spin) if spin else None
+
+
+def _thruster_names(facts: Facts) -> Iterator[Finding]:
+    """Tolerances of thrusters that the file does not have."""
+    known = list(thrusts(facts))
+    for key in BY_THRUSTER:
+        path: KeyPath = ("dispersions", key)
+        node = facts.root.get(*path)
+        if node is None or not isinstance(node.value, dict):
+            continue
+        if not node.value:
+            yield Finding(path, f"empty; give {_example(QUANTITIES[key])}, or one such entry by thruster")
+        elif by_name(node.value):
+            for name in node.value:
+                if name == STEERABLE and name not in known:
+                    yield Finding((*path, name), f"the file has no {STEERABLE} torquer; leave this out", True)
+                elif name not in known:
+                    yield Finding((*path, name), f"no thruster is called {shown(name)}; {instead(name, known)}", True)
+
+
+def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
+    """What is wrong with the kinds and the size of one tolerance."""
+    node = facts.root.get(*entry.path)
+    if node is None or not isinstance(node.value, dict):
+        return
+    given = [key for key in node.value if key in KINDS]
+    said = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
+    if not given and not said:
+        yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
+    for key in given[1:]:
+        yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
+    for key in given:
+        problem = _size_fault(facts, entry, key, node.value[key].plain())
+        if problem is not None:
+            yield Finding((*entry.path, key), problem)
+
+
+def _example(kind: str) -> str:
+    sizes = {
+        "inertia": "2 %",
+        "mass": "1 %",
+        "pressure": "2 %",
+        "rate": "0.1 deg/s",
+        "force": "3 %",
+        "ratio": "1 %",
+        "angle": "0.5 deg",
+        READING: "0.01 deg/s",
+    }
+    return f"{{normal: {sizes.get(kind, '5 mm' if kind == 'length' else '5 ms')}}}, or uniform, triangular, bias"
+
+
+def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | None:
+    """What makes the size of a tolerance impossible."""
+    if value is None:
+        return None  # said already
+    try:
+        size, relative = size_of(value, entry.kind)
+    except ValueError as wrong:
+        return str(wrong)
+    if key != "bias" and size < 0.0:
+        what = "one sigma" if key == "normal" else "half a width"
+        return f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
+    if entry.kind == "force" and not relative:
+        unknown = _without_thrust(facts, entry)
+        if unknown is not None:
+            return f"{shown(value)} needs the thrust of {unknown}, which is not known; give its lever_arm, or a %"
+    nominal = 1.0 if relative else entry.nominal
+    if nominal is None:
+        return None
+    fraction, limit = abs(size) / nominal, LARGEST_SIGMA if key == "normal" else LARGEST_OFFSET
+    if fraction < limit or (key == "normal" and fraction == limit):
+        return None
+    most = f"{'of at most' if key == 'normal' else 'below'} {100 * limit:g} %"
+    amounts = f"is {100 * fraction:.3g} % of {entry.of}" if entry.of and not relative else "is out of range"
+    what = {"normal": "one sigma", "bias": "an offset"}.get(key, "half a width")
+    return f"{shown(value)} {amounts}; expected {what} {most}"
+
+
+def _without_thrust(facts: Facts, entry: Entry) -> str | None:
+    """A thruster that an absolute tolerance concerns and whose thrust is not known."""
+    named = entry.path[2:]
+    for name, thrust in thrusts(facts).items():
+        if thrust is None and (not named or name == named[0]):
+            return f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
+    return None
+
+
+def _shifted_moments(facts: Facts) -> Iterator[Finding]:
+    """Fixed offsets of A and C that make a body no body: every draw would be refused."""
+    moments = moments_of(facts)
+    if moments is None:
+        return
+    wider = _offset(facts, "A", 0.5 * (moments[0] + moments[1]))
+    longer = _offset(facts, "C", moments[2])
+    if wider is None or longer is None or (wider == longer == 0.0):
+        return
+    first, second, third = (1 + wider) * moments[0], (1 + wider) * moments[1], (1 + longer) * moments[2]
+    if third > (first + second) * (1 + 1e-9) or abs(first - second) > third:
+        key = "C" if longer != 0.0 else "A"
+        problem = f"with this offset C = {third:g} and A = {0.5 * (first + second):g} kg m^2: not physically possible"
+        yield Finding(("dispersions", key, "bias"), f"{problem}; C must be at most 2 A")
+
+
+def _of_sensor(facts: Facts) -> Iterator[Finding]:
+    """Tolerances of a sensor that the file does not have, or of the other kind, and a delay below zero."""
+    kind = facts.text("loop", "sensor", "kind")
+    wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
+    for key in QUANTITIES:
+        path: KeyPath = ("dispersions", key)
+        if not key.startswith("sensor_") or not facts.has(*path):
+            continue
+        if not facts.has("loop"):
+            yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
+        for one in KINDS if key == "sensor_bias" and kind is not None else ():
+            text = facts.text(*path, one)
+            if text is not None and facts.number(wrong, *path, one) is not None:
+                yield Finding((*path, one), f"{shown(text)} is not in the unit of the sensor: {right}")
+    delay, offset = (
+        facts.number("time", *path) for path in (("loop", "sensor", "delay"), ("dispersions", "sensor_delay", "bias"))
+    )
+    if offset is not None and (delay or 0.0) + offset < 0.0 and facts.has("loop"):
+        problem = f"with this offset the delay is {(delay or 0.0) + offset:g} s; expected a delay of at least 0"
+        yield Finding(("dispersions", "sensor_delay", "bias"), problem)
+
+
+def _offset(facts: Facts, key: str, nominal: float) -> float | None:
+    """Fixed offset of a moment of inertia, relative; 0 where it is exactly known, None where it is random or faulty."""
+    if not facts.has("dispersions", key):
+        return 0.0
+    path = ("dispersions", key, "bias")
+    relative, value = facts.number("ratio", *path), facts.number("inertia", *path)
+    if facts.text(*path) is None or relative is None:
+        relative = None if value is None else value / nominal
+    return relative if relative is not None and abs(relative) < LARGEST_OFFSET else None

@@ -1,0 +1,267 @@
+"""Constraints between the keys of a closed loop and those of the body that it damps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.errors import span
+from nutdamp.files.fields import KeyPath
+from nutdamp.files.rules import (
+    Facts,
+    Finding,
+    Vector,
+    inertia_of,
+    norm,
+    spin_axis,
+    spin_of,
+)
+from nutdamp.files.thruster_rules import instead, on_times_of, torque_of
+from nutdamp.files.yaml import Node
+from nutdamp.spacecraft.model import Inertia
+from nutdamp.spacecraft.tolerances import KINDS
+from nutdamp.units import KINDS as UNITS
+from nutdamp.units import shown
+
+SAMPLES = 4.0
+"""Samples a nutation period without which the phase of the nutation is hardly seen."""
+
+MOST_SAMPLES = 1e6
+"""Samples a nutation period, more than which tell no more and take for ever to fly."""
+
+LATE = 20.0
+"""Nutation periods after which a sample tells nothing: how long delay, filter and settling may be."""
+
+LONGEST_WAIT = 1e4
+"""Nutation periods, more than which from firing to firing damp nothing."""
+
+LARGEST_BIAS, FARTHEST = 1e3, 1e3
+"""m/s² and m of an accelerometer beyond which it is none of a spacecraft: its nutation would be lost in rounding."""
+
+SCALES = (0.1, 10.0)
+"""Sizes of scales between which a sensor shows what it measures."""
+
+SENSOR: KeyPath = ("loop", "sensor")
+
+
+def loop_findings(root: Node) -> Iterator[Finding]:
+    """Everything wrong with ``loop``."""
+    facts = Facts(root)
+    if not facts.has("loop"):
+        return
+    inertia, spin = inertia_of(facts), spin_of(facts)
+    yield from _thresholds(facts)
+    yield from _sensor(facts)
+    yield from _channels(facts)
+    if inertia is None or spin is None:
+        return
+    if inertia.body_rate == 0.0:
+        problem = "in a sphere ω does not rotate in the body, so that a loop has no phase to fire by; leave loop out"
+        yield Finding(("loop",), problem, True)
+        return
+    yield from _sampling(facts, abs(inertia.body_rate * spin))
+    yield from _lags(facts, 2.0 * math.pi / abs(inertia.body_rate * spin))
+    yield from _accelerometer(facts, inertia)
+    yield from _seen(facts, inertia, spin)
+
+
+class ChannelFacts(NamedTuple):
+    """A channel as far as it can be read: its torque (3,) N m, file axes, None where it is not known, and on-times, s.
+
+    ``damps`` is whether the torque is more transverse to principal axis 3 than along it.
+    """
+
+    name: str
+    torque: Vector | None
+    damps: bool
+    least: float
+    most: float
+
+
+def channel_facts(facts: Facts) -> list[ChannelFacts]:
+    """The channels of the file, or its thrusters where it names none."""
+    thrusters = {
+        facts.text("thrusters", index, "name"): ("thrusters", index) for index, _ in facts.children("thrusters")
+    }
+    named = [
+        (str(name), [entry.value for _, entry in node.children()]) for name, node in facts.children("channels")
+    ] or [(name, [name]) for name in thrusters if name is not None]
+    axis, found = spin_axis(facts), []
+    for name, members in named:
+        paths: list[KeyPath] = [thrusters[one] for one in members if one in thrusters]
+        torques = [torque_of(facts, path) for path in paths]
+        total = None if None in torques else np.sum([one[0] for one in torques if one is not None], axis=0)
+        along = 0.0 if total is None else abs(float(total @ axis))
+        damps = total is not None and norm(total - (total @ axis) * axis) > along
+        times = [on_times_of(facts, path) for path in paths]
+        least, most = max((one for one, _ in times), default=0.0), min((one for _, one in times), default=math.inf)
+        found.append(ChannelFacts(name, total, damps, least, most))
+    return found
+
+
+def _thresholds(facts: Facts) -> Iterator[Finding]:
+    start = facts.number("angle", "loop", "start")
+    stop = facts.number("angle", "loop", "stop")
+    if start is not None and stop is not None and stop >= start > 0.0:
+        problem = f"{math.degrees(stop):g} deg is not below start; expected less than {math.degrees(start):g} deg"
+        yield Finding(("loop", "stop"), problem)
+
+
+def _sensor(facts: Facts) -> Iterator[Finding]:
+    kind = facts.text(*SENSOR, "kind")
+    scale = facts.number("ratio", *SENSOR, "scale")
+    if scale == 0.0:
+        yield Finding((*SENSOR, "scale"), "zero: the sensor shows nothing; expected about 100 %")
+    elif scale is not None and not SCALES[0] <= abs(scale) <= SCALES[1]:
+        allowed = f"{100.0 * SCALES[0]:g} % to {100.0 * SCALES[1]:g} %, or the same below zero"
+        yield Finding((*SENSOR, "scale"), f"{100.0 * scale:g} % is no scale of a sensor; expected {allowed}")
+    if not facts.has(*SENSOR, "rate"):
+        for key in ("noise", "quantisation", "low_pass"):
+            if facts.has(*SENSOR, key):
+                yield Finding((*SENSOR, key), "applies to samples: it needs rate, such as rate: 100 Hz", True)
+    if kind == "accelerometer":
+        for key in ("rate", "position"):
+            if not facts.has(*SENSOR, key):
+                what = "samples, of which a sine is made" if key == "rate" else "where it is, from the centre of mass"
+                yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
+    elif kind == "gyro":
+        for key in ("position", "axis"):
+            if facts.has(*SENSOR, key):
+                yield Finding((*SENSOR, key), "is for kind: accelerometer; a gyro measures the same everywhere", True)
+    axis = facts.vector("number", 3, *SENSOR, "axis")
+    if axis is not None and not axis.any():
+        yield Finding((*SENSOR, "axis"), "zero; expected a direction, such as [0, 0, 1]")
+    yield from _units(facts, kind)
+
+
+def _units(facts: Facts, kind: str | None) -> Iterator[Finding]:
+    """Quantities in the unit of the other sensor."""
+    wrong = {"gyro": "acceleration", "accelerometer": "rate"}.get(kind or "")
+    right = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelerometer: m/s^2"}.get(kind or "")
+    for key in ("noise", "bias", "quantisation"):
+        text = facts.text(*SENSOR, key)
+        if wrong is not None and text is not None and facts.number(wrong, *SENSOR, key) is not None:
+            yield Finding((*SENSOR, key), f"{shown(text)} is not in a unit of {right}")
+
+
+def _channels(facts: Facts) -> Iterator[Finding]:
+    """Whether something can be fired, for as long as the law says, and whether it is there."""
+    known = channel_facts(facts)
+    law, on_time = facts.text("loop", "law"), facts.number("time", "loop", "on_time")
+    if not known:
+        problem = "needs channels to fire: thrusters with a torque across axis 3"
+        yield Finding(("loop",), problem, True)
+    elif all(one.torque is not None for one in known) and not any(one.damps for one in known):
+        problem = "no channel has a torque more transverse than axial, so none can damp a nutation"
+        yield Finding(("loop",), problem, True)
+    if law == "bang" and not facts.has("loop", "on_time"):
+        yield Finding(("loop", "on_time"), "missing; the law bang fires pulses of this length")
+    if law == "one-pulse" and facts.has("loop", "on_time"):
+        yield Finding(("loop", "on_time"), "is for four-pulse and bang; one-pulse fires for as long as it takes", True)
+    elif on_time is not None:
+        for one in known:
+            if not one.least <= on_time <= one.most:
+                problem = f"{on_time:g} s is outside what {one.name} allows: {span(one.least, one.most, 's')}"
+                yield Finding(("loop", "on_time"), problem)
+    names, before = [one.name for one in known], set()
+    for index, node in facts.children("loop", "faults", "reversed"):
+        path: KeyPath = ("loop", "faults", "reversed", index)
+        if node.value in before:
+            yield Finding(path, f"{shown(node.value)} is named twice; expected each channel once")
+        before.add(node.value)
+        if isinstance(node.value, str) and node.value not in names:
+            yield Finding(path, f"no channel is called {shown(node.value)}; {instead(node.value, names)}")
+
+
+def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
+    """Too few samples for a nutation ``rate`` (rad/s) in the body."""
+    given, alias = facts.number("frequency", *SENSOR, "rate"), facts.root.get("loop", "alias")
+    least = SAMPLES * rate / (2.0 * math.pi)
+    if given is not None and 0.0 < given < least and (alias is None or alias.value is not True):
+        problem = f"{given:g} Hz is below four times the nutation frequency; expected at least {least:.4g} Hz"
+        yield Finding((*SENSOR, "rate"), f"{problem}, or alias: true beside start")
+    most = MOST_SAMPLES * rate / (2.0 * math.pi)
+    if given is not None and given > most:
+        problem = f"{given:g} Hz is more than a million samples a nutation period of {2.0 * math.pi / rate:.4g} s"
+        problem += f"; expected at most {most:.4g} Hz"
+        yield Finding((*SENSOR, "rate"), f"{problem}, or no rate for a continuous signal")
+
+
+def _lags(facts: Facts, period: float) -> Iterator[Finding]:
+    """Times after which what the sensor shows is of no use; ``period`` s is that of the nutation in the body."""
+    lags = ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle"))
+    for path, most in (*((path, LATE) for path in lags), (("loop", "min_interval"), LONGEST_WAIT)):
+        value = facts.number("time", *path)
+        if value is not None and value > most * period:
+            problem = f"{value:g} s is {value / period:.3g} nutation periods; expected at most {most:g}"
+            yield Finding(path, f"{problem} of them, {most * period:.4g} s")
+
+
+def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
+    """An accelerometer that shows nothing of the nutation."""
+    from nutdamp.control_loop.sensor import is_blind  # few files have one
+
+    position, axis = _mounting(facts, inertia)
+    if facts.text(*SENSOR, "kind") != "accelerometer" or position is None or axis is None:
+        return
+    if math.hypot(*position) > FARTHEST:
+        problem = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
+        yield Finding((*SENSOR, "position"), problem)
+    if not is_blind(inertia.moments, position, axis):
+        return
+    if inertia.symmetric and inertia.C == 2.0 * inertia.A and abs(axis[2]) > 1.0 - 1e-9:
+        problem = "blind: along axis 3 it shows r ω1 ω3 (1 + a), which is nothing at C = 2A, where a = -1"
+        yield Finding((*SENSOR, "kind"), f"{problem}; measure across axis 3, off its plane")
+    else:
+        problem = "blind: here it shows nothing of the nutation; move it off axis 3, or turn its axis"
+        yield Finding((*SENSOR, "position"), problem)
+
+
+def _mounting(facts: Facts, inertia: Inertia) -> tuple[Vector | None, Vector | None]:
+    """Position (3,) m and unit axis (3,) of an accelerometer in principal axes."""
+    position = facts.vector("length", 3, *SENSOR, "position")
+    axis = facts.vector("number", 3, *SENSOR, "axis") if facts.has(*SENSOR, "axis") else np.array([0.0, 0.0, 1.0])
+    if axis is not None:
+        axis = inertia.axes.T @ (axis / math.hypot(*axis)) if axis.any() else None
+    return None if position is None else inertia.axes.T @ position, axis
+
+
+def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
+    """Noise, steps and bias in which the start threshold is lost."""
+    start, kind = facts.number("angle", "loop", "start"), facts.text(*SENSOR, "kind")
+    if start is None or not 0.0 < start < 0.5 * math.pi or kind not in ("gyro", "accelerometer"):
+        return
+    size = inertia.C * abs(spin) / inertia.A * math.tan(start)
+    if kind == "accelerometer":
+        from nutdamp.control_loop.sensor import gain
+
+        position, axis = _mounting(facts, inertia)
+        if position is None or axis is None:
+            return
+        size *= abs(spin) * math.hypot(*gain(inertia.moments, position, axis))
+        if size == 0.0:
+            return
+    quantity = "rate" if kind == "gyro" else "acceleration"
+    # The offset of an accelerometer is fitted, and does not matter.
+    shares = {(*SENSOR, "noise"): 1.0, (*SENSOR, "quantisation"): 2.0}
+    biases: list[KeyPath] = [(*SENSOR, "bias"), *(("dispersions", "sensor_bias", one) for one in KINDS)]
+    for path, share in (*shares.items(), *((path, 1.0 if kind == "gyro" else LARGEST_BIAS / size) for path in biases)):
+        value = facts.number(quantity, *path)
+        if value is None or abs(value) <= share * size or (value < 0.0 and path in shares):
+            continue
+        unit, scale = _unit_of(facts.text(*path)) if kind == "gyro" else ("m/s^2", 1.0)
+        most = f"{share * size / scale:.4g} {unit}"
+        if kind == "gyro" or path in shares:
+            problem = f"{value / scale:.4g} {unit} hides start, which shows as {size / scale:.4g} {unit}"
+        else:
+            problem = f"{value:.4g} {unit} is no bias of an accelerometer"
+        yield Finding(path, f"{problem}; expected at most {most}")
+
+
+def _unit_of(text: str | None) -> tuple[str, float]:
+    """The unit of an angular rate as it is written, and its size in rad/s."""
+    written = (text or "").rpartition(" ")[2]
+    return (written, UNITS["rate"].factors[written]) if written in UNITS["rate"].factors else ("rad/s", 1.0)

@@ -1,0 +1,354 @@
+"""Keys of a spacecraft file for studies: dispersions and the closed loop, with their units and ranges.
+
+Sizes of tolerances stay as they are written here: `dispersion_rules` finds the faults in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+from nutdamp.files.fields import (
+    RIGHT_ANGLE,
+    AcuteAngle,
+    Direction,
+    Field,
+    Length,
+    Name,
+    Position,
+    PositiveTime,
+    Quantity,
+    Rule,
+    Section,
+    Time,
+)
+from nutdamp.spacecraft.tolerances import KINDS, Dispersions, Tolerance
+from nutdamp.units import parse, pattern, shown
+
+if TYPE_CHECKING:
+    from nutdamp.spacecraft.equipment import Steerable, Thruster
+
+READING = "reading"
+"""The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
+
+RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
+"""The kinds of quantity that may be dispersed by a percentage of the nominal value."""
+
+VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
+
+ALL = ""
+"""Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
+
+
+def size_of(value: object, kind: str) -> tuple[float, bool]:
+    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and whether it is a fraction.
+
+    Raises ValueError, which says what would be right.
+    """
+    if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
+        return parse(value, "ratio"), True
+    if kind == READING:
+        with suppress(ValueError):
+            return parse(value, "acceleration"), False
+        return parse(value, "rate"), False
+    try:
+        return parse(value, kind), kind == "ratio"
+    except ValueError as wrong:
+        hint = ", or in % of the nominal value" if kind in RELATIVE and kind != "ratio" else ""
+        raise ValueError(f"{wrong}{hint}") from None
+
+
+def unit_kinds(kind: str) -> list[str]:
+    """The kinds of quantity (keys of `units.KINDS`) by which a tolerance of ``kind`` may be given."""
+    if kind == READING:
+        return ["rate", "acceleration"]
+    return [kind, "ratio"] if kind in RELATIVE and kind != "ratio" else [kind]
+
+
+def by_name(value: Mapping[str, object]) -> bool:
+    """Whether a mapping holds tolerances by thruster, and is not itself one."""
+    return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
+
+
+class ToleranceSection(Section):
+    """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
+
+    written = "a tolerance, such as {normal: 2 %}"
+
+    normal: Any = Field("One sigma of a normal distribution, in its unit or in %.", "2 %", default=None)
+    uniform: Any = Field("Half the width of a uniform distribution, in its unit or in %.", "5 ms", default=None)
+    triangular: Any = Field("Half the width of a triangular distribution, in its unit or in %.", "5 %", default=None)
+    bias: Any = Field("Fixed offset, signed, in its unit or in %.", "-2 ms", default=None)
+
+    def tolerance(self, key: str) -> Tolerance:
+        """The checked tolerance, which is at ``key`` of the dispersions."""
+        kind = next(kind for kind in KINDS if getattr(self, kind) is not None)
+        size, relative = size_of(getattr(self, kind), QUANTITIES[key])
+        return Tolerance(kind, size, relative)
+
+
+class _Tolerance(Rule):
+    """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which may be for all."""
+
+    def __init__(self, kind: str, each: Literal["", "axis", "thruster"] = "") -> None:
+        self.kind, self.each = kind, each
+
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
+        """A single tolerance is that of all three axes, or for all thrusters."""
+        if isinstance(value, dict) and self.each == "axis":
+            return inner([value] * 3)
+        alone = isinstance(value, dict) and self.each == "thruster" and not by_name(value)
+        return inner({ALL: value} if alone else value)
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """One tolerance or several, with their units."""
+        single = _json_schema(self.kind)
+        if self.each == "axis":
+            return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
+        if self.each == "thruster":
+            return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
+        return single
+
+
+def _json_schema(kind: str) -> dict[str, Any]:
+    """JSON Schema of a tolerance of ``kind``."""
+    texts = [{"type": "string", "pattern": pattern(one)} for one in unit_kinds(kind)]
+    spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
+    return {
+        "type": "object",
+        "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
+        "additionalProperties": False,
+        "minProperties": 1,
+        "maxProperties": 1,
+    }
+
+
+_Three = Annotated[list[ToleranceSection], Length(3, 3)]
+_ByThruster = dict[str, ToleranceSection]
+_Moment = Annotated[ToleranceSection, _Tolerance("inertia")]
+_Share = Annotated[ToleranceSection, _Tolerance("ratio")]
+_Time = Annotated[ToleranceSection, _Tolerance("time")]
+_Pressure = Annotated[ToleranceSection, _Tolerance("pressure")]
+_Times = Annotated[_ByThruster, _Tolerance("time", "thruster")]
+
+
+class DispersionsSection(Section):
+    """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
+
+    A: _Moment | None = Field("Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"})
+    C: _Moment | None = Field("Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"})
+    omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
+        "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
+    )
+    thrust: Annotated[_ByThruster, _Tolerance("force", "thruster")] | None = Field(
+        "Of each thruster, the same in all its pulses, % or N; or by name.", {"normal": "3 %"}
+    )
+    thrust_per_pulse: _Share | None = Field("Of the thrust, in each pulse anew, %.", {"normal": "1 %"})
+    thrust_direction: Annotated[_ByThruster, _Tolerance("angle", "thruster")] | None = Field(
+        "Tilt of each force about two axes across it, rad; or by name.", {"normal": "0.5 deg"}
+    )
+    position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
+        "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
+    )
+    timing: _Time | None = Field("Shift of each pulse, s.", {"uniform": "5 ms"})
+    timing_offset: _Time | None = Field("One shift of the whole schedule, s.", {"bias": "2 ms"})
+    attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
+        "Of the direction of the spin axis at t = 0, about two axes across it, rad.", {"normal": "0.2 deg"}
+    )
+    open_delay: _Times | None = Field(
+        "Of each valve's open_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    close_delay: _Times | None = Field(
+        "Of each valve's close_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    rise_time: _Times | None = Field(
+        "Of each valve's rise_time, the same in all its pulses, s; or by name.", {"normal": "0.5 ms"}
+    )
+    fall_time: _Times | None = Field(
+        "Of each valve's fall_time, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
+    )
+    impulse_bit: Annotated[_ByThruster, _Tolerance("ratio", "thruster")] | None = Field(
+        "Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.", {"normal": "2 %"}
+    )
+    cold: _Share | None = Field("Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"})
+    sensor_bias: Annotated[ToleranceSection, _Tolerance(READING)] | None = Field(
+        "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", {"normal": "0.01 deg/s"}
+    )
+    sensor_scale: _Share | None = Field(
+        "Of the scale of each gyro of a loop, or of its accelerometer, %.", {"normal": "1 %"}
+    )
+    sensor_noise: _Share | None = Field("Of the noise of the sensor of a loop, %.", {"uniform": "20 %"})
+    sensor_delay: _Time | None = Field(
+        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", {"uniform": "2 ms"}
+    )
+    cold_pulses: _Share | None = Field("Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"})
+    tank_propellant: Annotated[ToleranceSection, _Tolerance("mass")] | None = Field(
+        "Of the propellant in the tank at t = 0, kg or %.", {"normal": "1 %"}
+    )
+    tank_pressure: _Pressure | None = Field(
+        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", {"normal": "0.2 bar"}
+    )
+    tank_final_pressure: _Pressure | None = Field("Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"})
+    tank_exponent: _Share | None = Field(
+        "Of the power of the pressure that the thrust goes with, in %.", {"normal": "5 %"}
+    )
+    inertia_per_kg: _Share | None = Field(
+        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", {"normal": "10 %"}
+    )
+    correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
+        "Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
+        " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
+        [["A", "C", 0.99]],
+        default=[],
+    )
+
+
+_TOLERANCES = {
+    key: rule
+    for key, field in DispersionsSection.fields().items()
+    for rule in get_args(get_args(field.type)[0])
+    if isinstance(rule, _Tolerance)
+}
+QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}
+"""The keys of dispersions with the kind of quantity that they hold."""
+
+BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")
+"""The keys that hold one tolerance for all thrusters, or one by name."""
+
+
+def dispersions(
+    section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
+) -> Dispersions | None:
+    """The tolerances of a checked file; None where it has none. A thrust in N becomes a fraction of the thruster's.
+
+    ``torquer`` is the steerable one, also where an ideal one is assumed.
+    """
+    if section is None:
+        return None
+    from nutdamp.spacecraft.schedule import STEERABLE
+
+    thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
+    if torquer is not None:
+        thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
+
+    def fraction(name: str, tolerance: Tolerance) -> Tolerance:
+        thrust = thrusts[name]
+        if tolerance.relative or thrust is None:
+            return tolerance
+        return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
+
+    found: dict[str, Any] = {}
+    for key in (one.name for one in fields(Dispersions)):
+        entry = getattr(section, key)
+        if key == "correlation":
+            found[key] = tuple((one, other, size) for one, other, size in entry)
+        elif isinstance(entry, ToleranceSection):
+            found[key] = entry.tolerance(key)
+        elif isinstance(entry, list | tuple):  # by axis
+            found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)
+        elif entry is not None:  # by thruster
+            named = {name: one.tolerance(key) for name, one in entry.items()}
+            found[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
+    if "thrust" in found:
+        found["thrust"] = {name: fraction(name, tolerance) for name, tolerance in found["thrust"].items()}
+    return Dispersions(**found)
+
+
+def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:
+    """Thrust in N behind a torque (N m) on a lever arm (m); None where one of them is not known."""
+    return None if torque is None or lever_arm is None else torque / lever_arm
+
+
+class Reading(Quantity):
+    """Annotation of a quantity in the unit of the sensor: an angular rate of a gyro, else an acceleration."""
+
+    def __init__(self, **bounds: float) -> None:
+        super().__init__("rate", **bounds)
+
+    def check(self, value: object) -> float:
+        """SI value; raises ValueError, which says what would be right."""
+        try:
+            result = parse(value, "acceleration")
+        except ValueError:
+            result = parse(value, self.kind)
+        if not self._allows(result):
+            raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
+        return result
+
+    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
+        """A number, or a text with a unit of either."""
+        texts = [{"type": "string", "pattern": pattern(kind)} for kind in ("rate", "acceleration")]
+        return {"anyOf": [{"type": "number", **self.bounds}, *texts]}
+
+
+Frequency = Annotated[float, Quantity("frequency", exclusiveMinimum=0)]
+Least = Annotated[float, Reading(minimum=0)]
+Threshold = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
+
+
+class LoopSensorSection(Section):
+    """What the loop sees: two rate gyros about the axes 1 and 2, or an accelerometer."""
+
+    kind: Literal["gyro", "accelerometer"] = Field(
+        "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"
+    )
+    rate: Frequency | None = Field("Samples a second, Hz; default: a continuous signal.", "100 Hz")
+    quantisation: Least = Field(
+        "Step of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.002 deg/s", default=0.0
+    )
+    noise: Least = Field(
+        "One sigma of the noise of a sample: rad/s, of an accelerometer m/s²; default 0.", "0.01 deg/s", default=0.0
+    )
+    bias: Annotated[float, Reading()] = Field(
+        "What a signal shows without motion: rad/s, of an accelerometer m/s²; default 0.", "0.02 deg/s", default=0.0
+    )
+    scale: Annotated[float, Quantity("ratio")] = Field(
+        "Factor of the signal on the truth; default 100 %. -100 % is a sensor that is reversed.", "101 %", default=1.0
+    )
+    delay: Time = Field("Time until a sample reaches the valves, s; default 0.", "20 ms", default=0.0)
+    low_pass: Time = Field(
+        "Time constant of a first-order low-pass filter over the samples, s; default 0: none.", "50 ms", default=0.0
+    )
+    position: Position | None = Field("Where an accelerometer is, from the centre of mass, m.", ["0.8 m", 0, 0])
+    axis: Direction | None = Field(
+        "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
+    )
+
+
+class LoopFaultsSection(Section):
+    """Faults that the loop is flown with and does not know of."""
+
+    reversed: list[Name] = Field("Channels that push the other way when they are fired.", ["+M1"], default=[])
+
+
+class LoopSection(Section):
+    """A closed loop, for `nutdamp loop`: it fires from where the sensor shows start down to stop."""
+
+    sensor: LoopSensorSection = Field("The sensor.", {"kind": "gyro", "rate": "100 Hz", "noise": "0.01 deg/s"})
+    law: Literal["four-pulse", "one-pulse", "bang"] = Field(
+        "four-pulse: each channel that comes into line, as long as what is left requires, at most "
+        "on_time; one-pulse: the same, at most half a nutation period; bang: each for on_time. Default four-pulse.",
+        "four-pulse",
+        default="four-pulse",
+    )
+    start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
+    stop: Threshold = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
+    settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
+    min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
+    predict: bool = Field(
+        "Whether delay, filter and half the on-time are compensated, so that firings are centred on "
+        "their moments; default true.",
+        True,
+        default=True,
+    )
+    alias: bool = Field(
+        "Whether fewer than four samples a nutation period are meant; default false.", True, default=False
+    )
+    on_time: PositiveTime | None = Field(
+        "Pulses of bang, and the longest ones of four-pulse, s; default of four-pulse: an eighth of the "
+        "nutation period, within min_on_time and max_on_time.",
+        "50 ms",
+    )
+    faults: LoopFaultsSection | None = Field("Faults to fly with, default none.", {"reversed": ["+M1"]})

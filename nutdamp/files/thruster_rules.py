@@ -1,0 +1,332 @@
+"""Constraints between the keys of thrusters, channels, valves, cold nozzles and the tank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from nutdamp.errors import nearest
+from nutdamp.files.fields import SMALLEST, KeyPath
+from nutdamp.files.rules import (
+    CANCELLED,
+    Facts,
+    Finding,
+    Vector,
+    force_vector,
+    norm,
+    symmetric,
+    tensor_fault,
+    tensor_of,
+)
+from nutdamp.files.study_keys import VALVE_TIMES, thrust_behind
+from nutdamp.files.yaml import Node
+from nutdamp.physics.body import principal_axes
+from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.units import bar, shown
+
+_MOUNTING = ("position", "direction", "force")
+
+
+def thrusters(facts: Facts) -> Iterator[Finding]:
+    """What is wrong with each of the ``thrusters``."""
+    for index, node in facts.children("thrusters"):
+        if isinstance(node.value, dict):
+            yield from _thruster_keys(facts, ("thrusters", index))
+            yield from _thruster_values(facts, ("thrusters", index))
+
+
+def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    mounting = [key for key in _MOUNTING if facts.has(*path, key)]
+    given = " and ".join(mounting)
+    if facts.has(*path, "torque"):
+        if mounting:
+            problem = f"given together with {given}; keep either torque, or position, direction and force"
+            yield Finding((*path, "torque"), problem, True)
+    elif not mounting:
+        yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
+    else:
+        for key in _MOUNTING:
+            if key not in mounting:
+                yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
+    if mounting and facts.has(*path, "lever_arm"):
+        yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
+
+
+def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    direction = facts.vector("number", 3, *path, "direction")
+    if direction is not None and norm(direction) < SMALLEST:
+        yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
+    elif _is_none(torque_of(facts, path)):
+        if facts.has(*path, "torque"):
+            yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
+        else:
+            problem = "no torque: the force passes through the centre of mass; move or turn the thruster"
+            yield Finding((*path, "position"), problem)
+    least, most = on_times_of(facts, path)
+    if least > most:
+        yield Finding((*path, "min_on_time"), f"{least:g} s exceeds max_on_time; expected at most {most:g} s")
+
+
+def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
+    """Torque of a thruster, and the magnitude that its rounding goes by; None where it cannot be read."""
+    torque = facts.vector("torque", 3, *path, "torque")
+    if torque is not None:
+        return torque, norm(torque)
+    position = facts.vector("length", 3, *path, "position")
+    direction = facts.vector("number", 3, *path, "direction")
+    force = facts.number("force", *path, "force")
+    if position is None or direction is None or not force or norm(direction) < SMALLEST:
+        return None
+    return np.cross(position, force_vector(direction, force)), norm(position) * abs(force)
+
+
+def _is_none(torque: tuple[Vector, float] | None) -> bool:
+    """Whether a torque is zero but for rounding; False where it is not known."""
+    return torque is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1])
+
+
+def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
+    """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
+    least = facts.number("time", *path, "min_on_time")
+    most = facts.number("time", *path, "max_on_time")
+    return (0.0 if least is None else least), (math.inf if most is None else most)
+
+
+def channels(facts: Facts) -> Iterator[Finding]:
+    """What is wrong with the ``channels``: thrusters that fire together."""
+    indices = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
+    names = [name for name in indices if name is not None]
+    for channel, node in facts.children("channels"):
+        path = ("channels", channel)
+        members: set[KeyPath] = set()
+        for index, entry in node.children():
+            name = entry.value
+            if not isinstance(name, str):
+                continue
+            if name not in indices:
+                yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
+            elif (member := ("thrusters", indices[name])) in members:
+                yield Finding((*path, index), f"{shown(name)} is listed twice in this channel; expected once")
+            else:
+                members.add(member)
+        if members and len(members) == len(list(node.children())):
+            yield from _channel_values(facts, path, members)
+
+
+def instead(name: str, names: list[str]) -> str:
+    """The thruster that was meant, or all there are."""
+    few = names[:20]  # to look for the nearest of very many takes long
+    close = nearest(name, few)
+    if close is not None:
+        return f"did you mean {shown(close)}?"
+    return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
+
+
+def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
+    times = [on_times_of(facts, member) for member in members]
+    least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
+    if least > most and all(shortest <= longest for shortest, longest in times):
+        problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
+        yield Finding(path, f"{problem}; let them fire in channels of their own")
+
+
+def moments_of(facts: Facts) -> tuple[float, float, float] | None:
+    """Principal moments in kg m², the one about the spin axis last; None where they cannot be read."""
+    tensor = tensor_of(facts)
+    if tensor is not None:
+        return None if tensor_fault(tensor) else principal_axes(symmetric(tensor))[0]
+    A, C = (facts.number("inertia", "inertia", key) for key in ("A", "C"))
+    return None if A is None or C is None or A <= 0.0 or C <= 0.0 else (A, A, C)
+
+
+def thrusts(facts: Facts) -> dict[str, float | None]:
+    """The thrust in N of each thruster of the file and its torquer; None where it is not known."""
+    found: dict[str, float | None] = {}
+    for index, _ in facts.children("thrusters"):
+        path: KeyPath = ("thrusters", index)
+        name = facts.text(*path, "name")
+        if name is not None:
+            torque = facts.vector("torque", 3, *path, "torque")
+            size = None if torque is None else float(np.linalg.norm(torque))
+            lever = facts.number("length", *path, "lever_arm")
+            found[name] = facts.number("force", *path, "force") or thrust_behind(size, lever or None)
+    if facts.has("steerable") or not facts.children("thrusters"):
+        torque_, lever = facts.number("torque", "steerable", "torque"), facts.number("length", "steerable", "lever_arm")
+        found[STEERABLE] = thrust_behind(torque_, lever or None)
+    return found
+
+
+THRUST_KEYS = ("valve", "cold", "tank")
+"""At the root of the file."""
+
+
+def thrust_findings(root: Node) -> Iterator[Finding]:
+    """Everything wrong with thrusters, channels, ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
+    facts = Facts(root)
+    yield from thrusters(facts)
+    yield from channels(facts)
+    indices = [index for index, _ in facts.children("thrusters")]
+    for key in THRUST_KEYS:
+        if facts.has(key) and not indices:
+            yield Finding((key,), "applies to thrusters, and the file has none; leave it out", True)
+    named, said = thrusts(facts), set[KeyPath]()
+    for index in indices:
+        path: KeyPath = ("thrusters", index)
+        if facts.has(*path, "valve") and facts.has(*path, "impulse_bit"):
+            yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
+        valve = _valve_path(facts, path)
+        if valve is not None:
+            for found in _opens(facts, path, valve):
+                if found.path not in said:
+                    yield found
+                said.add(found.path)
+        elif facts.has(*path, "impulse_bit"):
+            yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
+    yield from _alike(facts, named)
+    if facts.has("tank") and indices:
+        yield from _tank(facts, named)
+
+
+def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
+    """Where the valve of a thruster is: its own, or that of all."""
+    if facts.has(*path, "valve"):
+        return (*path, "valve")
+    return ("valve",) if facts.has("valve") and not facts.has(*path, "impulse_bit") else None
+
+
+def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
+    """A valve that closes before it opens, whatever the command."""
+    opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
+    longest = facts.number("time", *path, "max_on_time")
+    if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
+        of = facts.text(*path, "name") or "a thruster"
+        problem = (
+            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s of {of}: its valve "
+            "closes before it opens, and no command gives thrust"
+        )
+        yield Finding((*valve, "open_delay"), problem)
+
+
+def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Finding]:
+    """What is wrong with an impulse_bit; ``thrust`` N, None where it is not known."""
+    table: KeyPath = (*path, "impulse_bit")
+    rows = [
+        [facts.number(kind, *table, row, column) for column, kind in enumerate(("time", "impulse", "time"))]
+        for row, _ in facts.children(*table)
+    ]
+    for number, (before, row) in enumerate(pairwise(rows), start=1):
+        for column, what, unit in ((0, "on-time", "s"), (1, "impulse", "N s")):
+            value, last = row[column], before[column]
+            if value is not None and last is not None and value <= last:
+                problem = f"{what} {value:g} {unit} is not above that of the row before, {last:g} {unit}"
+                yield Finding((*table, number, column), f"{problem}; expected rows with rising on-times and impulses")
+        value, last = row[2], before[2]
+        if value is not None and last is not None and value < last:
+            problem = f"centroid {value:g} s is before that of the row before, {last:g} s; expected one not earlier"
+            yield Finding((*table, number, 2), problem)
+    if thrust is None:
+        if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
+            return  # what cannot be read is said already
+        yield Finding(table, "needs the thrust; give lever_arm", True)
+        return
+    for number, (on_time, impulse, centroid) in enumerate(rows):
+        if on_time is None or impulse is None or centroid is None:
+            continue
+        lasts = impulse / thrust
+        if centroid < 0.5 * lasts:
+            problem = (
+                f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the thrust "
+                f"would begin before the command; expected at least {0.5 * lasts:g} s"
+            )
+            yield Finding((*table, number, 2), problem)
+    first, last = (rows[0][0], rows[-1][0]) if rows else (None, None)
+    least, most = (facts.number("time", *path, key) for key in ("min_on_time", "max_on_time"))
+    if last is not None and least is not None and least >= last:
+        yield Finding((*path, "min_on_time"), f"{least:g} s is not below the last on-time of impulse_bit, {last:g} s")
+    if first is not None and most is not None and most <= first:
+        yield Finding((*path, "max_on_time"), f"{most:g} s is not above the first on-time of impulse_bit, {first:g} s")
+
+
+def _alike(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
+    """Thrusters of one channel that make different pulses of a command; ``named`` are their thrusts, N."""
+    entries = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
+    kinds = {name: _kind(facts, index, named.get(name or "")) for name, index in entries.items()}
+    for channel, node in facts.children("channels"):
+        listed = [entry.value for _, entry in node.children() if isinstance(entry.value, str)]
+        members = [name for name in listed if name in kinds]
+        other = next((name for name in members if kinds[name] != kinds[members[0]]), None)
+        if other is not None:
+            problem = f"{members[0]} and {other} make different pulses of a command, by valve or impulse_bit"
+            yield Finding(("channels", channel), f"{problem}; let them fire in channels of their own")
+
+
+def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
+    """What is wrong with the tank; ``named`` are the thrusts of the thrusters, N."""
+    full, empty = (facts.number("pressure", "tank", key) for key in ("pressure", "final_pressure"))
+    if full is not None and empty is not None and empty > full > 0.0:
+        problem = f"{bar(empty)} exceeds pressure: it falls as propellant is used; expected at most {bar(full)}"
+        yield Finding(("tank", "final_pressure"), problem)
+    mass, propellant = facts.number("mass", "mass"), facts.number("mass", "tank", "propellant")
+    if mass is not None and propellant is not None and propellant >= mass > 0.0:
+        yield Finding(("tank", "propellant"), f"{propellant:g} kg is not less than the mass, {mass:g} kg")
+    rows = [facts.number("pressure", "tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
+    for number, (before, pressure) in enumerate(pairwise(rows), start=1):
+        if before is not None and pressure is not None and pressure <= before:
+            problem = f"{bar(pressure)} is not above that of the row before, {bar(before)}; expected rising pressures"
+            yield Finding(("tank", "isp", number, 0), problem)
+    known = [pressure for pressure in rows if pressure is not None]
+    if full is not None and known and not min(known) <= full <= max(known):
+        problem = f"{bar(min(known))} to {bar(max(known))} leave out the pressure at t = 0, {bar(full)}; add a row"
+        yield Finding(("tank", "isp"), problem)
+    if propellant is not None and facts.has("tank", "inertia_per_kg"):
+        yield from _emptied(facts, propellant)
+    for index, _ in facts.children("thrusters"):
+        name = facts.text("thrusters", index, "name") or ""
+        if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):
+            problem = "missing; tank needs to know the propellant that is used, by isp here or in tank"
+            yield Finding(("thrusters", index, "isp"), problem)
+        if named.get(name, 0.0) is None and not facts.has("thrusters", index, "force"):
+            problem = "missing; tank needs to know the propellant that is used, and so the thrust"
+            yield Finding(("thrusters", index, "lever_arm"), problem)
+
+
+def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
+    """Moments of inertia that no body can have once all ``propellant`` kg are used."""
+    path: KeyPath = ("tank", "inertia_per_kg")
+    moments, rows = moments_of(facts), facts.vector("shed", 3, *path)
+    transverse, axial = (facts.number("shed", *path, key) for key in "AC")
+    if rows is None and transverse is not None and axial is not None:
+        rows = np.array([transverse, transverse, axial])
+    if moments is None or rows is None or rows.min() < 0.0:
+        return  # what cannot be read, or is out of range, is said already
+    empty = np.asarray(moments) - propellant * rows
+    values = ", ".join(f"{moment:.4g}" for moment in empty)
+    least, middle, largest = np.sort(empty).tolist()
+    if least <= 0.0:
+        worst = int(np.argmax(rows / moments))
+        most = f"expected less than {moments[worst] / propellant:.4g} kg m^2/kg of the moment {moments[worst]:g} kg m^2"
+        yield Finding(path, f"leaves {values} kg m^2 once {propellant:g} kg are used, all must be above 0; {most}")
+    elif empty[2] == middle and least < middle < largest:
+        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the moment about axis 3 is the middle one"
+        yield Finding(path, f"{problem}, about which a spin is unstable; expected the largest or the least")
+    elif largest > (least + middle) * (1.0 + 1e-9):
+        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the largest exceeds the sum of the others"
+        yield Finding(path, f"{problem}, which no body has; expected less off the smaller ones, or more off it")
+
+
+def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:
+    """What a thruster of ``thrust`` N makes of a command, to be compared."""
+    path: KeyPath = ("thrusters", index)
+    valve = _valve_path(facts, path)
+    if valve is not None:
+        times = tuple(facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES)
+        return (*times, facts.text(*valve, "on_time_is") or "command")
+    cells: list[float | str | None] = []
+    for row, _ in facts.children(*path, "impulse_bit"):
+        impulse = facts.number("impulse", *path, "impulse_bit", row, 1)
+        cells += [facts.number("time", *path, "impulse_bit", row, column) for column in (0, 2)]
+        cells.append(None if impulse is None else round(impulse / (thrust or math.inf), 12))
+    return tuple(cells) if cells else (*(0.0,) * len(VALVE_TIMES), "command")
