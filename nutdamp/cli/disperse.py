@@ -27,7 +27,7 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import interruption, leave
-from nutdamp.cli.options import FILE, Aim, Count, EndTime, PlanningCommand, goal_options
+from nutdamp.cli.options import FILE, SAMPLES, Aim, Count, EndTime, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.schemes.catalogue import Options
 
@@ -118,9 +118,6 @@ def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
     flown = study.fly([study.case(case)])
     job.deliver([(json, partial(loop_case_json, study, case, flown))], partial(loop_case_screen, study, case, flown))
 
-
-SAMPLES = 20_000
-"""Cases where nothing else is said: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
 
 FIGURES = ("overview", "cases", "momentum", "budget")
 """What --plot draws."""

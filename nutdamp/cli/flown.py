@@ -13,6 +13,7 @@ from nutdamp.cli.screen import show_failures
 from nutdamp.schemes.catalogue import NAMES, Options, SchemeOptions
 
 if TYPE_CHECKING:
+    from nutdamp.api import Trade
     from nutdamp.cli.job import Job
     from nutdamp.planning.decision import Comparison
     from nutdamp.planning.plan import Plan
@@ -88,6 +89,16 @@ def robust_of(job: Job, compared: Comparison, options: Options) -> RobustCompari
     trials = robust.attempts(compared, options)
     with progress("dispersing", len(trials), quiet=job.quiet) as advance:
         return robust.compare(compared, trials, advance)
+
+
+def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, options: Options) -> Trade:
+    """The fronts of time against cost, with a bar."""
+    from nutdamp.api import trade
+    from nutdamp.cli.job import progress
+
+    with progress("searching", points * len(set(shifts)), quiet=job.quiet) as step:
+        known = options.with_disturbances
+        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, progress=step)
 
 
 def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:

@@ -102,6 +102,9 @@ class FolderName(FileName):
     completed_as = "dir"
 
 
+SAMPLES = 20_000
+"""Cases where nothing else is said: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
+
 FILE = FileName()
 FOLDER = FolderName()
 

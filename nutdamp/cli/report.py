@@ -10,13 +10,11 @@ from typing import Any
 
 import click
 
-from nutdamp.cli.disperse import SAMPLES
-from nutdamp.cli.flown import Flown, compared_with, plan_or_read, robust_of
+from nutdamp.cli.flown import Flown, compared_with, fronts_of, plan_or_read, robust_of
 from nutdamp.cli.job import Input, begin, deliver, quiet_option, require_dispersions, spacecraft_argument, working
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, Aim, Count, Grouped, PlanningCommand, SchemeName, goal_options, is_number
+from nutdamp.cli.options import FILE, SAMPLES, Aim, Count, Grouped, PlanningCommand, SchemeName, goal_options, is_number
 from nutdamp.cli.screen import show_failures
-from nutdamp.cli.trade import trade_with
 from nutdamp.errors import printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED, Options
 
@@ -139,7 +137,7 @@ def command(
         compared = compare_plans((plan_or_read(job, flown, options),), samples=samples)
     if robust:
         compared = robust_of(job, compared, options).joined
-    fronts = () if trade is None else trade_with(job, trade, (0.0, math.inf), LEAST[0], options).fronts
+    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
         made = made_of(compared, repeat, kept, fronts)
     deliver([(output, lambda: made.content)])

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.job import Input, Job, Output, begin, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.flown import fronts_of
+from nutdamp.cli.job import Input, Output, begin, quiet_option, remarks, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
     FILE,
@@ -97,7 +98,7 @@ def command(
     paths = [] if schedules is None else schedule_paths(schedules, most)
     job = begin(spacecraft, aim=aim, quiet=quiet, csv=csv, json=json, plot=plot, schedules=paths)
     expect_read((OPTIMAL.name,), options, job.spacecraft, job.remark)
-    traded = trade_with(job, points, shifts, least, options)
+    traded = fronts_of(job, points, shifts, least, options)
     found = traded.fronts
     for index, _, point in numbered(found):
         if point.plan.cut:
@@ -106,16 +107,6 @@ def command(
     files, unsaved = ([], []) if schedules is None else _schedules(found, schedules)
     job.deliver([*outputs, *files], partial(_screen, traded), unsaved=unsaved)
     leave(infeasible=not any(front.points for front in found))
-
-
-def trade_with(job: Job, points: int, shifts: Sequence[float], least: str, options: Options) -> Trade:
-    """The fronts, with a bar."""
-    from nutdamp.api import trade
-    from nutdamp.cli.job import progress
-
-    with progress("searching", points * len(set(shifts)), quiet=job.quiet) as step:
-        known = options.with_disturbances
-        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, progress=step)
 
 
 def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.page.moving import Moving
+if TYPE_CHECKING:
+    from nutdamp.page.scales import Panel, Strip
+    from nutdamp.spacecraft.model import Vector
 
 
 class Column(NamedTuple):
@@ -98,6 +100,49 @@ class Listing:
 
     title: str
     text: str
+
+
+class Circle(NamedTuple):
+    """A circle of ``radius`` rad on the globe; ``kind`` styles it."""
+
+    name: str
+    radius: float
+    kind: str
+
+
+class Named(NamedTuple):
+    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
+
+    ``watched``: the angle from it to the spin axis is shown.
+    """
+
+    name: str
+    axis: Vector
+    kind: str
+    circles: tuple[Circle, ...] = ()
+    watched: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """What does not move in the view, and what moves as the JSON ``data``.
+
+    ``longitude``: what the numbers of the globe are; ``how``: the model that is flown; ``command``: what writes the
+    same rows.
+    """
+
+    panels: tuple[Panel, ...]
+    strip: Strip
+    speeds: tuple[tuple[float, str], ...]
+    speed: float
+    angles: tuple[str, str]
+    named: tuple[Named, ...]
+    dated: bool
+    longitude: str
+    steep: bool
+    how: str
+    command: tuple[str, ...]
+    data: str
 
 
 Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp.errors import BadRequest, MissingExtra
 from nutdamp.figures.style import require
-from nutdamp.page.document import Block, Page
-from nutdamp.page.moving import Moving
+from nutdamp.page.document import Block, Moving, Page
 from nutdamp.views.text import MISSING
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from nutdamp.figures import geometry
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
-from nutdamp.page.scales import LEAD, Panel, Strip, panel, placed, strip_of
+from nutdamp.page.document import Circle, Moving, Named
+from nutdamp.page.scales import LEAD, Panel, panel, placed, strip_of
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -48,49 +48,6 @@ NONE = -(10**8)
 
 QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
 """Seconds that playing takes at the quickest, at first, and at the slowest."""
-
-
-class Circle(NamedTuple):
-    """A circle of ``radius`` rad on the globe; ``kind`` styles it."""
-
-    name: str
-    radius: float
-    kind: str
-
-
-class Named(NamedTuple):
-    """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
-
-    ``watched``: the angle from it to the spin axis is shown.
-    """
-
-    name: str
-    axis: Vector
-    kind: str
-    circles: tuple[Circle, ...] = ()
-    watched: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Moving:
-    """What does not move in the view, and what moves as the JSON ``data``.
-
-    ``longitude``: what the numbers of the globe are; ``how``: the model that is flown; ``command``: what writes the
-    same rows.
-    """
-
-    panels: tuple[Panel, ...]
-    strip: Strip
-    speeds: tuple[tuple[float, str], ...]
-    speed: float
-    angles: tuple[str, str]
-    named: tuple[Named, ...]
-    dated: bool
-    longitude: str
-    steep: bool
-    how: str
-    command: tuple[str, ...]
-    data: str
 
 
 def moving_of(plan: Plan) -> Moving:

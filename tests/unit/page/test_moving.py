@@ -26,9 +26,9 @@ from support.shown import WIDE, compared_text, tree
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.page import moving
-from nutdamp.page.document import Section
+from nutdamp.page.document import Circle, Moving, Named, Section
 from nutdamp.page.html import page_html
-from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, Circle, Moving, Named, moving_of
+from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, moving_of
 from nutdamp.page.scales import EDGES, LEAD, strip_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
