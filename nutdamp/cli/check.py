@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
 from nutdamp.cli.job import (
     DEFAULT_FILE,
-    Input,
+    FileInput,
     Job,
     begin,
     deliver,
@@ -60,13 +60,13 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
 
-    silent = expect_outputs(*(Input(file) for file in files or (None,)), json=json)
+    silent = expect_outputs(*(FileInput(file) for file in files or (None,)), json=json)
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
     for name in files or (None,):
         doubts: list[Fault] = []
         try:
-            report, screen = _looked_into(Input(name, settings), remarks(quiet), doubts)
+            report, screen = _looked_into(FileInput(name, settings), remarks(quiet), doubts)
         except (FaultyFile, CannotRead) as wrong:
             from nutdamp.views.check_json import failed_json
 
@@ -92,7 +92,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
 
 
 def _looked_into(
-    given: Input, remark: Callable[[str], None], doubts: list[Fault]
+    given: FileInput, remark: Callable[[str], None], doubts: list[Fault]
 ) -> tuple[dict[str, Any], RenderableType]:
     """What follows from a file, for JSON and for the screen; warnings are added to ``doubts``.
 
@@ -117,8 +117,8 @@ def _looked_into(
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
 @quiet_option
 def verify_command(
-    spacecraft: Input,
-    flown: Flown,
+    spacecraft: FileInput,
+    flown: FlownChoice,
     options: Options,
     aim: Aim,
     looped: bool,

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
 from nutdamp.cli.job import (
-    Input,
+    FileInput,
     Job,
     Output,
     begin,
@@ -143,8 +143,8 @@ FIGURES = ("overview", "cases", "momentum", "budget")
 @plot_options(FIGURES)
 @quiet_option
 def command(
-    spacecraft: Input,
-    flown: Flown,
+    spacecraft: FileInput,
+    flown: FlownChoice,
     options: Options,
     aim: Aim,
     samples: int,
@@ -210,14 +210,14 @@ def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
     return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
 
 
-def _expect_loop(flown: Flown, others: Mapping[str, object]) -> None:
+def _expect_loop(flown: FlownChoice, others: Mapping[str, object]) -> None:
     """A usage error for options that do not go with ``--loop``."""
     for name, value in {**flown._asdict(), **others}.items():
         if value:
             raise click.UsageError(f"--loop flies the loop of the file, all in one way: leave --{name} out")
 
 
-class Run(NamedTuple):
+class StudyRun(NamedTuple):
     """A study after its run: the results, the files that could not be saved, and the signal that ended it, if any."""
 
     results: Results
@@ -225,7 +225,7 @@ class Run(NamedTuple):
     stopped_by: int | None
 
 
-def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet: bool) -> Run:
+def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet: bool) -> StudyRun:
     """Fly the cases, with a bar, until they are done or somebody interrupts; where that is before the first, raise."""
     from nutdamp.cli.job import progress, stoppable
     from nutdamp.errors import CannotWrite
@@ -246,7 +246,7 @@ def fly(study: Study, samples: int, threads: int | None, csv: str | None, quiet:
             if results.done < samples and not stopped():
                 raise  # it never began
             unsaved.append(wrong)
-    return Run(results, tuple(unsaved), stopped.number)
+    return StudyRun(results, tuple(unsaved), stopped.number)
 
 
 def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Collect | None], None]) -> None:

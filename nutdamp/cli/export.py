@@ -11,10 +11,10 @@ import shlex
 
 import click
 
-from nutdamp.cli.flown import Flown, flown_options, plan_or_read
-from nutdamp.cli.job import Input, begin, deliver, expect_outputs, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
+from nutdamp.cli.job import FileInput, begin, deliver, expect_outputs, quiet_option, remarks, spacecraft_argument
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, Aim, EndTime, Named, PlanningCommand, goal_options
+from nutdamp.cli.options import FILE, Aim, EndTime, NameType, PlanningCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.errors import printable
 from nutdamp.schemes.catalogue import Options
@@ -26,7 +26,7 @@ from nutdamp.views.exchange import FORMATS, MESSAGES, export_text, lacking
 @click.option(
     "--format",
     "form",
-    type=Named(FORMATS),
+    type=NameType(FORMATS),
     help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS) as quaternions, aem-spin: as spin, "
     "nutation and momentum; opm: velocity change of each pulse (CCSDS); stk: attitude history as .a; spin-table: CSV, "
     "one row a spin; basilisk: a script that flies the schedule; json: as `plan --json`.",
@@ -44,10 +44,10 @@ from nutdamp.views.exchange import FORMATS, MESSAGES, export_text, lacking
 @click.pass_context
 def command(
     ctx: click.Context,
-    spacecraft: Input,
+    spacecraft: FileInput,
     form: str | None,
     xml: bool,
-    flown: Flown,
+    flown: FlownChoice,
     options: Options,
     aim: Aim,
     until: float | None,
@@ -76,7 +76,7 @@ def command(
         leave(missed=True)
 
 
-def _format(form: str | None, spacecraft: Input, more: list[str]) -> str:
+def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
     """The format named; a usage error that shows how to name it, also where it was given as if it were a file."""
     words = [word for word in (spacecraft.path, *more) if word is not None]
     meant = next((word.lower() for word in words if word.lower() in FORMATS), None)

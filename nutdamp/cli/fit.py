@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.job import Input, Output, begin, quiet_option, spacecraft_argument, working
-from nutdamp.cli.options import FILE, Quantity
+from nutdamp.cli.job import FileInput, Output, begin, quiet_option, spacecraft_argument, working
+from nutdamp.cli.options import FILE, UnitType
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @spacecraft_argument
 @click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
 @click.option("--sun-pulses", type=FILE, help="Times of Sun pulses: a CSV file with a column t_s or utc.")
-@click.option("--at", type=Quantity("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
+@click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
 @click.option("-o", "--output", type=FILE, help="Write the spacecraft file with the estimates in it.")
 @click.option("--json", type=FILE, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=FILE, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @quiet_option
 def command(
     telemetry: str,
-    spacecraft: Input,
+    spacecraft: FileInput,
     schedule: str | None,
     sun_pulses: str | None,
     at: float,

@@ -26,7 +26,7 @@ JITTER_SEED = 1
 """Of the errors of the Sun pulses from which blocks are fired: the same in every run."""
 
 
-class Flown(NamedTuple):
+class FlownChoice(NamedTuple):
     """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, those that the command blocks
     of a file fire, else the recommended plan.
     """
@@ -42,7 +42,7 @@ class Flown(NamedTuple):
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme``, ``--schedule`` and ``--blocks``, gathered into ``flown`` (`Flown`) for `plan_or_read`.
+    """``--scheme``, ``--schedule`` and ``--blocks``, gathered into ``flown`` (`FlownChoice`) for `plan_or_read`.
 
     ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
     A usage error for two of them.
@@ -54,7 +54,7 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
         def gathered(
             *args: Any, scheme: str | None, schedule: str | None, blocks: str | None, **parameters: Any
         ) -> Any:
-            flown = Flown(scheme, schedule, blocks)
+            flown = FlownChoice(scheme, schedule, blocks)
             if flown.count(None) < 2:
                 raise click.UsageError(f"name what to {verb.lower()}: one of --scheme, --schedule and --blocks")
             return command(*args, flown=flown, **parameters)
@@ -101,7 +101,7 @@ def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, option
         return trade(job.spacecraft, points, shifts, least, with_disturbances=known, progress=step)
 
 
-def plan_or_read(job: Job, flown: Flown, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:
+def plan_or_read(job: Job, flown: FlownChoice, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:
     """What a command flies, as a plan; raises Infeasible where there is none.
 
     ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.

@@ -26,7 +26,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import click
 
-from nutdamp.cli.options import FILE, Named
+from nutdamp.cli.options import FILE, NameType
 from nutdamp.cli.screen import say, show
 from nutdamp.common.work import Watch, watched
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
@@ -74,7 +74,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
 
 
-class Input(NamedTuple):
+class FileInput(NamedTuple):
     """The spacecraft that a command line names: the ``path`` of a file, and what ``--set`` changes in it."""
 
     path: str | None
@@ -103,11 +103,11 @@ set_option = click.option(
 
 
 def spacecraft_argument(command: Command) -> Command:
-    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`Input`) for `job.begin`."""
+    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`FileInput`) for `job.begin`."""
 
     @functools.wraps(command)
     def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
-        given = Input(spacecraft, settings)
+        given = FileInput(spacecraft, settings)
         try:
             return command(*args, spacecraft=given, **parameters)
         except Unsuitable as wrong:
@@ -117,7 +117,7 @@ def spacecraft_argument(command: Command) -> Command:
     return cast(Command, argument(set_option(gathered)))
 
 
-def placed(wrong: Unsuitable, given: Input) -> NutdampError:
+def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
     """The error as a fault with the place of the value in the spacecraft file, where it comes from one."""
     if given.path == "-" or any(wrong.where[:1] == setting.path[:1] for setting in given.settings):
         return wrong
@@ -130,7 +130,9 @@ def placed(wrong: Unsuitable, given: Input) -> NutdampError:
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """``--plot FILE`` and which of the pictures ``names`` it is to be, the default first."""
-    which = click.option("--figure", type=Named(names), default=names[0], show_default=True, help="What --plot draws.")
+    which = click.option(
+        "--figure", type=NameType(names), default=names[0], show_default=True, help="What --plot draws."
+    )
     where = click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
     return lambda command: where(which(command))
 
@@ -200,7 +202,7 @@ def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable
     It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
     behind. Elsewhere one line says how far it is, after `LONG`.
     """
-    shown = _Bar(what, total) if sys.stderr.isatty() else _Line(what, total)
+    shown = _Bar(what, total) if sys.stderr.isatty() else _ProgressLine(what, total)
     try:
         yield (lambda _: None) if quiet else shown.update
     finally:
@@ -250,7 +252,7 @@ class _Doing:
         return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
 
 
-class _Line:
+class _ProgressLine:
     """What is shown where there is no terminal: one line, once, that names the share done and the time left."""
 
     def __init__(self, what: str, total: int) -> None:
@@ -309,7 +311,7 @@ class _Bar:
             self.bar.stop()
 
 
-class Stop:
+class Interruption:
     """Whether a run was requested to stop, and by which signal."""
 
     number: int | None = None
@@ -320,12 +322,12 @@ class Stop:
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
+def stoppable() -> Iterator[Interruption]:
     """Tells whether the run was requested to stop, by Ctrl-C or SIGTERM, so that it can end in order.
 
     A second Ctrl-C interrupts at once.
     """
-    stop = Stop()
+    stop = Interruption()
 
     def ask(number: int, _: FrameType | None) -> None:
         if stop() and number == signal.SIGINT:
@@ -344,7 +346,7 @@ STANDARD = "-"
 """File name that means standard input or standard output."""
 
 
-def expect_outputs(*read: Input | str | None, **written: str | Sequence[str] | None) -> bool:
+def expect_outputs(*read: FileInput | str | None, **written: str | Sequence[str] | None) -> bool:
     """Whether an output file is standard output, so that nothing else may go there.
 
     A usage error where an output, given by its option, is one of the files ``read`` or another output, under whatever
@@ -373,9 +375,9 @@ def expect_outputs(*read: Input | str | None, **written: str | Sequence[str] | N
     return bool(standard)
 
 
-def _path_of(given: Input | str | None) -> str | None:
+def _path_of(given: FileInput | str | None) -> str | None:
     """The file that is read, if any."""
-    if not isinstance(given, Input):
+    if not isinstance(given, FileInput):
         return given
     return DEFAULT_FILE if given.path is None and Path(DEFAULT_FILE).exists() else given.path
 
@@ -433,7 +435,7 @@ class Job(NamedTuple):
 
 
 def begin(
-    given: Input,
+    given: FileInput,
     *read: str | None,
     aim: Aim | None = None,
     quiet: bool = False,

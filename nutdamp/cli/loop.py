@@ -13,9 +13,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.job import Input, Output, begin, quiet_option, require_dispersions, require_loop, spacecraft_argument
+from nutdamp.cli.job import (
+    FileInput,
+    Output,
+    begin,
+    quiet_option,
+    require_dispersions,
+    require_loop,
+    spacecraft_argument,
+)
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, Angles, Count, Direction, EndTime, Quantity
+from nutdamp.cli.options import FILE, Angles, Count, Direction, EndTime, UnitType
 from nutdamp.cli.screen import say
 
 if TYPE_CHECKING:
@@ -41,7 +49,7 @@ if TYPE_CHECKING:
 @click.option("--plot", type=FILE, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
 @quiet_option
 def command(
-    spacecraft: Input,
+    spacecraft: FileInput,
     until: float | None,
     seed: int,
     case: int | None,
@@ -102,14 +110,14 @@ def _picture(plan: LoopPlan) -> Figure:
     metavar="START,STOP",
     help="Fire from START to STOP, such as 0.5deg,0.1deg; repeatable. Default: start and stop of loop.",
 )
-@click.option("--largest", type=Quantity("angle"), help="By which damping must begin; default: requirement.nutation.")
+@click.option("--largest", type=UnitType("angle"), help="By which damping must begin; default: requirement.nutation.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the noise of the sensor.")
 @click.option("--csv", type=FILE, help="Write a row for each two thresholds.")
 @click.option("--json", type=FILE, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
 @quiet_option
 def budget_command(
-    spacecraft: Input,
+    spacecraft: FileInput,
     thresholds: tuple[Angles, ...],
     largest: float | None,
     seed: int,

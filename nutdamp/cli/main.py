@@ -169,7 +169,7 @@ SHARED = {
 """Commands whose module is that of another one."""
 
 
-class Commands(click.Group):
+class CommandGroup(click.Group):
     """Subcommands live in modules of their name, or as `SHARED` has it, and load little of others."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
@@ -211,7 +211,7 @@ class Commands(click.Group):
 
 
 @click.command(
-    cls=Commands,
+    cls=CommandGroup,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=(
         "Exit status: 0 done; 1 could not read or write; 2 bad command line or bad file; 3 none of the "

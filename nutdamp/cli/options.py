@@ -44,7 +44,7 @@ else:
             return cls
 
 
-class Named(Choice[str]):
+class NameType(Choice[str]):
     """One of some names; for a misspelt one the error names the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
@@ -58,7 +58,7 @@ class Named(Choice[str]):
             self.fail(f"{wrong.message.rstrip('.')}; did you mean {close!r}?", param, ctx)
 
 
-class SchemeName(Named):
+class SchemeName(NameType):
     """The name of a scheme; there are more of them than a line of the help page holds."""
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
@@ -109,7 +109,7 @@ FILE = FileName()
 FOLDER = FolderName()
 
 
-class Quantity(ParamType[float]):
+class UnitType(ParamType[float]):
     """A number in SI or a text with a unit, as in a spacecraft file."""
 
     name = "quantity"
@@ -132,7 +132,7 @@ class Quantity(ParamType[float]):
         return self.kind.upper()
 
 
-class EndTime(Quantity):
+class EndTime(UnitType):
     """A time after t = 0."""
 
     def __init__(self) -> None:
@@ -146,7 +146,7 @@ class EndTime(Quantity):
         return time
 
 
-class FinalSpin(Quantity):
+class FinalSpin(UnitType):
     """A rate, or ``keep``."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -187,7 +187,7 @@ class Direction(ParamType[Angles]):
         parts = [part.strip() for part in str(value).split(",")]
         if len(parts) != 2:
             self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
-        first, second = (Quantity("angle").convert(part, param, ctx) for part in parts)
+        first, second = (UnitType("angle").convert(part, param, ctx) for part in parts)
         return Angles(first, second)
 
 
@@ -359,8 +359,8 @@ def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
 
 def _type(kind: Kind) -> click.ParamType[Any]:
     if kind.names:
-        return Named(kind.names)
-    return COUNT_FROM_ONE if kind.unit is None else Quantity(kind.unit)
+        return NameType(kind.names)
+    return COUNT_FROM_ONE if kind.unit is None else UnitType(kind.unit)
 
 
 class Aim(NamedTuple):

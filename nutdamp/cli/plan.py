@@ -11,7 +11,7 @@ import click
 from nutdamp.cli.flown import compared_with, robust_of
 from nutdamp.cli.job import (
     FIGURES,
-    Input,
+    FileInput,
     Output,
     begin,
     plot_options,
@@ -63,7 +63,7 @@ SCHEMES, PRIMER = "schemes", "primer"
 @plot_options((*FIGURES, SCHEMES, PRIMER))
 @quiet_option
 def command(
-    spacecraft: Input,
+    spacecraft: FileInput,
     names: tuple[str, ...],
     options: Options,
     aim: Aim,

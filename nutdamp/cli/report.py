@@ -10,8 +10,8 @@ from typing import Any
 
 import click
 
-from nutdamp.cli.flown import Flown, compared_with, fronts_of, plan_or_read, robust_of
-from nutdamp.cli.job import Input, begin, deliver, quiet_option, require_dispersions, spacecraft_argument, working
+from nutdamp.cli.flown import FlownChoice, compared_with, fronts_of, plan_or_read, robust_of
+from nutdamp.cli.job import FileInput, begin, deliver, quiet_option, require_dispersions, spacecraft_argument, working
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import FILE, SAMPLES, Aim, Count, Grouped, PlanningCommand, SchemeName, goal_options, is_number
 from nutdamp.cli.screen import show_failures
@@ -25,7 +25,7 @@ COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
 """Options that may come without a number, and what they then are."""
 
 
-class Report(PlanningCommand):
+class ReportCommand(PlanningCommand):
     """``report``, in which the options of `COUNTS` may come without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -59,7 +59,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-@click.command("report", cls=Report)
+@click.command("report", cls=ReportCommand)
 @spacecraft_argument
 @click.option("--scheme", "names", multiple=True, type=SchemeName(PLANNED), help="Compare this one only; repeatable.")
 @click.option("--schedule", type=FILE, help="Report the pulses of a CSV file, as `plan --csv` writes it.")
@@ -90,7 +90,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @control_options
 @quiet_option
 def command(
-    spacecraft: Input,
+    spacecraft: FileInput,
     names: tuple[str, ...],
     schedule: str | None,
     blocks: str | None,
@@ -112,7 +112,7 @@ def command(
     from nutdamp.page.html import expect_html
 
     expect_html(output)
-    flown = Flown(names[0] if names else None, schedule, blocks)
+    flown = FlownChoice(names[0] if names else None, schedule, blocks)
     if flown.count(None) < 2 or (flown.file is not None and robust):
         raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.flown import Flown, flown_options, plan_or_read
+from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
 from nutdamp.cli.job import (
     FIGURES,
-    Input,
+    FileInput,
     Output,
     begin,
     deliver,
@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 )
 @quiet_option
 def animate_command(
-    spacecraft: Input,
-    flown: Flown,
+    spacecraft: FileInput,
+    flown: FlownChoice,
     options: Options,
     aim: Aim,
     output: str,
@@ -115,8 +115,8 @@ PICTURED = 100_000
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @quiet_option
 def command(
-    spacecraft: Input,
-    flown: Flown,
+    spacecraft: FileInput,
+    flown: FlownChoice,
     options: Options,
     aim: Aim,
     real: bool,

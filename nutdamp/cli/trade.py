@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import fronts_of
-from nutdamp.cli.job import Input, Output, begin, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.job import FileInput, Output, begin, quiet_option, remarks, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
     FILE,
     FOLDER,
     Aim,
     Bare,
-    Named,
+    NameType,
     PlanningCommand,
-    Quantity,
+    UnitType,
     expect_read,
     goal_options,
     reading_of,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Front
 
 
-class Allowance(Quantity):
+class Allowance(UnitType):
     """An angle, or ``any``."""
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
@@ -55,7 +55,7 @@ class Allowance(Quantity):
 @click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
 @click.option(
     "--least",
-    type=Named(LEAST[:2]),
+    type=NameType(LEAST[:2]),
     default=LEAST[0],
     show_default=True,
     help="What is traded against time; impulse where propellant is unknown.",
@@ -67,7 +67,7 @@ class Allowance(Quantity):
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
 @quiet_option
 def command(
-    spacecraft: Input,
+    spacecraft: FileInput,
     allow: tuple[float, ...],
     points: int,
     least: str,

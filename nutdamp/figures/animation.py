@@ -200,7 +200,7 @@ class Scene:
         self.canvas.draw()  # type: ignore[no-untyped-call]
         self.still = self.canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
-    def cones(self, number: int) -> geometry.Cones:
+    def cones(self, number: int) -> geometry.DrawnCones:
         """The cones of frame ``number``, from 0."""
         return geometry.cones(self.flight, self.rates[number], self.quaternions[number])
 

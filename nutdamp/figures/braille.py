@@ -30,7 +30,7 @@ MOST_DOTS = 200_000
 
 
 @dataclass
-class Panel:
+class BraillePanel:
     """A square panel with equal scales: ``columns`` characters of dots, ``half`` the width of the data from ``middle``.
 
     Curves lie over each other in the order they are drawn; marks lie over all curves.
@@ -124,23 +124,23 @@ def ticks(low: float, high: float, most: int) -> list[float]:
     return [count * step + 0.0 for count in range(first, last + 1)]
 
 
-def fitted(width: int, middle: Vector, half: float) -> Panel:
+def fitted(width: int, middle: Vector, half: float) -> BraillePanel:
     """The panel that with its frame and its numbers is ``width`` characters wide."""
     for margin in range(1, width):
-        panel = Panel(width - margin - FRAME, middle, half)
+        panel = BraillePanel(width - margin - FRAME, middle, half)
         if margin >= max(len(text) for text in _upright(panel).values()):
             return panel
     raise ValueError(f"no room for a panel in {width} characters")
 
 
-def _upright(panel: Panel) -> dict[int, str]:
+def _upright(panel: BraillePanel) -> dict[int, str]:
     """Numbers of the upright scale by the line they are on."""
     low, high = float(panel.middle[1]) - panel.half, float(panel.middle[1]) + panel.half
     left = float(panel.middle[0]) - panel.half
     return {panel.cell(left, value)[0]: f"{value:.4g}" for value in ticks(low, high, max(panel.rows // 3, 2))}
 
 
-def framed(panel: Panel, title: str, x: str, y: str) -> list[Text]:
+def framed(panel: BraillePanel, title: str, x: str, y: str) -> list[Text]:
     """The panel with its title, its two scales and what they measure; all lines equally wide."""
     (left, low), (right, _) = panel.middle - panel.half, panel.middle + panel.half
     upright = _upright(panel)

@@ -78,7 +78,7 @@ def channels_fired(flight: Flight) -> list[str]:
     return sorted(used, key=lambda name: order.index(name) if name in order else -1)
 
 
-class Stretch(NamedTuple):
+class TrackPiece(NamedTuple):
     """Rows ``first`` to ``last`` of a track, both included; ``pulse`` is the number of the one that fires, from 0."""
 
     first: int
@@ -86,7 +86,7 @@ class Stretch(NamedTuple):
     pulse: int | None
 
 
-def stretches(flight: Flight, track: Track) -> Iterator[Stretch]:
+def stretches(flight: Flight, track: Track) -> Iterator[TrackPiece]:
     """The track cut where pulses begin and end, in order; an impulse is a stretch of two rows."""
     now, last = 0, len(track.t) - 1
     for number, (begins, ends) in enumerate(flight.spans):
@@ -95,14 +95,14 @@ def stretches(flight: Flight, track: Track) -> Iterator[Stretch]:
         first = max(now, int(np.searchsorted(track.t, begins, side="left")))
         until = max(first, min(last, int(np.searchsorted(track.t, ends, side="right")) - 1))
         if first > now:
-            yield Stretch(now, first, None)
-        yield Stretch(first, until, number)
+            yield TrackPiece(now, first, None)
+        yield TrackPiece(first, until, number)
         now = until
     if now < last:
-        yield Stretch(now, last, None)
+        yield TrackPiece(now, last, None)
 
 
-class Block(NamedTuple):
+class FiredBlock(NamedTuple):
     """Pulses ``first`` to ``last``, numbered from 1, from ``begins`` to ``ends`` s; ``on`` s of it something fires."""
 
     first: int
@@ -120,7 +120,7 @@ class Block(NamedTuple):
         return f"{self.first}{'–' if self.many == self.last - self.first + 1 else ' … '}{self.last}"
 
 
-def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Block]:
+def blocks(flight: Flight, until: float, channel: str | None = None) -> list[FiredBlock]:
     """The firings of a channel, or of all, up to ``until`` s; those that could not be distinguished are one.
 
     These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
@@ -137,7 +137,7 @@ def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Blo
     for group in groups:
         for part in [group] if len(group) >= MANY else [[one] for one in group]:
             ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
-            found.append(Block(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+            found.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
     return found
 
 
@@ -244,7 +244,7 @@ def hull(points: Vector) -> Vector:
     return np.array(sides)
 
 
-class Cones(NamedTuple):
+class DrawnCones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
     ``axis`` spin axis, ``momentum`` direction of H, ``rotation`` of ω, (3,); ``body`` and ``space`` (n, 3) are the
@@ -260,7 +260,7 @@ class Cones(NamedTuple):
     swept: Vector
 
 
-def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
+def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion (4,).
 
     Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4).
@@ -273,19 +273,19 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> Cones:
     rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
     if moments[0] == moments[1]:
         space = around(direction, rotation)
-        return Cones(axis, direction, rotation, around(axis, rotation), space, space)
+        return DrawnCones(axis, direction, rotation, around(axis, rotation), space, space)
     period = triaxial.nutation_period(flight.moments, rates)
     if not math.isfinite(period):
-        return Cones(axis, direction, rotation, *np.empty((3, 0, 3)))
+        return DrawnCones(axis, direction, rotation, *np.empty((3, 0, 3)))
     times = np.linspace(0.0, period, 4 * RIM)
     polhode = triaxial.free_rates(flight.moments, rates, times)
     turns = triaxial.free_attitude(flight.moments, rates, quaternion, times)
     size = np.linalg.norm(polhode, axis=1, keepdims=True)
     body, space = attitude.rotate(quaternion, polhode / size), attitude.rotate(turns, polhode / size)
-    return Cones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
+    return DrawnCones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
 
 
-def body_mark(found: Cones, quaternion: Vector) -> Vector:
+def body_mark(found: DrawnCones, quaternion: Vector) -> Vector:
     """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
     if not len(found.body):
         return np.full(3, np.nan)

@@ -174,7 +174,7 @@ def firings(axes: Axes, flight: Flight, until: float, *, brief: bool = False) ->
         axes.text(0.5, 0.5, "no pulses", transform=axes.transAxes, ha="center", va="center")
 
 
-def _bar(axes: Axes, flight: Flight, block: geometry.Block, row: int, *, brief: bool) -> None:
+def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int, *, brief: bool) -> None:
     """The bar of a firing, or of several that cannot be distinguished: paler where they do not fill it."""
     size = block.ends - block.begins
     dense = block.many == 1 or block.on > FULL * size

@@ -50,7 +50,7 @@ class Floor(NamedTuple):
     scheme: str
 
 
-class Quantity(NamedTuple):
+class BarQuantity(NamedTuple):
     """A column: its name, the value of a plan (None: unknown), what is written beside the dot, and the lines.
 
     ``required``: the bound of the requirement. ``log``: an angle in degrees on a log axis. ``most``: no value is more.
@@ -65,7 +65,7 @@ class Quantity(NamedTuple):
     most: float = math.inf
 
 
-class Rows(NamedTuple):
+class SchemeRows(NamedTuple):
     """The plans from above, the ``chosen`` one of them, and what is said of those that fall short, by scheme."""
 
     plans: Sequence[Plan]
@@ -87,7 +87,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
     cells = list(figure.subplots(2, abreast).flat)
     for index, (axes, column) in enumerate(zip(cells, columns, strict=False)):
-        rows = Rows(plans, chosen, short)
+        rows = SchemeRows(plans, chosen, short)
         _column(axes, column, rows)
         # Why a scheme falls short is said at the left alone: beside every panel it would leave them no room.
         _name_rows(axes, rows, why=index % abreast == 0)
@@ -120,7 +120,7 @@ def _short(plan: Plan, compared: Comparison) -> str:
     return "" if compared.meets(plan) in (None, True) else "NOT met: too few cases comply"
 
 
-def _columns(compared: Comparison) -> list[Quantity]:
+def _columns(compared: Comparison) -> list[BarQuantity]:
     plans = [plan for plan in compared.plans if plan.feasible]
     body, propellant = compared.spacecraft, by_propellant(plans)
     unit = "kg" if propellant else "N m s"
@@ -144,14 +144,14 @@ def _columns(compared: Comparison) -> list[Quantity]:
 
     return [
         *(
-            Quantity(f"{part.label}, deg", left(part), _angle, required=most.get(part), log=True)
+            BarQuantity(f"{part.label}, deg", left(part), _angle, required=most.get(part), log=True)
             for part in (Part.NUTATION, aim)
         ),
-        Quantity(
+        BarQuantity(
             ("propellant, g" if light else "propellant, kg") if propellant else "impulse, N m s", cost, _figures,
             floor=min(proved, default=None),
         ),
-        Quantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
+        BarQuantity("end, s", lambda plan: plan.pulses.end, "{:.3f}".format),
     ]  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def _angle(value: float) -> str:
     return in_degrees(math.radians(value))
 
 
-def _complying(shares: Mapping[str, float], probability: float) -> Quantity:
+def _complying(shares: Mapping[str, float], probability: float) -> BarQuantity:
     def share(plan: Plan) -> float | None:
         found = shares.get(plan.scheme)
         return None if found is None else 100.0 * found
@@ -171,10 +171,10 @@ def _complying(shares: Mapping[str, float], probability: float) -> Quantity:
     def text(value: float) -> str:
         return percent(value / 100.0, probability).removesuffix(" %")
 
-    return Quantity("complying cases, %", share, text, required=100.0 * probability, most=100.0)
+    return BarQuantity("complying cases, %", share, text, required=100.0 * probability, most=100.0)
 
 
-def _column(axes: Axes, column: Quantity, rows: Rows) -> None:
+def _column(axes: Axes, column: BarQuantity, rows: SchemeRows) -> None:
     values = [column.value(plan) if plan.feasible else None for plan in rows.plans]
     known = [value for value in values if value is not None]
     floor = None if column.floor is None else column.floor.least
@@ -209,7 +209,7 @@ def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) ->
         axes.plot([], [], "<", color=GREY, markersize=6, linestyle="", label="less than the axis shows")
 
 
-def _name_rows(axes: Axes, rows: Rows, *, why: bool) -> None:
+def _name_rows(axes: Axes, rows: SchemeRows, *, why: bool) -> None:
     """Schemes beside their rows; those that fall short have another colour, and say ``why``."""
     names = []
     for plan in rows.plans:
@@ -223,7 +223,7 @@ def _name_rows(axes: Axes, rows: Rows, *, why: bool) -> None:
         tick.set(fontweight="bold" if plan is rows.chosen else "normal", color=colour, fontsize=style.SMALL)
 
 
-def _scale(axes: Axes, values: list[float], column: Quantity) -> float:
+def _scale(axes: Axes, values: list[float], column: BarQuantity) -> float:
     """Scale and limits of a column; returns its least value, below which a dot is drawn at the edge."""
     from matplotlib.ticker import LogLocator
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nutdamp.figures import geometry, labels, style
-from nutdamp.figures.geometry import Cones
+from nutdamp.figures.geometry import DrawnCones
 from nutdamp.figures.legends import legend
 from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
 from nutdamp.flight.propagation import Flight
@@ -142,7 +142,7 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
     return pulses
 
 
-def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
+def draw_cones(axes: Axes, looked: View, found: DrawnCones) -> None:
     """Space cone, body cone, and the three directions that lie in one plane."""
     for rim, within, colour, alpha in _rims(found):
         if len(rim):
@@ -153,7 +153,7 @@ def draw_cones(axes: Axes, looked: View, found: Cones) -> None:
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
 
-def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
+def name_lines(axes: Axes, found: DrawnCones, *, pulses: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(found.body):
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
@@ -164,7 +164,7 @@ def name_lines(axes: Axes, found: Cones, *, pulses: bool) -> None:
     axes.plot([], [], label="path of H", **style.PATH_OF_H)
 
 
-def _hidden(found: Cones) -> str:
+def _hidden(found: DrawnCones) -> str:
     """What the legend adds where the body cone is so small that the marks of the axes in it hide it."""
     body, space = (float(np.arccos(np.clip(found.rotation @ one, -1.0, 1.0))) for one in (found.axis, found.momentum))
     return f" ({degrees(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
@@ -177,7 +177,7 @@ def name_directions(axes: Axes) -> None:
         axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
 
 
-def _directions(found: Cones) -> tuple[tuple[Vector, str, str], ...]:
+def _directions(found: DrawnCones) -> tuple[tuple[Vector, str, str], ...]:
     return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
 
 
@@ -186,7 +186,7 @@ def aimed(flight: Flight) -> Vector:
     return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
 
 
-def _name_tips(axes: Axes, found: Cones, place: Callable[[Vector], Vector]) -> None:
+def _name_tips(axes: Axes, found: DrawnCones, place: Callable[[Vector], Vector]) -> None:
     """The names of the three directions at the tips of their arrows, each in the colour of its own."""
     named = _directions(found)
     tips = np.array([place(direction) for direction, _, _ in named])
@@ -195,7 +195,7 @@ def _name_tips(axes: Axes, found: Cones, place: Callable[[Vector], Vector]) -> N
         labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
 
 
-def _rims(found: Cones) -> tuple[tuple[Vector, Vector, str, float], ...]:
+def _rims(found: DrawnCones) -> tuple[tuple[Vector, Vector, str, float], ...]:
     """Rim, circle about it, colour and density of the cones."""
     return (found.space, found.swept, MOMENTUM, SPACE), (found.body, found.body, MOTION, BODY)
 
@@ -242,7 +242,7 @@ def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H, true angles\n{sky.view}")
 
 
-def draw_circles(axes: Axes, plane: Vector, found: Cones) -> None:
+def draw_circles(axes: Axes, plane: Vector, found: DrawnCones) -> None:
     """Rims of the cones with their axes and where they touch, on the sky."""
     for rim, within, colour, alpha in _rims(found):
         if len(rim):

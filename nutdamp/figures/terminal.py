@@ -10,7 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from nutdamp.figures import geometry
-from nutdamp.figures.braille import FAINT, Panel, fitted, framed
+from nutdamp.figures.braille import FAINT, BraillePanel, fitted, framed
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft.model import Vector
@@ -75,7 +75,7 @@ class Drawing:
         sky = geometry.sky_names(self.flight)
         return framed(panel, "Axis track, H towards you", sky.x, sky.y)
 
-    def _path(self, panel: Panel, points: Vector) -> None:
+    def _path(self, panel: BraillePanel, points: Vector) -> None:
         span = np.linspace(-panel.half, panel.half, panel.columns)
         panel.scatter(np.column_stack([panel.middle[0] + span, np.zeros(panel.columns)]), FAINT)
         panel.scatter(np.column_stack([np.zeros(panel.columns), panel.middle[1] + span]), FAINT)

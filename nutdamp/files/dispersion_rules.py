@@ -27,7 +27,9 @@ EACH_PULSE = ("thrust_per_pulse", "timing")
 """Tolerances that each pulse draws anew."""
 
 
-def correlation_findings(facts: Facts, entries: Iterable[Entry], thrusters: Iterable[str]) -> Iterator[Finding]:
+def correlation_findings(
+    facts: Facts, entries: Iterable[ToleranceEntry], thrusters: Iterable[str]
+) -> Iterator[Finding]:
     """Pairs of what is not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
 
     ``entries`` are the tolerances of the file, ``thrusters`` the names that may have some of their own.
@@ -73,7 +75,7 @@ def _unknown(name: str, drawn: dict[str, bool]) -> str:
     return f"the dispersions have no input called {shown(name)}; {known}"
 
 
-def _drawn(facts: Facts, entries: Iterable[Entry], thrusters: list[str]) -> dict[str, bool]:
+def _drawn(facts: Facts, entries: Iterable[ToleranceEntry], thrusters: list[str]) -> dict[str, bool]:
     """Names of all inputs that any schedule could draw once, as `montecarlo.inputs` has them, and whether they vary."""
     found = {}
     for entry in entries:
@@ -115,7 +117,7 @@ LARGEST_OFFSET = 1.0
 sign. Of an angle the nominal value is 90 deg."""
 
 
-class Entry(NamedTuple):
+class ToleranceEntry(NamedTuple):
     """One tolerance: where it is, what kind of quantity it holds, the least nominal value and what that is."""
 
     path: KeyPath
@@ -215,7 +217,7 @@ def _probability(facts: Facts) -> Iterator[Finding]:
         yield Finding(("requirement", "probability"), problem, True)
 
 
-def _entries(facts: Facts) -> Iterator[Entry]:
+def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
     """All tolerances in the file."""
     forces = thrusts(facts)
     for key, kind in QUANTITIES.items():
@@ -225,17 +227,17 @@ def _entries(facts: Facts) -> Iterator[Entry]:
             continue
         if key == "omega0" and isinstance(node.value, list):
             for index, _ in node.children():
-                yield Entry((*path, index), kind, _spin(facts) if index == 2 else None, "the spin")
+                yield ToleranceEntry((*path, index), kind, _spin(facts) if index == 2 else None, "the spin")
         elif key in BY_THRUSTER and isinstance(node.value, dict) and by_name(node.value):
             for name, _ in node.children():
                 nominal = forces.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
-                yield Entry((*path, name), kind, nominal, f"the thrust of {name}" if kind == "force" else "")
+                yield ToleranceEntry((*path, name), kind, nominal, f"the thrust of {name}" if kind == "force" else "")
         elif key == "thrust":
             known = [(thrust, name) for name, thrust in forces.items() if thrust is not None]
             least = min(known, default=(None, ""))
-            yield Entry(path, kind, least[0], f"the thrust of {least[1]}")
+            yield ToleranceEntry(path, kind, least[0], f"the thrust of {least[1]}")
         else:
-            yield Entry(path, kind, *_nominal(facts, key))
+            yield ToleranceEntry(path, kind, *_nominal(facts, key))
 
 
 def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
@@ -274,7 +276,7 @@ def _thruster_names(facts: Facts) -> Iterator[Finding]:
                     yield Finding((*path, name), f"no thruster is called {shown(name)}; {instead(name, known)}", True)
 
 
-def _kinds(facts: Facts, entry: Entry) -> Iterator[Finding]:
+def _kinds(facts: Facts, entry: ToleranceEntry) -> Iterator[Finding]:
     """What is wrong with the kinds and the size of one tolerance."""
     node = facts.root.get(*entry.path)
     if node is None or not isinstance(node.value, dict):
@@ -305,7 +307,7 @@ def _example(kind: str) -> str:
     return f"{{normal: {sizes.get(kind, '5 mm' if kind == 'length' else '5 ms')}}}, or uniform, triangular, bias"
 
 
-def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | None:
+def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) -> str | None:
     """What makes the size of a tolerance impossible."""
     if value is None:
         return None  # said already
@@ -332,7 +334,7 @@ def _size_fault(facts: Facts, entry: Entry, key: str, value: object) -> str | No
     return f"{shown(value)} {amounts}; expected {what} {most}"
 
 
-def _without_thrust(facts: Facts, entry: Entry) -> str | None:
+def _without_thrust(facts: Facts, entry: ToleranceEntry) -> str | None:
     """A thruster that an absolute tolerance concerns and whose thrust is not known."""
     named = entry.path[2:]
     for name, thrust in thrusts(facts).items():

@@ -36,7 +36,7 @@ from nutdamp.spacecraft.tolerances import Tolerance
 from nutdamp.units import parse
 
 
-class Change(NamedTuple):
+class TextChange(NamedTuple):
     """What is written over ``start`` to ``end`` of a text."""
 
     start: int
@@ -55,7 +55,7 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
     for old, new in (renamed or {}).items():
         key, _ = _find(_root(text), (old,))
         if key is not None:
-            text = _applied(text, [Change(key.start_mark.index, key.end_mark.index, new)])
+            text = _applied(text, [TextChange(key.start_mark.index, key.end_mark.index, new)])
     return text
 
 
@@ -75,7 +75,7 @@ def _with(text: str, path: KeyPath, value: str) -> str:
         if node is None:
             continue
         if length == len(path):
-            return _applied(text, [Change(node.start_mark.index, _end(node), value)])
+            return _applied(text, [TextChange(node.start_mark.index, _end(node), value)])
         return _added(text, node, path[length:], value)
     return _added(text, root, path, value)
 
@@ -91,12 +91,12 @@ def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
         last = _end(parent) - 1
         comma = "" if not parent.value or text[:last].rstrip().endswith(",") else ", "
         at = len(text[:last].rstrip()) if comma else last
-        return _applied(text, [Change(at, at, comma + entry)])
+        return _applied(text, [TextChange(at, at, comma + entry)])
     end = _end(parent)
     line_end = text.find("\n", end)
     at = len(text) if line_end < 0 else line_end
     indent = " " * parent.value[0][0].start_mark.column
-    return _applied(text, [Change(at, at, f"\n{indent}{entry}")])
+    return _applied(text, [TextChange(at, at, f"\n{indent}{entry}")])
 
 
 def _root(text: str) -> yaml.MappingNode:
@@ -134,7 +134,7 @@ def _key(step: str | int) -> str:
     return word if re.fullmatch(r"[A-Za-z_][\w+-]*|[+-][A-Za-z]\w*", word) else "'" + word.replace("'", "''") + "'"
 
 
-def _applied(text: str, changes: Iterable[Change]) -> str:
+def _applied(text: str, changes: Iterable[TextChange]) -> str:
     for change in sorted(changes, reverse=True):
         text = text[: change.start] + change.text + text[change.end :]
     return text

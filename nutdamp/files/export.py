@@ -230,7 +230,7 @@ class Reference(NamedTuple):
     frame: str
 
 
-class Stretch(NamedTuple):
+class AttitudeSegment(NamedTuple):
     """Motion without jumps, in the axes of the file.
 
     ``t`` (n,) s, whole nanoseconds; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> frame, scalar first, without
@@ -263,7 +263,7 @@ def reference(spacecraft: Spacecraft) -> Reference:
         raise Unsuitable(("attitude", "epoch"), str(wrong)) from None
 
 
-def interpolated(flown: Flight, until: float) -> Iterator[Stretch]:
+def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
     """The motion from 0 to ``until`` s between the edges of pulses, close enough to be interpolated.
 
     Stretches too short to be distinguished in nanoseconds are left out. Raises BadRequest for a motion that would take
@@ -284,7 +284,7 @@ def interpolated(flown: Flight, until: float) -> Iterator[Stretch]:
         rates, quaternion = map(cleaned, flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t)))
         quaternion = _steady(quaternion, previous)
         previous = quaternion[-1]
-        yield Stretch(t, rates, quaternion, leg.completed)
+        yield AttitudeSegment(t, rates, quaternion, leg.completed)
 
 
 def _records(leg: Leg, until: float) -> int:

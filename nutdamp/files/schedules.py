@@ -323,7 +323,7 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
     table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
-    return _Reader(table, spacecraft).read()
+    return _ScheduleReader(table, spacecraft).read()
 
 
 def read_plan(
@@ -338,7 +338,7 @@ def read_plan(
     return made, (*warnings, *broken_limits(spacecraft, pulses))
 
 
-class _Reader:
+class _ScheduleReader:
     """Rows of one file into pulses, collecting faults, contradictions and warnings."""
 
     def __init__(self, table: Table, spacecraft: Spacecraft) -> None:

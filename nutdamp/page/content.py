@@ -20,13 +20,13 @@ from nutdamp.page.document import (
     UNCONTROLLED,
     Block,
     Control,
-    Facts,
+    FactList,
     Figure,
     Listing,
     Page,
+    PageSection,
     Prose,
     Remarks,
-    Section,
     blocks_of,
     sheet_of,
 )
@@ -73,8 +73,8 @@ def report_page(
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
     sections = [
-        Section("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
-        Section("method", "Method", tuple(method_blocks(compared))),
+        PageSection("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
+        PageSection("method", "Method", tuple(method_blocks(compared))),
         _schemes(compared, decided),
     ]
     if traded:
@@ -85,11 +85,11 @@ def report_page(
         sections.append(_schedule(chosen))
         dispersed = compared.results(chosen)
         sections.append(manoeuvre_section(chosen, dispersed))
-        sections.append(Section("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
+        sections.append(PageSection("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
         sections.append(_verification(chosen))
         if dispersed is not None:
             sections.append(_dispersion(chosen, dispersed))
-    sections.append(Section("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
+    sections.append(PageSection("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
     return Page(
         title=control.title or _title(body),
         control=control,
@@ -171,7 +171,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
     yield Figure("nutation at t = 0", degrees(body.tilt))
 
 
-def _schemes(compared: Comparison, decided: Decision | None) -> Section:
+def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     """The comparison, why a scheme is infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*said(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
@@ -180,7 +180,7 @@ def _schemes(compared: Comparison, decided: Decision | None) -> Section:
         blocks.append(Remarks(remarks))
     if decided is not None and len(compared) > 1:
         blocks.append(schemes_picture_of(compared, decided))
-    return Section("schemes", "Schemes compared", tuple(blocks))
+    return PageSection("schemes", "Schemes compared", tuple(blocks))
 
 
 def _broken(plan: Plan) -> list[str]:
@@ -208,7 +208,7 @@ COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
 """Pulses by the names of schemes."""
 
 
-def _trade(compared: Comparison, traded: Sequence[Front]) -> Section:
+def _trade(compared: Comparison, traded: Sequence[Front]) -> PageSection:
     """What an earlier end costs, as ``trade`` has it."""
     tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
     chosen = compared.recommended
@@ -216,23 +216,23 @@ def _trade(compared: Comparison, traded: Sequence[Front]) -> Section:
     tables += [Remarks((("Note", said),)) for said in notes]
     drawn = any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
     pictures = (trade_picture_of(compared, traded),) if drawn else ()
-    return Section("trade", "Time against cost", (*tables, *pictures))
+    return PageSection("trade", "Time against cost", (*tables, *pictures))
 
 
-def _schedule(chosen: Plan) -> Section:
+def _schedule(chosen: Plan) -> PageSection:
     title = f"Recommended schedule: {chosen.scheme}"
     ends = (ends_sheet(chosen.flight), ends_note(chosen.flight))
     if not len(chosen.pulses):
-        return Section("schedule", title, (Prose("No pulse is needed."), *ends))
+        return PageSection("schedule", title, (Prose("No pulse is needed."), *ends))
     note = Prose(
         "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
         "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse"
         f"{', the largest of the free motion then' * (not chosen.spacecraft.inertia.symmetric)}."
     )
-    return Section("schedule", title, (pulse_sheet(chosen), note, *ends))
+    return PageSection("schedule", title, (pulse_sheet(chosen), note, *ends))
 
 
-def _verification(chosen: Plan) -> Section:
+def _verification(chosen: Plan) -> PageSection:
     expected = chosen.options.with_disturbances
     verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
@@ -249,31 +249,31 @@ def _verification(chosen: Plan) -> Section:
         ),
         *[Prose(note) for note in (budget_note(verified, aimed=chosen.spacecraft.goal.axis is not None),) if note],
     ]
-    return Section("budget", "Verification and error budget", tuple(blocks))
+    return PageSection("budget", "Verification and error budget", tuple(blocks))
 
 
-def _dispersion(chosen: Plan, dispersed: Results) -> Section:
+def _dispersion(chosen: Plan, dispersed: Results) -> PageSection:
     from nutdamp.views.dispersion_tables import dispersion_screen
 
     blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
     if note := dispersed.study.lightening_error:
         blocks.append(Prose(f"Note: {note}."))
     blocks += dispersion_pictures_of(dispersed, chosen.scheme)
-    return Section("dispersion", "Dispersion", tuple(blocks))
+    return PageSection("dispersion", "Dispersion", tuple(blocks))
 
 
-def _repeat(repeat: Repeat, dispersed: Results | None) -> Section:
-    blocks: list[Block] = [Listing("Command", printable(repeat.command)), Facts("Versions", tuple(_versions()))]
+def _repeat(repeat: Repeat, dispersed: Results | None) -> PageSection:
+    blocks: list[Block] = [Listing("Command", printable(repeat.command)), FactList("Versions", tuple(_versions()))]
     facts = [] if dispersed is None else [("seed of the dispersed cases", str(dispersed.study.seed))]
     if repeat.text:
         facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
     if facts:
-        blocks.append(Facts("Input", tuple(facts)))
+        blocks.append(FactList("Input", tuple(facts)))
     if repeat.text:
         blocks.append(Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n")))
     if repeat.settings:
-        blocks.append(Facts("Set in place of what the file says", repeat.settings))
-    return Section("repeat", "To repeat it", tuple(blocks))
+        blocks.append(FactList("Set in place of what the file says", repeat.settings))
+    return PageSection("repeat", "To repeat it", tuple(blocks))
 
 
 def _versions() -> Iterator[tuple[str, str]]:

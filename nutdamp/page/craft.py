@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, Column, Facts, Prose, Sheet, facts_of, sheet_of
+from nutdamp.page.document import Block, Column, FactList, Prose, Sheet, facts_of, sheet_of
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Thruster
@@ -37,7 +37,7 @@ def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
 
 def spacecraft_facts(
     spacecraft: Spacecraft, title: str = "At t = 0, what is required of the end, and the limits of a plan"
-) -> Facts:
+) -> FactList:
     """The spacecraft at t = 0, its requirement, and the limits of its plans."""
     return facts_of(
         title, derived_table(spacecraft, (*_body(spacecraft), *_limits(spacecraft), *sun_pulse_facts(spacecraft)))

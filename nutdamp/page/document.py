@@ -40,7 +40,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class FactList:
     """Names and what they are."""
 
     title: str
@@ -110,7 +110,7 @@ class Circle(NamedTuple):
     kind: str
 
 
-class Named(NamedTuple):
+class NamedDirection(NamedTuple):
     """A direction on the globe, (3,) inertial unit vector, with circles around it; ``kind`` styles it.
 
     ``watched``: the angle from it to the spin axis is shown.
@@ -136,7 +136,7 @@ class Moving:
     speeds: tuple[tuple[float, str], ...]
     speed: float
     angles: tuple[str, str]
-    named: tuple[Named, ...]
+    named: tuple[NamedDirection, ...]
     dated: bool
     longitude: str
     steep: bool
@@ -145,10 +145,10 @@ class Moving:
     data: str
 
 
-Block = Sheet | Facts | Prose | Remarks | Points | Picture | Moving | Listing
+Block = Sheet | FactList | Prose | Remarks | Points | Picture | Moving | Listing
 
 
-class Section(NamedTuple):
+class PageSection(NamedTuple):
     """A heading with what comes under it; ``name`` is where links lead to."""
 
     name: str
@@ -198,7 +198,7 @@ class Page:
     good: bool
     decision: tuple[Block, ...]
     figures: tuple[Figure, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
     made_by: str
 
     @property
@@ -222,15 +222,15 @@ def sheet_of(title: str, table: Table) -> Sheet:
     return Sheet(title, headed, _rows(table), sortable=bool(first.name))
 
 
-def facts_of(title: str, table: Table) -> Facts:
-    """A screen's list of names and values as `Facts`; a row without a name continues the one before."""
+def facts_of(title: str, table: Table) -> FactList:
+    """A screen's list of names and values as `FactList`; a row without a name continues the one before."""
     rows: list[tuple[str, str]] = []
     for name, value in _rows(table):
         if name or not rows:
             rows.append((name, value))
         else:
             rows[-1] = (rows[-1][0], f"{rows[-1][1]}; {value}")
-    return Facts(title, tuple(rows))
+    return FactList(title, tuple(rows))
 
 
 def blocks_of(title: str, screen: Group) -> Iterator[Block]:

@@ -11,7 +11,7 @@ import numpy as np
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, Column, Facts, Prose, Section, Sheet, sheet_of
+from nutdamp.page.document import Block, Column, FactList, PageSection, Prose, Sheet, sheet_of
 from nutdamp.page.sheets import on_times
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
@@ -41,9 +41,9 @@ STILL = 1e-9
 """deg/s of transverse rate, below which it is rounding."""
 
 
-def manoeuvre_section(plan: Plan, dispersed: Results | None) -> Section:
+def manoeuvre_section(plan: Plan, dispersed: Results | None) -> PageSection:
     """The sheet of a plan; with its ``dispersed`` cases there are abort criteria."""
-    return Section("manoeuvre", f"Manoeuvre sheet: {plan.scheme}", tuple(_blocks(plan, dispersed)))
+    return PageSection("manoeuvre", f"Manoeuvre sheet: {plan.scheme}", tuple(_blocks(plan, dispersed)))
 
 
 def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
@@ -74,7 +74,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         yield from _criteria(flown, dispersed)
         return
     how = "report --disperse flies them" if body.dispersions is not None else "the file gives no dispersions"
-    yield Facts("Abort criteria", (("not known", f"they come from dispersed cases; {how}"),))
+    yield FactList("Abort criteria", (("not known", f"they come from dispersed cases; {how}"),))
 
 
 def _phases(plan: Plan) -> str:

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by, tolerated
 from nutdamp.flight.verification import AGREE, Verification
-from nutdamp.page.document import Block, Column, Facts, Listing, Points, Prose, Sheet
+from nutdamp.page.document import Block, Column, FactList, Listing, Points, Prose, Sheet
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part, left_of
 from nutdamp.views import guide
-from nutdamp.views.guide import Formula, Rows, Topic
+from nutdamp.views.guide import Formula, Topic, TopicRows
 from nutdamp.views.plan_tables import beyond_floors
 from nutdamp.views.text import MISSING, degrees, quantity
 
@@ -43,7 +43,7 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
         lines += _listed(scheme, _formulas(scheme)[0])
     yield Listing("Equations", "\n".join(lines))
     symbols = _symbols(topics, chosen, " ".join([*lines, "θ"]))
-    yield Facts("Symbols", (*symbols, *_floors(compared.spacecraft)))
+    yield FactList("Symbols", (*symbols, *_floors(compared.spacecraft)))
     yield Points(guide.SOURCES[:1])
 
 
@@ -62,7 +62,7 @@ def _symbols(topics: list[Topic], chosen: Plan | None, listed: str) -> Iterator[
     for topic in topics:
         for part in topic.parts:
             for block in part.blocks:
-                if isinstance(block, Rows):
+                if isinstance(block, TopicRows):
                     seen.update((symbol, text) for symbol, text in block.rows if symbol.removesuffix(")") in listed)
     yield from seen.items()
     if chosen is None or chosen.scheme not in guide.NAMES:

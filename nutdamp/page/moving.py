@@ -16,7 +16,7 @@ from nutdamp.figures import geometry
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
-from nutdamp.page.document import Circle, Moving, Named
+from nutdamp.page.document import Circle, Moving, NamedDirection
 from nutdamp.page.scales import LEAD, Panel, panel, placed, strip_of
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
@@ -58,20 +58,20 @@ def moving_of(plan: Plan) -> Moving:
     return moving(propagation.flown(body, pulses, until), until, plan.scheme, named_directions(body))
 
 
-def named_directions(body: Spacecraft) -> tuple[Named, ...]:
+def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     """What the globe shows besides the track: the target, the Sun, the cones that the spin axis keeps."""
     found = []
     if body.goal.axis is not None:
         shift = None if body.requirement is None else body.requirement.momentum_shift
         circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
-        found.append(Named("target", body.goal.axis, "target", circles))
+        found.append(NamedDirection("target", body.goal.axis, "target", circles))
     for keep in body.watched:
         bounds = []
         if keep.least > 0.0:
             bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))
         if keep.most < math.pi:
             bounds.append(Circle(f"axis at most {most(keep.most)} from {keep.name}", keep.most, "keep-in"))
-        found.append(Named(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
+        found.append(NamedDirection(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
     return tuple(found)
 
 
@@ -80,7 +80,7 @@ def samples_for(flown: Flight, until: float) -> int:
     return min(max(math.ceil(ROWS_A_TURN * until / geometry.quickest(flown)), LEAST_ROWS), MOST_ROWS) + 1
 
 
-def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()) -> Moving:
+def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirection] = ()) -> Moving:
     """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
     body, samples = flown.spacecraft, samples_for(flown, until)
     track = flown.sampled(samples, until)
@@ -129,7 +129,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[Named] = ()
 
 
 def _panels(
-    flown: Flight, track: Track, named: Sequence[Named]
+    flown: Flight, track: Track, named: Sequence[NamedDirection]
 ) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None]:
     """Pole curve and axis track, the columns of their paths, and the place of the target in the latter."""
     sky, momentum = geometry.sky_paths(flown, track)
@@ -157,7 +157,7 @@ def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[in
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
 
 
-def _mark(one: Named) -> dict[str, Any]:
+def _mark(one: NamedDirection) -> dict[str, Any]:
     """A direction as the script takes it."""
     return {
         "name": one.name,
@@ -167,7 +167,7 @@ def _mark(one: Named) -> dict[str, Any]:
     }
 
 
-def _target(flown: Flight, track: Track, named: Sequence[Named], paths: Vector) -> Vector:
+def _target(flown: Flight, track: Track, named: Sequence[NamedDirection], paths: Vector) -> Vector:
     """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
     found = geometry.sky_target(flown, track)
     reach = FAR * float(np.hypot(*paths.T).max())
@@ -234,7 +234,7 @@ def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
     return column, texts
 
 
-def _look(track: Track, named: Sequence[Named]) -> list[float]:
+def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
     """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
     for one in named[:1]:

@@ -9,7 +9,7 @@ from rich.constrain import Constrain
 from rich.padding import Padding
 from rich.text import Text
 
-from nutdamp.views.guide import SOURCES, SUMMARIES, Block, Commands, Formula, Rows, Topic
+from nutdamp.views.guide import SOURCES, SUMMARIES, Block, CommandHelp, Formula, Topic, TopicRows
 from nutdamp.views.layout import facts
 
 WIDEST = 100
@@ -57,9 +57,9 @@ def equations_screen() -> RenderableType:
 def _block(block: Block) -> RenderableType:
     if isinstance(block, Formula):
         return Padding(Group(*(Text(line) for line in block.lines)), (0, 0, 0, 2))
-    if isinstance(block, Rows):
+    if isinstance(block, TopicRows):
         return _Pairs(block.rows)
-    if isinstance(block, Commands):
+    if isinstance(block, CommandHelp):
         return _Typed(block)
     return Text(block)
 
@@ -85,7 +85,7 @@ class _Pairs:
 class _Typed:
     """Command lines, broken as a shell allows where they are longer than the screen is wide."""
 
-    def __init__(self, commands: Commands) -> None:
+    def __init__(self, commands: CommandHelp) -> None:
         self.commands = commands
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:

@@ -11,10 +11,10 @@ from nutdamp.files.fields import Quantity, Section, section_of
 from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
-from nutdamp.views.guide import FILE, Part, Rows, Topic, meant
+from nutdamp.views.guide import FILE, Topic, TopicPart, TopicRows, meant
 
 
-class Key(NamedTuple):
+class KeyGuide(NamedTuple):
     """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and what holds it.
 
     ``section`` is the model of what it holds, where that is a mapping or a list of mappings.
@@ -56,11 +56,11 @@ class Key(NamedTuple):
         return "default none" if value is None or value == [] else f"default {value:g}"
 
 
-def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Key]:
+def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
     """All keys of the file, each before those below it."""
     for name, field in model.fields().items():
         section = section_of(field.type)
-        yield Key(f"{prefix}{name}", field, section)
+        yield KeyGuide(f"{prefix}{name}", field, section)
         if section is not None:
             yield from keys(section, f"{prefix}{name}.")
 
@@ -73,7 +73,7 @@ def file_topic(below: str = "") -> Topic:
     every = list(keys())
     if not below:
         roots = [key for key in every if not key.parent]
-        parts = [Part("", (INTRODUCTION, Rows(tuple(key.row for key in roots))))]
+        parts = [TopicPart("", (INTRODUCTION, TopicRows(tuple(key.row for key in roots))))]
         for key in roots:
             parts += _sections(key, every)
         return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
@@ -83,7 +83,7 @@ def file_topic(below: str = "") -> Topic:
     return Topic(
         f"{FILE}.{below}",
         "a key of the spacecraft file",
-        (Part("", (Rows((requested.row,)),)), *_sections(requested, every), _SEE),
+        (TopicPart("", (TopicRows((requested.row,)),)), *_sections(requested, every), _SEE),
     )
 
 
@@ -91,10 +91,10 @@ INTRODUCTION = (
     "A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, entries of a list "
     "by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."
 )
-_SEE = Part("See also", ("explain units, nutdamp init, nutdamp schema",))
+_SEE = TopicPart("See also", ("explain units, nutdamp init, nutdamp schema",))
 
 
-def _sections(key: Key, every: list[Key]) -> Iterator[Part]:
+def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
     """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
     if key.section is None:
         return
@@ -102,18 +102,18 @@ def _sections(key: Key, every: list[Key]) -> Iterator[Part]:
     title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
     children = [one for one in every if one.parent == key.path]
     about = " ".join((key.section.__doc__ or "").split())
-    yield Part(title, (about, Rows(tuple(child.row for child in children))))
+    yield TopicPart(title, (about, TopicRows(tuple(child.row for child in children))))
     below = [child for child in children if child.section is not None]
     if below and all(child.section is ToleranceSection for child in below):
         alike = [one for one in every if one.parent == below[0].path]
         names = ", ".join(child.name for child in below)
-        yield Part(f"{key.path}: each of {names}", (Rows(tuple(one.row for one in alike)),))
+        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(one.row for one in alike)),))
         return
     for child in below:
         yield from _sections(child, every)
 
 
-def _near(below: str, every: list[Key]) -> str:
+def _near(below: str, every: list[KeyGuide]) -> str:
     """A key of the same name elsewhere, or one that is spelt alike."""
     paths = tuple(
         key.path for key in every if key.parent.partition(".")[0] != "dispersions" or not key.parent.count(".")

@@ -28,23 +28,23 @@ class Formula(NamedTuple):
     lines: tuple[str, ...]
 
 
-class Rows(NamedTuple):
+class TopicRows(NamedTuple):
     """Names and what they are."""
 
     rows: tuple[tuple[str, str], ...]
 
 
-class Commands(NamedTuple):
+class CommandHelp(NamedTuple):
     """Command lines to copy: each may be broken into parts only between its entries."""
 
     lines: tuple[tuple[str, ...], ...]
 
 
-Block = str | Formula | Rows | Commands
+Block = str | Formula | TopicRows | CommandHelp
 """A paragraph, or one of the forms above."""
 
 
-class Part(NamedTuple):
+class TopicPart(NamedTuple):
     """Blocks under a heading; the first part of a topic has none."""
 
     title: str
@@ -56,7 +56,7 @@ class Topic(NamedTuple):
 
     name: str
     summary: str
-    parts: tuple[Part, ...]
+    parts: tuple[TopicPart, ...]
 
 
 def _page(file: str) -> str:
@@ -81,7 +81,7 @@ def _topic(text: str) -> Topic:
     first, *others = _sections(body, "## ")
     parts = [("", first)] if first.strip() else []
     titled = (tuple(other.split("\n", 1)) for other in others)
-    return Topic(name, summary, tuple(Part(title, _blocks(blocks)) for title, blocks in (*parts, *titled)))
+    return Topic(name, summary, tuple(TopicPart(title, _blocks(blocks)) for title, blocks in (*parts, *titled)))
 
 
 def _blocks(text: str) -> tuple[Block, ...]:
@@ -93,10 +93,10 @@ def _block(text: str) -> Block:
     if text.startswith("    "):
         return Formula(tuple(line[4:] for line in lines))
     if text.startswith("$ "):
-        return Commands(tuple(tuple(line[2:].split("  ")) for line in lines))
+        return CommandHelp(tuple(tuple(line[2:].split("  ")) for line in lines))
     if text.startswith("- "):
         named = (row.replace("\n  ", " ").partition(" :: ") for row in text[2:].split("\n- "))
-        return Rows(tuple((name, meaning) for name, _, meaning in named))
+        return TopicRows(tuple((name, meaning) for name, _, meaning in named))
     return " ".join(lines)
 
 
@@ -116,12 +116,12 @@ def units_topic() -> Topic:
         "units",
         "units of the spacecraft file and of options",
         (
-            Part(
+            TopicPart(
                 "",
                 (
                     "A value is a number in SI (the first unit of a line) or a text with a unit, such as 60 rpm, 20 ms "
                     "or 5 deg. On the command line the blank may be left out: --until 90s, --set state.spin=60rpm.",
-                    Rows(rows),
+                    TopicRows(rows),
                     "Blanks within a unit may be left out or written as * or ·, and ^2 as ²: kgm², N*m. degrees, "
                     "degree and ° are read as deg, sec as s, hour as hours, rpm in any case. A unit of another kind, "
                     "or one that is not listed, is an error that names those allowed; Hz is for sampling rates "
@@ -130,7 +130,7 @@ def units_topic() -> Topic:
                     "Reports show degrees, CSV and JSON name the unit in the column or key, such as t_s, nutation_deg.",
                 ),
             ),
-            Part("See also", ("explain file",)),
+            TopicPart("See also", ("explain file",)),
         ),
     )
 
@@ -239,7 +239,7 @@ class Equation(NamedTuple):
     def of(cls, topic: Topic) -> Equation:
         """The equation of a topic of `equations.md`: its formula, symbols and place, and what is changed."""
         ((_, (formula, rows, *changed)),) = topic.parts
-        facts = dict(cast("Rows", rows).rows)
+        facts = dict(cast("TopicRows", rows).rows)
         symbols = tuple(facts["symbols"].split())
         return cls(topic.name, topic.summary, cast("Formula", formula), symbols, facts["place"], tuple(changed))
 
@@ -252,16 +252,16 @@ class Equation(NamedTuple):
     def topic(self) -> Topic:
         """The equation as a topic of the guide."""
         parts = (
-            Part("", (self.formula,)),
-            Part("Symbols", (Rows(tuple((name, SYMBOLS[name]) for name in self.symbols)),)),
-            Part("What nutdamp changes", self.changed or ("Nothing: it is used as printed.",)),
-            Part("In the code", (self.place,)),
+            TopicPart("", (self.formula,)),
+            TopicPart("Symbols", (TopicRows(tuple((name, SYMBOLS[name]) for name in self.symbols)),)),
+            TopicPart("What nutdamp changes", self.changed or ("Nothing: it is used as printed.",)),
+            TopicPart("In the code", (self.place,)),
         )
         return Topic(self.number, self.subject, parts)
 
 
 (_symbols,) = topics("symbols.md")
-SYMBOLS = dict(cast("Rows", _symbols.parts[0].blocks[0]).rows)
+SYMBOLS = dict(cast("TopicRows", _symbols.parts[0].blocks[0]).rows)
 """Symbols of the sources with their units."""
 
 EQUATIONS = tuple(map(Equation.of, topics("equations.md")))

@@ -28,7 +28,7 @@ def facts() -> Table:
     return table
 
 
-class Columns(Table):
+class FittedColumns(Table):
     """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -81,9 +81,9 @@ def _widths(columns: list[list[str]], room: int) -> list[int] | None:
     return widths
 
 
-def columns(*names: str, text: tuple[str, ...] = ()) -> Columns:
+def columns(*names: str, text: tuple[str, ...] = ()) -> FittedColumns:
     """A table of numbers, flush right under their headings, but for the first column and those named ``text``."""
-    table = Columns(box=None, pad_edge=False, header_style="bold", padding=(0, GAP, 0, 0))
+    table = FittedColumns(box=None, pad_edge=False, header_style="bold", padding=(0, GAP, 0, 0))
     for index, name in enumerate(names):
         table.add_column(name, justify="left" if index == 0 or name in text else "right")
     return table

@@ -46,7 +46,7 @@ class ChannelSteps:
 
 
 @dataclass(frozen=True, slots=True)
-class SunClock:
+class SunPhases:
     """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
 
     ``first`` is None where there is none, and ``refusal`` then says why.
@@ -57,15 +57,15 @@ class SunClock:
     refusal: str = ""
 
 
-def sun_clock(spacecraft: Spacecraft) -> SunClock | None:
+def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
     """When Sun pulses come; None where the file says nothing of Sun and sensor."""
     if spacecraft.sun is None or spacecraft.sun_sensor is None:
         return None
     turn = block_model.spin_turn(spacecraft)
     try:
-        return SunClock(turn, block_model.first_sun_pulse(spacecraft))
+        return SunPhases(turn, block_model.first_sun_pulse(spacecraft))
     except Infeasible as reason:
-        return SunClock(turn, None, str(reason))
+        return SunPhases(turn, None, str(reason))
 
 
 @dataclass(frozen=True, slots=True)

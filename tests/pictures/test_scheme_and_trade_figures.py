@@ -121,7 +121,7 @@ def test_scales_of_schemes() -> None:
     """Costs that are equal but for rounding look equal; complying cases end at all of them."""
     axes = Figure().subplots()
     for costs in ([2.564, 2.5642, 2.56423], [200.0, 200.0 * (1 + 1e-15)]):
-        schemes._scale(axes, costs, schemes.Quantity("impulse", lambda plan: plan.pulses.total_impulse, str))
+        schemes._scale(axes, costs, schemes.BarQuantity("impulse", lambda plan: plan.pulses.total_impulse, str))
         low, high = axes.get_xlim()
         assert np.ptp(costs) / (high - low) < 0.01
         assert 0.0 < low < min(costs) <= max(costs) < high

@@ -175,7 +175,7 @@ AEM_RECORDS = {
 """A data line of each ATTITUDE_TYPE (table 4-4)."""
 
 
-class Entry(NamedTuple):
+class MessageEntry(NamedTuple):
     """A keyword with its value, as texts; ``line`` counts from 1 in a message that was read."""
 
     keyword: str
@@ -185,11 +185,11 @@ class Entry(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class MessageBlock:
     """Keywords that belong together; ``name`` is that of the layout, empty for what is outside of blocks."""
 
     name: str
-    entries: tuple[Entry, ...]
+    entries: tuple[MessageEntry, ...]
     comments: tuple[str, ...] = ()
     line: int = 0
 
@@ -198,8 +198,8 @@ class Block:
 class Segment:
     """Metadata and the data that they describe: blocks (APM), or records of the layout ``record`` (AEM)."""
 
-    metadata: Block
-    blocks: tuple[Block, ...] = ()
+    metadata: MessageBlock
+    blocks: tuple[MessageBlock, ...] = ()
     records: tuple[tuple[str, ...], ...] = ()
     record: Layout | None = None
 
@@ -209,7 +209,7 @@ class Message:
     """A whole message; ``kind`` is APM, AEM or OPM."""
 
     kind: str
-    header: Block
+    header: MessageBlock
     segments: tuple[Segment, ...]
 
     @property
@@ -218,14 +218,14 @@ class Message:
         return OPM_VERSION if self.kind == "OPM" else VERSION
 
 
-def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> Block:
+def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> MessageBlock:
     """A block with ``values`` in the order of the table; numbers in the unit of the table."""
     entries = tuple(
-        Entry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
+        MessageEntry(keyword.name, value if isinstance(value, str) else number(value), keyword.unit)
         for keyword in keywords
         if (value := values.get(keyword.name)) is not None
     )
-    return Block(name, entries, tuple(comment(text) for text in comments))
+    return MessageBlock(name, entries, tuple(comment(text) for text in comments))
 
 
 def number(value: float) -> str:
@@ -285,19 +285,19 @@ def to_xml(message: Message) -> str:
         for record in segment.records:
             assert segment.record is not None
             tag, rows = segment.record
-            entries = (Entry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
+            entries = (MessageEntry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
             _entries(SubElement(SubElement(data, "attitudeState"), tag), entries, rows)
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
 
-def _fill(place: Element, block: Block, keywords: tuple[Keyword, ...] = ()) -> None:
+def _fill(place: Element, block: MessageBlock, keywords: tuple[Keyword, ...] = ()) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
     _entries(place, block.entries, keywords)
 
 
-def _entries(place: Element, entries: Iterable[Entry], keywords: tuple[Keyword, ...]) -> None:
+def _entries(place: Element, entries: Iterable[MessageEntry], keywords: tuple[Keyword, ...]) -> None:
     wraps = {keyword.name: keyword.tag for keyword in keywords}
     for tag, group in groupby(entries, lambda entry: wraps.get(entry.keyword, "")):
         parent = SubElement(place, tag) if tag else place
@@ -327,7 +327,7 @@ def to_kvn(message: Message) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _block(block: Block) -> list[str]:
+def _block(block: MessageBlock) -> list[str]:
     width = max((len(entry.keyword) for entry in block.entries), default=0)
     return [
         *(f"COMMENT {comment}" for comment in block.comments),
@@ -338,39 +338,39 @@ def _block(block: Block) -> list[str]:
     ]
 
 
-def from_kvn(text: str, name: str) -> tuple[list[Block], list[Fault]]:
+def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
 
     Lines count from 1; ``name`` is that of the file in faults.
     """
-    outside: list[Entry] = []
-    blocks: list[Block] = []
+    outside: list[MessageEntry] = []
+    blocks: list[MessageBlock] = []
     faults: list[Fault] = []
     within: tuple[str, int] | None = None
-    entries: list[Entry] = []
+    entries: list[MessageEntry] = []
     for line, raw in enumerate(_LINE_END.split(text), start=1):
         content = raw.strip()
         if not content or content.split(maxsplit=1)[0] == "COMMENT":
             continue
         pair = _PAIR.fullmatch(content)
         if pair is not None:
-            entry = Entry(pair[1], pair[2], pair[3] or "", line)
+            entry = MessageEntry(pair[1], pair[2], pair[3] or "", line)
             (outside if within is None else entries).append(entry)
         elif _WORD.fullmatch(content) and content.endswith("_START"):
             if within is not None:
                 faults.append(Fault(name, line, 1, content, f"{within[0]}_STOP is missing before it"))
-                blocks.append(Block(within[0], tuple(entries), line=within[1]))
+                blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
             within, entries = (content.removesuffix("_START"), line), []
         elif _WORD.fullmatch(content) and content.endswith("_STOP"):
             if within is None or content != f"{within[0]}_STOP":
                 expected = "no block is open" if within is None else f"expected {within[0]}_STOP"
                 faults.append(Fault(name, line, 1, content, expected))
             else:
-                blocks.append(Block(within[0], tuple(entries), line=within[1]))
+                blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
                 within = None
         else:
             faults.append(Fault(name, line, 1, "", f"{content[:40]!r} is no KEYWORD = value"))
     if within is not None:
         faults.append(Fault(name, within[1], 1, f"{within[0]}_START", f"{within[0]}_STOP is missing"))
-        blocks.append(Block(within[0], tuple(entries), line=within[1]))
-    return [Block("", tuple(outside), line=1), *blocks], faults
+        blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
+    return [MessageBlock("", tuple(outside), line=1), *blocks], faults

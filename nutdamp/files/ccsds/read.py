@@ -28,9 +28,9 @@ from nutdamp.files.ccsds.message import (
     HEADER,
     MOMENTUM,
     VERSION,
-    Block,
-    Entry,
     Keyword,
+    MessageBlock,
+    MessageEntry,
     from_kvn,
 )
 from nutdamp.files.export import FRAMES
@@ -49,9 +49,9 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 class Checked:
     """A block by keyword; what is wrong goes to ``faults``, and what cannot be read is then None."""
 
-    def __init__(self, file: str, block: Block, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
+    def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
         self.file, self.block, self.faults = file, block, faults
-        self.entries: dict[str, Entry] = {}
+        self.entries: dict[str, MessageEntry] = {}
         self._known = {keyword.name: keyword for keyword in keywords}
         self._fill()
         for keyword in keywords:
@@ -78,7 +78,7 @@ class Checked:
                     last = name
                 self._form(entry, self._known[name])
 
-    def _form(self, entry: Entry, keyword: Keyword) -> None:
+    def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
         """Whether the value is of the kind that the table has, in its unit."""
         if not entry.value:
             self.fault(keyword.name, "empty; expected a value")
@@ -203,13 +203,13 @@ def read_apm(path: str) -> ApmContents:
         raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
     blocks, faults = from_kvn(utf8_text(data, path), path)
     _refuse_other_versions(path, blocks[0], faults)
-    contents = _Reader(path, blocks, faults).read()
+    contents = _MessageReader(path, blocks, faults).read()
     if faults or contents is None:
         raise FaultyFile(faults)
     return contents
 
 
-def _refuse_other_versions(path: str, outside: Block, faults: list[Fault]) -> None:
+def _refuse_other_versions(path: str, outside: MessageBlock, faults: list[Fault]) -> None:
     """Another message, or another version of it, makes no sense by these tables."""
     first = outside.entries[0] if outside.entries else None
     if first is None or not re.fullmatch("CCSDS_[A-Z]+_VERS", first.keyword):
@@ -221,10 +221,10 @@ def _refuse_other_versions(path: str, outside: Block, faults: list[Fault]) -> No
         raise FaultyFile([Fault(path, first.line, 1, _VERSION, problem)])
 
 
-class _Reader:
+class _MessageReader:
     """One message; what is wrong goes to ``faults``."""
 
-    def __init__(self, path: str, blocks: list[Block], faults: list[Fault]) -> None:
+    def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
         self.path, self.faults = path, faults
         self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
         self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
@@ -235,7 +235,7 @@ class _Reader:
         self.nutation: float | None = None
         self._sort(blocks[1:])
 
-    def _sort(self, blocks: list[Block]) -> None:
+    def _sort(self, blocks: list[MessageBlock]) -> None:
         order, last = list(APM_BLOCKS), ""
         for block in blocks:
             if block.name not in APM_BLOCKS:

@@ -44,15 +44,15 @@ from nutdamp.files.ccsds.message import (
     OPM_METADATA,
     QUATERNION_ANGVEL,
     SPIN_NUTATION_MOM,
-    Block,
     Keyword,
     Message,
+    MessageBlock,
     Segment,
     block,
     label,
     number,
 )
-from nutdamp.files.export import Reference, Stretch, interpolated
+from nutdamp.files.export import AttitudeSegment, Reference, interpolated
 from nutdamp.flight.end_state import momentum_gained
 from nutdamp.flight.propagation import Flight, shed
 from nutdamp.physics import attitude
@@ -131,7 +131,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     return Message("APM", header(plan, created), (Segment(about, tuple(blocks)),))
 
 
-def header(plan: Plan, created: Epoch) -> Block:
+def header(plan: Plan, created: Epoch) -> MessageBlock:
     """Who made the message, when, and of what."""
     moment = created.text.partition(".")[0]
     values: Values = {
@@ -177,7 +177,7 @@ def _spinless(spins: bool) -> list[str]:
     return ["No SPIN block: the body is not symmetric about its third axis, as the model of that block is."]
 
 
-def _apm_block(name: str, values: Values, *comments: str) -> Block:
+def _apm_block(name: str, values: Values, *comments: str) -> MessageBlock:
     return block(name, APM_BLOCKS[name].keywords, values, *comments)
 
 
@@ -185,7 +185,7 @@ def _frames(frame: str) -> Values:
     return {"REF_FRAME_A": frame, "REF_FRAME_B": BODY_FRAME}
 
 
-def _motion(body: Spacecraft, frame: str) -> list[Block]:
+def _motion(body: Spacecraft, frame: str) -> list[MessageBlock]:
     """Attitude and angular velocity at t = 0."""
     rates, quaternion = map(cleaned, body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion))
     scalar, *vector = quaternion.tolist()
@@ -253,7 +253,7 @@ def aem(
     return Message("AEM", header(plan, created), segments)
 
 
-def _segment(body: Spacecraft, stretch: Stretch, reference: Reference, kind: str) -> Segment:
+def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> Segment:
     times = [reference.epoch.plus(seconds).text for seconds in stretch.t.tolist()]
     metadata = block(
         "",
@@ -277,13 +277,13 @@ def _segment(body: Spacecraft, stretch: Stretch, reference: Reference, kind: str
     return Segment(metadata, records=records, record=AEM_RECORDS[kind])
 
 
-def _turns(stretch: Stretch) -> Iterable[tuple[float, ...]]:
+def _turns(stretch: AttitudeSegment) -> Iterable[tuple[float, ...]]:
     """Q1 Q2 Q3 QC and the rates."""
     for (scalar, *vector), rates in zip(stretch.quaternion.tolist(), stretch.rates, strict=True):
         yield (*vector, scalar, *angular_velocity(rates).values())
 
 
-def _spins(body: Spacecraft, stretch: Stretch) -> Iterable[list[float]]:
+def _spins(body: Spacecraft, stretch: AttitudeSegment) -> Iterable[list[float]]:
     """Spin axis, angle and its rate, momentum, and the rate about that."""
     found = spin_values(body.inertia, stretch.rates, stretch.quaternion)
     names = [keyword.name for keyword in AEM_RECORDS[SPIN_NUTATION_MOM].keywords[1:]]
@@ -320,7 +320,7 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     return Message("OPM", header(plan, created), (Segment(metadata, tuple(blocks)),))
 
 
-def _opm_block(name: str, values: Values, *comments: str) -> Block:
+def _opm_block(name: str, values: Values, *comments: str) -> MessageBlock:
     return block(name, OPM_BLOCKS[name].keywords, values, *comments)
 
 

@@ -24,7 +24,7 @@ from nutdamp.units import KINDS
 from nutdamp.views import guide
 from nutdamp.views.explain_tables import WIDEST
 from nutdamp.views.file_guide import flow, keys
-from nutdamp.views.guide import EQUATIONS, SYMBOLS, Commands, Formula
+from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -142,7 +142,7 @@ def test_every_unit_is_in_the_units_topic() -> None:
 # --- the figures of Magnus 1970 ---------------------------------------------------------------------------------------
 
 DRAWN = [
-    parts for part in FIGURES.parts for block in part.blocks if isinstance(block, Commands) for parts in block.lines
+    parts for part in FIGURES.parts for block in part.blocks if isinstance(block, CommandHelp) for parts in block.lines
 ]
 
 

@@ -12,7 +12,7 @@ from rich.text import Text
 from support.builders import cross, spinner
 from support.cases import deep
 
-from nutdamp.figures.braille import FAINT, Panel, framed, ticks
+from nutdamp.figures.braille import FAINT, BraillePanel, framed, ticks
 from nutdamp.figures.terminal import motion_drawing
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
@@ -65,8 +65,8 @@ def dots(lines: list[Text]) -> Vector:
     return np.array(found, dtype=float).reshape(-1, 2)
 
 
-def panel(columns: int = 20) -> Panel:
-    return Panel(columns, np.zeros(2), 1.0)
+def panel(columns: int = 20) -> BraillePanel:
+    return BraillePanel(columns, np.zeros(2), 1.0)
 
 
 # --- braille ---------------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from support.shown import WIDE, compared_text, tree
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.page import moving
-from nutdamp.page.document import Circle, Moving, Named, Section
+from nutdamp.page.document import Circle, Moving, NamedDirection, PageSection
 from nutdamp.page.html import page_html
 from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, moving_of
 from nutdamp.page.scales import EDGES, LEAD, strip_of
@@ -176,7 +176,7 @@ def test_dates_are_exact_through_a_leap_second_and_without_an_epoch_there_are_no
 def test_a_page_has_the_view_and_its_script_where_it_has_pictures() -> None:
     plain = plain_page(compared_text(TEXTS["single"]))
     assert "requestAnimationFrame" not in page_html(plain)
-    page = tree(replace(plain, sections=(Section("pictures", "Pictures", (view(TEXTS["single"])[0],)),)))
+    page = tree(replace(plain, sections=(PageSection("pictures", "Pictures", (view(TEXTS["single"])[0],)),)))
     (shown,) = (node for node in page if "moving" in node.attributes.get("class", "").split())
     assert "UTC" not in shown.text
 
@@ -217,7 +217,7 @@ def test_the_target_is_a_mark_and_a_circle_and_further_circles_are_taken_as_data
     assert (math.degrees(math.atan2(y, x)), math.degrees(math.asin(z))) == pytest.approx((-90, -30), abs=1e-3)
     assert data["target"] is not None
     plan = chosen(TEXTS["target"])
-    star = Named("star", np.array([0.0, 0.6, 0.8]), "watched", (Circle("near it", 0.2, "keep-out"),))
+    star = NamedDirection("star", np.array([0.0, 0.6, 0.8]), "watched", (Circle("near it", 0.2, "keep-out"),))
     assert json.loads(moving.moving(plan.flight, 60.0, plan.scheme, [star]).data)["named"] == [
         {"name": "star", "kind": "watched", "axis": [0.0, 0.6, 0.8], "circles": [{"radius": 0.2, "kind": "keep-out"}]}
     ]
