@@ -347,12 +347,12 @@ def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float |
     ``until``: end of a history or spin table, s. Raises Infeasible, BadRequest or CannotWrite.
     """
     from nutdamp.files.tabular import write_whole
-    from nutdamp.views.exchange import FORMATS, MESSAGES, export_text
+    from nutdamp.views.exchange import FORMATS, export_text
 
-    made, form = feasible(plan), units.one_of("format", format, FORMATS)
+    made, form = feasible(plan), units.one_of("format", format, tuple(FORMATS))
     name = units.path("path", path)
     end = None if until is None else units.end_of_flight(until)
-    write_whole(name, export_text(made, form, xml=form in MESSAGES and name.lower().endswith(".xml"), until=end))
+    write_whole(name, export_text(made, form, xml=FORMATS[form].message and name.lower().endswith(".xml"), until=end))
 
 
 @dataclass(frozen=True, eq=False)

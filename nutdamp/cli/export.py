@@ -18,7 +18,7 @@ from nutdamp.cli.options import FILE, Aim, EndTime, NameType, PlanningCommand, g
 from nutdamp.cli.screen import say
 from nutdamp.errors import printable
 from nutdamp.schemes.catalogue import Options
-from nutdamp.views.exchange import FORMATS, MESSAGES, export_text, lacking
+from nutdamp.views.exchange import FORMATS, expect_possible, export_text, lacking
 
 
 @click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
@@ -26,10 +26,8 @@ from nutdamp.views.exchange import FORMATS, MESSAGES, export_text, lacking
 @click.option(
     "--format",
     "form",
-    type=NameType(FORMATS),
-    help="Required. apm: state and pulses (CCSDS); aem: attitude history (CCSDS) as quaternions, aem-spin: as spin, "
-    "nutation and momentum; opm: velocity change of each pulse (CCSDS); stk: attitude history as .a; spin-table: CSV, "
-    "one row a spin; basilisk: a script that flies the schedule; json: as `plan --json`.",
+    type=NameType(tuple(FORMATS)),
+    help=f"Required. {'; '.join(f'{row.name}: {row.summary}' for row in FORMATS.values())}.",
 )
 @click.option("--xml", is_flag=True, help="CCSDS: XML instead of keyword = value; also where FILE ends in .xml.")
 @flown_options("Export")
@@ -62,9 +60,10 @@ def command(
     from nutdamp.planning.decision import Decision
 
     form = _format(form, spacecraft, ctx.args)
+    notation = xml or (FORMATS[form].message and output.lower().endswith(".xml"))
+    expect_possible(form, xml=notation, until=until)
     job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
     plan = plan_or_read(job, flown, options)
-    notation = xml or (form in MESSAGES and output.lower().endswith(".xml"))
     deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
     missing = lacking(plan, form)
     if missing is not None:
@@ -85,7 +84,7 @@ def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
     if form is not None:
         return form
     if meant is None:
-        raise click.UsageError(f"name the format: --format {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+        raise click.UsageError(f"name the format: --format {', '.join([*FORMATS][:-1])} or {[*FORMATS][-1]}")
     named = [word for word in words if word.lower() != meant]
     raise click.UsageError(f"the format is an option: nutdamp export {shlex.join([*named, '--format', meant])}")
 

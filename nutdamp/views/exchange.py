@@ -1,23 +1,155 @@
-"""Plans as other tools read them: one entry for each format that `nutdamp export` writes."""
+"""Plans as other tools read them: a row of `FORMATS` for each format that `nutdamp export` writes."""
 
 from __future__ import annotations
 
 import datetime
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
+    from nutdamp.common.time import Epoch
+    from nutdamp.files.ccsds.message import Message
+    from nutdamp.flight.propagation import Flight
     from nutdamp.planning.plan import Plan
 
 
-FORMATS = ("apm", "aem", "aem-spin", "opm", "stk", "spin-table", "basilisk", "json")
+class Request(NamedTuple):
+    """A plan to be written: CCSDS messages as ``xml`` or as keyword = value, tracks ``until`` a time, s, or None."""
+
+    plan: Plan
+    xml: bool
+    until: float | None
+
+    def end(self) -> float:
+        """End of an attitude history, s: by default an inertial period after the last pulse."""
+        return self.plan.pulses.end + self.plan.spacecraft.inertial_period if self.until is None else self.until
+
+    def flight(self) -> Flight:
+        """The flight up to that end."""
+        from nutdamp.flight.propagation import flown
+
+        return flown(self.plan.spacecraft, self.plan.pulses, self.end())
+
+
+class Format(NamedTuple):
+    """A format: its ``name``, a ``summary`` for help pages, the function that gives the text.
+
+    ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
+    frame of the attitude. ``needs_orbit``: incomplete without one.
+    """
+
+    name: str
+    summary: str
+    text: Callable[[Request], str]
+    message: bool = False
+    track: bool = False
+    dated: bool = False
+    needs_orbit: bool = False
+
+
+def _json(request: Request) -> str:
+    from nutdamp.files.tabular import json_text
+    from nutdamp.planning.decision import Comparison
+    from nutdamp.views.plan_json import comparison_json
+
+    compared = Comparison(request.plan.spacecraft, (request.plan,))
+    return json_text(comparison_json(compared, {"reason": "the plan exported"}))
+
+
+def _basilisk(request: Request) -> str:
+    from nutdamp.files.export import basilisk_script
+
+    return basilisk_script(request.plan)
+
+
+def _spin_table(request: Request) -> str:
+    from nutdamp.views.spin_table import spin_table
+
+    plan, until = request.plan, request.until
+    return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
+
+
+def _stk(request: Request) -> str:
+    from nutdamp.files.export import reference, stk_attitude
+
+    return stk_attitude(request.flight(), request.end(), reference(request.plan.spacecraft))
+
+
+def _apm(request: Request) -> str:
+    from nutdamp.files.ccsds.write import apm
+    from nutdamp.files.export import reference
+
+    return _notation(request, apm(request.plan, reference(request.plan.spacecraft), _now()))
+
+
+def _opm(request: Request) -> str:
+    from nutdamp.files.ccsds.write import opm
+    from nutdamp.files.export import reference
+
+    return _notation(request, opm(request.plan, reference(request.plan.spacecraft), _now()))
+
+
+def _aem(request: Request) -> str:
+    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL
+
+    return _history(request, QUATERNION_ANGVEL)
+
+
+def _aem_spin(request: Request) -> str:
+    from nutdamp.files.ccsds.message import SPIN_NUTATION_MOM
+
+    return _history(request, SPIN_NUTATION_MOM)
+
+
+def _history(request: Request, kind: str) -> str:
+    from nutdamp.files.ccsds.write import aem
+    from nutdamp.files.export import reference
+
+    place = reference(request.plan.spacecraft)
+    return _notation(request, aem(request.plan, request.flight(), request.end(), place, _now(), kind))
+
+
+def _notation(request: Request, message: Message) -> str:
+    from nutdamp.files.ccsds.message import to_kvn, to_xml
+
+    return to_xml(message) if request.xml else to_kvn(message)
+
+
+def _now() -> Epoch:
+    """Date of creation of a message, to the second."""
+    from nutdamp.common.time import Epoch
+
+    return Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
+
+
+FORMATS = {
+    row.name: row
+    for row in (
+        Format("apm", "state and pulses (CCSDS)", _apm, message=True, dated=True),
+        Format("aem", "attitude history (CCSDS) as quaternions", _aem, message=True, track=True, dated=True),
+        Format("aem-spin", "as spin, nutation and momentum", _aem_spin, message=True, track=True, dated=True),
+        Format("opm", "velocity change of each pulse (CCSDS)", _opm, message=True, dated=True, needs_orbit=True),
+        Format("stk", "attitude history as .a", _stk, track=True, dated=True),
+        Format("spin-table", "CSV, one row a spin", _spin_table, track=True),
+        Format("basilisk", "a script that flies the schedule", _basilisk),
+        Format("json", "as `plan --json`", _json),
+    )
+}
 """Formats by name."""
 
-MESSAGES = ("apm", "aem", "aem-spin", "opm")
-"""CCSDS messages, in either of two notations."""
 
-TRACKS = ("aem", "aem-spin", "stk", "spin-table")
+def expect_possible(form: str, *, xml: bool, until: float | None) -> None:
+    """Raise BadRequest for an XML notation or an end that the format has not."""
+    if xml and not FORMATS[form].message:
+        raise BadRequest(f"{form} has no XML notation; {', '.join(_names_where('message'))} have")
+    if until is not None and not FORMATS[form].track:
+        raise BadRequest(f"until is for {', '.join(_names_where('track'))}; {form} has no end time")
+
+
+def _names_where(flag: str) -> list[str]:
+    return [name for name, row in FORMATS.items() if getattr(row, flag)]
 
 
 def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
@@ -26,59 +158,21 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises BadRequest where the
     format needs what the spacecraft file does not give, or cannot hold what the plan has.
     """
-    if xml and form not in MESSAGES:
-        raise BadRequest(f"{form} has no XML notation; {', '.join(MESSAGES)} have")
-    if until is not None and form not in TRACKS:
-        raise BadRequest(f"until is for {', '.join(TRACKS)}; {form} has no end time")
-    if form == "json":
-        from nutdamp.files.tabular import json_text
-        from nutdamp.planning.decision import Comparison
-        from nutdamp.views.plan_json import comparison_json
+    expect_possible(form, xml=xml, until=until)
+    row, request = FORMATS[form], Request(plan, xml, until)
+    if row.dated:
+        from nutdamp.files.export import reference
 
-        return json_text(comparison_json(Comparison(plan.spacecraft, (plan,)), {"reason": "the plan exported"}))
-    if form == "basilisk":
-        from nutdamp.files.export import basilisk_script
-
-        return basilisk_script(plan)
-    if form == "spin-table":
-        from nutdamp.views.spin_table import spin_table
-
-        return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
-    return _with_epoch(plan, form, xml, until)
+        reference(plan.spacecraft)
+        last = request.end() if row.track else plan.pulses.end
+        if plan.spacecraft.utc(last) is None:
+            cure = "an earlier --until" if row.track else "a shorter horizon"
+            raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
+    return row.text(request)
 
 
 def lacking(plan: Plan, form: str) -> str | None:
     """What the format ``form`` needs to be complete and the spacecraft file does not give; None where it is."""
-    if form != "opm" or plan.spacecraft.orbit is not None:
+    if not FORMATS[form].needs_orbit or plan.spacecraft.orbit is not None:
         return None
     return "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, and no whole message"
-
-
-def _with_epoch(plan: Plan, form: str, xml: bool, until: float | None) -> str:
-    from nutdamp.files.export import reference
-    from nutdamp.flight import propagation
-
-    body = plan.spacecraft
-    place = reference(body)
-    end = plan.pulses.end + body.inertial_period if until is None else until
-    last = end if form in TRACKS else plan.pulses.end
-    if body.utc(last) is None:
-        cure = "an earlier --until" if form in TRACKS else "a shorter horizon"
-        raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
-    if form == "stk":
-        from nutdamp.files.export import stk_attitude
-
-        return stk_attitude(propagation.flown(body, plan.pulses, end), end, place)
-    from nutdamp.common.time import Epoch
-    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, SPIN_NUTATION_MOM, to_kvn, to_xml
-    from nutdamp.files.ccsds.write import aem, apm, opm
-
-    created = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
-    if form == "apm":
-        message = apm(plan, place, created)
-    elif form == "opm":
-        message = opm(plan, place, created)
-    else:
-        kind = QUATERNION_ANGVEL if form == "aem" else SPIN_NUTATION_MOM
-        message = aem(plan, propagation.flown(body, plan.pulses, end), end, place, created, kind)
-    return to_xml(message) if xml else to_kvn(message)
