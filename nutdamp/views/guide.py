@@ -138,6 +138,7 @@ def units_topic() -> Topic:
 __all__ = ["FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "found", "limits", "meant"]
 
 SCHEMES, MOTION = topics("schemes.md"), topics("motion.md")
+CODE = topics("contributing.md")
 
 SOURCES = (
     'M(n): K. Magnus, "Untersuchungen über zeitabhängig selbsterregte, symmetrische Kreisel", 1970',
@@ -168,6 +169,7 @@ SUMMARIES: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("units", "units of the spacecraft file and of options"),
         ),
     ),
+    ("Code", tuple((topic.name, topic.summary) for topic in CODE)),
 )
 """All topics with a line about each, in groups."""
 
@@ -183,7 +185,7 @@ def found(requested: str) -> Topic:
     Raises BadRequest, which names what is near, where there is none.
     """
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
-    known = {topic.name: topic for topic in (*SCHEMES, *MOTION)}
+    known = {topic.name: topic for topic in (*SCHEMES, *MOTION, *CODE)}
     if name in known:
         return known[name]
     if name == "units":
