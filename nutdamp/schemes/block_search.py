@@ -299,7 +299,8 @@ class BlockSearch:
             if not len(widths):
                 continue
             step = self.model.turned_by(channel, widths, float(state.spin))
-            near = self.model.pulses(state, channel, widths, float(way) / step, self.commands.max_count)
+            full = np.divide(float(way), step, out=np.zeros_like(step), where=step > 0.0)  # none of a torque along spin
+            near = self.model.pulses(state, channel, widths, full, self.commands.max_count)
             near = np.rint(near)[:, None] + np.arange(-1, 2)
             few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
             counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)

@@ -223,7 +223,7 @@ EVERY = (
 """What each file of `equipped` goes through."""
 
 
-FAULTY = (44, 66)
+FAULTY = (44, 66, 212)
 """Seeds of files that went wrong once."""
 
 
