@@ -98,7 +98,7 @@ set_option = click.option(
     multiple=True,
     metavar="KEY=VALUE",
     callback=_settings,
-    help="Change a key of the file, as limits.gap=1s; repeatable.",
+    help="Change a key: limits.gap=1s; repeatable.",
 )
 
 

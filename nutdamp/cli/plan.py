@@ -61,6 +61,7 @@ SCHEMES, PRIMER = "schemes", "primer"
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
 @click.option("--certificate", type=FILE, help="Write the proof of the least cost (JSON).")
 @plot_options((*FIGURES, SCHEMES, PRIMER))
+@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
 def command(
     spacecraft: FileInput,
@@ -77,6 +78,7 @@ def command(
     certificate: str | None,
     plot: str | None,
     figure: str,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
@@ -118,7 +120,7 @@ def command(
     ]
     if job.silent:
         job.warn(verdicts.warnings(compared))
-    job.deliver(outputs, partial(_screen, compared, dispersed), unsaved=unproved)
+    job.deliver(outputs, partial(_screen, compared, decided, dispersed, verbose), unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
@@ -235,11 +237,19 @@ def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
     return schemes.schemes_figure(compared, decided)
 
 
-def _screen(compared: Comparison, dispersed: RobustComparison | None) -> RenderableType:
+def _screen(
+    compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None, verbose: bool
+) -> RenderableType:
+    from nutdamp.views import robust_verdicts, verdicts
+    from nutdamp.views.glance import glance
+
     if dispersed is not None:
         from nutdamp.views.robust_tables import robust_screen
 
-        return robust_screen(dispersed)
-    from nutdamp.views.plan_tables import comparison_screen
+        reason = robust_verdicts.robust_reason(dispersed)
+        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, reason, dispersed.name)
+    if verbose:
+        from nutdamp.views.plan_tables import comparison_screen
 
-    return comparison_screen(compared)
+        return comparison_screen(compared)
+    return glance(compared, decided, verdicts.reason(compared))

@@ -184,6 +184,13 @@ class RobustComparison:
         return replace(self.comparison, plans=(*self.comparison.plans, plan), flown=flown)
 
     @property
+    def name(self) -> str:
+        """The name of the robust plan in `joined`."""
+        known = self.comparison.plans if self.chosen is None else self.joined.plans
+        chosen = None if self.chosen is None else _kind(self.chosen.plan)
+        return next((plan.scheme for plan in known if plan.feasible and _kind(plan) == chosen), "")
+
+    @property
     def lucky(self) -> bool:
         """Whether enough cases comply, but too few of those by which the plan was not chosen."""
         if self.fresh is None or self.chosen is None:

@@ -16,7 +16,7 @@ NARROW = 60
 GAP = 2
 """Characters between two columns."""
 
-WORD = re.compile(r"(?:[<≤✗] )?\S+(?: %(?!\S))?")
+WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")
 """What a column keeps on one line."""
 
 

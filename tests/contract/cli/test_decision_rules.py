@@ -62,8 +62,8 @@ def test_a_robust_plan_is_compared_by_the_same_cases(run: Run) -> None:
 def test_no_plan_complies_often_enough(run: Run) -> None:
     ended = run("plan", *QUICK, "--set", LOOSE)
     assert ended.returncode == 4
-    warning = next(line for line in ended.stdout.replace("\n", " ").split("  ") if "Warning" in line)
-    check_text("decision.too-few", warning[warning.index("Warning") :])
+    warning = next(line for line in ended.stdout.replace("\n", " ").split("  ") if "warning" in line)
+    check_text("decision.too-few", warning[warning.index("warning") :])
     assert run("plan", *QUICK, "--set", LOOSE, "--nominal").returncode == 0
 
 

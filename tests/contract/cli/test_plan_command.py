@@ -50,18 +50,18 @@ FILES = {
     "rest_yaml": BALL.replace("5 deg", "0 deg"),
 }
 SCREENS = {
-    "a weak thruster": ["plan weak.yaml --scheme one-pulse; 4", "plan weak.yaml --scheme two-pulse; 4"],
-    "a thruster that does not damp": ["plan axial.yaml; 3"],
-    "no nutation": ["plan rest.yaml --scheme two-pulse --scheme optimal"],
-    "a sphere": ["plan ball.yaml --scheme two-pulse"],
-    "requirements": [f"plan x.yaml --scheme two-pulse --set 'requirement={{{parts}}}' {more}" for parts, more in (
+    "a weak thruster": ["plan -v weak.yaml --scheme one-pulse; 4", "plan -v weak.yaml --scheme two-pulse; 4"],
+    "a thruster that does not damp": ["plan -v axial.yaml; 3"],
+    "no nutation": ["plan -v rest.yaml --scheme two-pulse --scheme optimal"],
+    "a sphere": ["plan -v ball.yaml --scheme two-pulse"],
+    "requirements": [f"plan -v x.yaml --scheme two-pulse --set 'requirement={{{parts}}}' {more}" for parts, more in (
         ("nutation: 0.5 deg, momentum_shift: 1e-12 deg", ""), ("momentum_shift: 0.2 deg", "--target 2deg,0deg"),
         ("nutation: 10 deg", ""))],
-    "what a scheme cannot do": ["plan --spin 31rpm; 3", "simulate --scheme two-pulse --spin 31rpm; 3",
-                                "plan x.yaml --scheme half-cone --scheme two-pulse",
-                                "plan --scheme one-pulse --target 10deg,45deg; 4"],
-    "robust": ["plan exact.yaml --robust; 2",
-               "plan sat.yaml --robust --set limits.horizon=1ms --scheme one-pulse --scheme optimal; 3"],
+    "what a scheme cannot do": ["plan -v --spin 31rpm; 3", "simulate --scheme two-pulse --spin 31rpm; 3",
+                                "plan -v x.yaml --scheme half-cone --scheme two-pulse",
+                                "plan -v --scheme one-pulse --target 10deg,45deg; 4"],
+    "robust": ["plan -v exact.yaml --robust; 2",
+               "plan -v sat.yaml --robust --set limits.horizon=1ms --scheme one-pulse --scheme optimal; 3"],
 }  # fmt: skip
 
 
@@ -77,7 +77,7 @@ def test_the_screen_of_awkward_spacecraft_and_requests(run: Run, tmp_path: Path,
 
 def test_the_built_in_example_is_planned_in_an_empty_folder(run: Run) -> None:
     """No line is cut or wider than the screen; what it shows is the first session of the README."""
-    ended, wide = run("plan", columns=80), run("plan", "--quiet", columns=140)
+    ended, wide = run("plan", "-v", columns=80), run("plan", "-v", "--quiet", columns=140)
     assert ended.returncode == 0
     assert ("built-in example" in ended.stderr, wide.stderr) == (True, "")
     assert all(len(line) <= 80 for line in ended.stdout.splitlines())
@@ -137,7 +137,7 @@ def test_schemes_are_named_and_a_spin_is_a_part_of_the_requirement(run: Run) -> 
 def test_nothing_feasible_is_exit_3_and_leaves_an_old_schedule(run: Run, tmp_path: Path) -> None:
     """What misses the requirement is written too, with status 4; without nutation the schedule is empty."""
     written(tmp_path, weak_yaml=WEAK, pulses_csv="old")
-    late = "plan weak.yaml --set limits.horizon=0.1s --json plan.json --csv pulses.csv; 3"
+    late = "plan -v weak.yaml --set limits.horizon=0.1s --json plan.json --csv pulses.csv; 3"
     check_text("cli.plan.late", transcript(run, [late]))
     data = json.loads((tmp_path / "plan.json").read_text())
     assert data["recommended"] is None
@@ -170,11 +170,11 @@ def test_literal_reproduces_the_printed_scheme(run: Run, tmp_path: Path) -> None
 @pytest.mark.deep
 def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
     """Propellant, time and residual of each against C|ω3|β, in one table that fits the screen."""
-    alone = run("plan", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line").stdout
+    alone = run("plan", "-v", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line").stdout
     assert "β = 10 deg from H" in alone
-    compared = run("plan", "--quiet", "--nominal", "--target", "2deg,45deg").stdout
+    compared = run("plan", "-v", "--quiet", "--nominal", "--target", "2deg,45deg").stdout
     assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal", "× C|ω3|β"))
-    along_h = run("plan", "-", "--target", "0deg,0deg", stdin=EXACT).stdout
+    along_h = run("plan", "-v", "-", "--target", "0deg,0deg", stdin=EXACT).stdout
     (row,) = [line for line in along_h.splitlines() if "× C|ω3|β" in line]
     assert set(row.split()[2:]) == {"–"}  # not a ratio of rounding
     assert "C|ω3|β = 0 N m s" in along_h
@@ -239,7 +239,7 @@ def faulty(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("faulty")
 def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, tmp_path: Path) -> None:
-    ended = run("plan", "--nominal", "--json", "plan.json", "--csv", "pulses.csv")
+    ended = run("plan", "-v", "--nominal", "--json", "plan.json", "--csv", "pulses.csv")
     assert ended.returncode == 1
     assert "Recommended: optimal" in ended.stdout
     check_text("cli.plan.internal-error", ended.stderr)
@@ -247,7 +247,7 @@ def test_after_an_internal_error_the_comparison_goes_on_and_is_exit_1(run: Run, 
     assert (one["feasible"], two["feasible"], four["feasible"]) == (True, False, True)
     assert two["why"] == "internal error, please report: ZeroDivisionError"
     assert (tmp_path / "pulses.csv").exists()
-    alone = run("plan", "--scheme", "two-pulse", "--debug")
+    alone = run("plan", "-v", "--scheme", "two-pulse", "--debug")
     assert (alone.returncode, "No recommendation" in alone.stdout) == (1, True)
     assert "Traceback" in alone.stderr
     assert "ZeroDivisionError: float division by zero" in alone.stderr
@@ -262,7 +262,7 @@ def test_pages_and_robust_plans_go_on_too(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
     assert run("report", "--disperse", "500").returncode == 1
     assert "ZeroDivisionError" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    robust = run("plan", "sat.yaml", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse")
+    robust = run("plan", "-v", "sat.yaml", "--robust", "--scheme", "two-pulse", "--scheme", "four-pulse")
     assert robust.returncode == 1
     assert "Robust plan: four-pulse" in robust.stdout
     assert "two-pulse: internal error, please report: ZeroDivisionError" in robust.stdout
@@ -274,7 +274,18 @@ def test_pages_and_robust_plans_go_on_too(run: Run, tmp_path: Path) -> None:
 @pytest.mark.deep
 def test_the_screen_the_json_and_the_csv_tell_of_the_same_robust_plan(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
-    command = ("plan", "sat.yaml", "--scheme", "four-pulse", "--robust", "--json", "plan.json", "--csv", "pulses.csv")
+    command = (
+        "plan",
+        "-v",
+        "sat.yaml",
+        "--scheme",
+        "four-pulse",
+        "--robust",
+        "--json",
+        "plan.json",
+        "--csv",
+        "pulses.csv",
+    )
     ended = run(*command)
     assert ended.returncode == 0, ended.stderr
     said, data = words(ended.stdout), json.loads((tmp_path / "plan.json").read_text("utf-8"))
@@ -300,7 +311,7 @@ def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees:
     """On ticks no on-times are trimmed."""
     requirement = f"requirement: {{nutation: {degrees} deg, probability: 95 %}}\nlimits: {{tick: 1 ms}}\n"
     written(tmp_path, sat_yaml=UNTRUSTED + requirement)
-    ended = run("plan", "sat.yaml", "--scheme", "four-pulse", "--robust")
+    ended = run("plan", "-v", "sat.yaml", "--scheme", "four-pulse", "--robust")
     assert ended.returncode == status, ended.stdout
     verdict = "Requirement " + ("met: 100.0 % of cases" if status == 0 else r"NOT met: [\d.]+ % of cases")
     assert re.search(verdict + r" comply \(95 % required\)", words(ended.stdout))
@@ -309,7 +320,7 @@ def test_the_requirement_with_its_probability(run: Run, tmp_path: Path, degrees:
 @pytest.mark.weekly
 def test_the_plan_picked_for_wide_tolerances_complies_where_no_scheme_does(run: Run, tmp_path: Path) -> None:
     """85.6 % of cases comply with two-pulse, the best of the plans that do not end as early as they can."""
-    ended = run("plan", "--robust", "--json", "plan.json", *WIDE)
+    ended = run("plan", "-v", "--robust", "--json", "plan.json", *WIDE)
     assert ended.returncode == 0
     data = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     for part in (
@@ -343,7 +354,7 @@ def test_the_plan_picked_for_wide_tolerances_complies_where_no_scheme_does(run: 
 def test_each_candidate_says_where_it_ends_and_the_screen_the_chosen_one(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=UNTRUSTED)
     options = ("--scheme", "optimal", "--target", "3deg,45deg", "--robust")
-    ended = run("plan", "sat.yaml", *options, "--json", "plan.json")
+    ended = run("plan", "-v", "sat.yaml", *options, "--json", "plan.json")
     data = json.loads((tmp_path / "plan.json").read_text("utf-8"))["robust"]
     assert data["target"]["axis"] == pytest.approx({"tilt_deg": 3.0, "azimuth_deg": 45.0})
     for plan in filter(None, (*data["candidates"], data["recommended"], data["against"])):

@@ -57,7 +57,7 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
 
 def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
     """COLUMNS=0 printed nothing, with exit status 0."""
-    none, one, seven, usual = (call(run, "plan -q --scheme two-pulse", columns=width) for width in (0, 1, 7, 80))
+    none, one, seven, usual = (call(run, "plan -v -q --scheme two-pulse", columns=width) for width in (0, 1, 7, 80))
     assert none.stdout == usual.stdout
     for ended in (one, seven):
         assert ended.returncode == 0
@@ -107,9 +107,9 @@ def test_four_or_five_schemes_fit_a_usual_screen(run: Run, name: str) -> None:
 
 def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_line(run: Run) -> None:
     """Long names of channels are broken, not "< 1e-9" after the last pulse."""
-    (line,) = re.findall("^pulses .*", call(run, f"plan {STEERED} -q").stdout, re.MULTILINE)
+    (line,) = re.findall("^pulses .*", call(run, f"plan {STEERED} -v -q").stdout, re.MULTILINE)
     assert re.split(r"  +", line) == ["pulses", "1", "2", "no thrusters", "no thrusters"]
-    shown = call(run, f"plan {STEERED} --scheme two-pulse -q").stdout
+    shown = call(run, f"plan {STEERED} --scheme two-pulse -v -q").stdout
     assert re.search("  < 1e-9$", shown, re.MULTILINE)
     assert not re.search("<$", shown, re.MULTILINE)
 

@@ -207,7 +207,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> None:
     """The screen has what an operator compares before and after."""
     text = FILE + "tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar, exponent: 1}\n"
-    planned = run("plan", "-", *GOAL, "--scheme", "command-block", *BLOCKS, "--csv", "pulses.csv", stdin=text)
+    planned = run("plan", "-v", "-", *GOAL, "--scheme", "command-block", *BLOCKS, "--csv", "pulses.csv", stdin=text)
     assert planned.returncode == 0, planned.stderr
     (row,) = rows_of(tmp_path / "blocks.csv")
     assert tuple(row) == BLOCKS_HEADER

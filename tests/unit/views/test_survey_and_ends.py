@@ -267,7 +267,7 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
 def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, command: str) -> None:
     """The command that shows both models gives the angles of each, one a row."""
     options = ("--scheme", "two-pulse", "--target", "350deg,20deg", "--json", "end.json", "--quiet")
-    screen = run(command, "-", *options, stdin=POINTED).stdout
+    screen = run(command, "-", *options, *["-v"] * (command == "plan"), stdin=POINTED).stdout
     written = json.loads((tmp_path / "end.json").read_text())
     written = written["plans"][0] if command == "plan" else written
     assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})
@@ -302,7 +302,7 @@ def test_the_range_of_right_ascension_goes_through_zero(run: Run) -> None:
 def test_pulses_say_when_they_start_in_utc(run: Run, tmp_path: Path, epoch: float, last: str) -> None:
     """Across a leap second, which a clock that adds seconds to a date would miss."""
     (tmp_path / "leap.yaml").write_text(POINTED.replace("23:59:59Z", f"23:59:{epoch}Z"))
-    screen = run("plan", "leap.yaml", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json", "-q")
+    screen = run("plan", "-v", "leap.yaml", "--scheme", "two-pulse", "--csv", "pulses.csv", "--json", "plan.json", "-q")
     assert screen.returncode == 0, screen.stderr
     rows = list(csv.DictReader(io.StringIO((tmp_path / "pulses.csv").read_text())))
     pulses = json.loads((tmp_path / "plan.json").read_text())["plans"][0]["pulses"]

@@ -1,0 +1,84 @@
+"""The default screen of `plan`: what to fire on top, in 24 lines of 80 columns."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+from support import places
+from support.builders import spinner
+from support.cases import spread
+from support.golden import check_text
+
+import nutdamp
+from nutdamp.planning.decision import Comparison, decide
+from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.views import verdicts
+from nutdamp.views.glance import LINES, ROWS, WIDTH, glance, short
+
+CONFIGS = sorted(path.stem for path in places.CONFIGS.glob("*.yaml"))
+
+
+def screen(compared: Comparison) -> list[str]:
+    console = Console(width=WIDTH, file=io.StringIO(), markup=False, emoji=False, highlight=False)
+    with console.capture() as captured:
+        console.print(glance(compared, decide(compared), verdicts.reason(compared)))
+    return [line.rstrip() for line in captured.get().splitlines()]
+
+
+def compared(body: Spacecraft, *names: str) -> Comparison:
+    return nutdamp.compare(body, names, samples=0)
+
+
+@pytest.mark.usefixtures("plans_shared")
+@spread("name", CONFIGS, quick=2, deep=len(CONFIGS))
+def test_a_plan_is_seen_at_a_glance(name: str) -> None:
+    lines = screen(compared(nutdamp.load(places.CONFIGS / f"{name}.yaml")))
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= WIDTH
+    assert [line for line in lines if line.startswith(("FLY ", "NO PULSE"))] == [lines[1]]
+    assert lines[-1].startswith("-v ")
+    assert not any("…" in line and "more" not in line for line in lines)
+
+
+@pytest.mark.usefixtures("plans_shared")
+def test_the_screen_of_the_example() -> None:
+    check_text("glance.example", "\n".join(screen(compared(nutdamp.example()))))
+
+
+def test_a_requirement_that_is_missed_is_never_dropped() -> None:
+    weak = replace(spinner(degrees=5.0), requirement=Requirement(nutation=math.radians(1e-7), momentum_shift=1e-9))
+    lines = screen(compared(weak, "one-pulse"))
+    assert lines[2].startswith("NOT met")
+    assert any(line.startswith("shift of H") and line.endswith("NOT met") for line in lines)
+
+
+def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
+    body = nutdamp.load({
+        "name": "weak", "inertia": {"A": 100, "C": 80}, "state": {"spin": 3.0, "nutation": "5 deg"},
+        "thrusters": [{"name": "T", "torque": [2.0, 0, 0], "max_on_time": "0.3 s"}], "limits": {"horizon": "200 s"},
+    })  # fmt: skip
+    plan = compared(body, "optimal")
+    count = len(plan["optimal"].pulses)
+    assert count > ROWS
+    rows = screen(plan)
+    start = next(index for index, line in enumerate(rows) if line.startswith("pulse"))
+    assert [row.split()[0] for row in rows[start + 1 : start + 7]] == ["1", "2", "3", "4", "…", str(count)]
+    assert f"{count - 5} more" in rows[start + 5]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "largest", "text"),
+    [
+        (1e-4, math.inf, "0"),
+        (6e-4, math.inf, "0.0006"),
+        (1e-4, 1e-3, "0.0001"),
+        (1.23456, 90.0, "1.23"),
+        (0.0, 1.0, "0"),
+    ],
+)
+def test_zero_is_written_one_way_below_what_matters(degrees: float, largest: float, text: str) -> None:
+    assert short(math.radians(degrees), math.radians(largest)) == text
