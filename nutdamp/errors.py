@@ -1,9 +1,4 @@
-"""Exceptions and faults with their place, as data.
-
-What can go wrong, as data: the command line turns it into messages and exit statuses in one place.
-
-Lists and spans as sentences have them.
-"""
+"""Exceptions, and faults with their place, as data; the command line turns them into messages and exit statuses."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from typing import NamedTuple
 class NutdampError(Exception):
     """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback.
 
-    What an error was made of is in ``args``, so that it can be pickled, as passing it between processes needs.
+    The arguments of the constructor are in ``args``, so that an error can be pickled and passed between processes.
     """
 
 
@@ -23,12 +18,12 @@ def printable(text: str) -> str:
     """A text such as the name of a file, with escapes in place of what cannot be printed, or would steer a terminal."""
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text)
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in text)
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The one of some names that a misspelt ``word`` may be meant as, whatever its case."""
-    import difflib  # here, because few runs meet a misspelt word
+    """The name closest to a misspelt ``word``, whatever its case; None where none is close."""
+    import difflib
 
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold(), folded, n=1)
@@ -59,7 +54,7 @@ class Fault(NamedTuple):
 
     @property
     def as_warning(self) -> str:
-        """How it reads where the file is taken all the same."""
+        """The text of the fault where the file is accepted all the same."""
         return str(self._replace(problem=f"warning: {self.problem}"))
 
 
@@ -159,7 +154,7 @@ class Infeasible(NutdampError):
 
 
 class TooShort(Infeasible):
-    """The same, where a longer horizon would do: ``why``, and a ``cure`` that names one, where one is known."""
+    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names the horizon, if known."""
 
     def __init__(self, why: str, cure: str = "") -> None:
         self.why, self.cure = why, cure
