@@ -100,21 +100,21 @@ def _labelled(call: str, path: KeyPath, value: object) -> Setting:
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
-    """The tree with the settings in it, one after the other, and what makes a setting impossible."""
+    """The tree with the settings in it, one after the other, and the faults of impossible settings."""
     faults: list[Fault] = []
     for setting in settings:
         place = Place(setting=setting.label)
         try:
             if len(setting.path) > MAX_DEPTH:
                 raise _NoPlaceError(f"nested more than {MAX_DEPTH} levels deep")
-            node, found = setting.node()
+            node, problems = setting.node()
             root = _put(root, setting.path, (), node, place)
         except FaultyFile as wrong:
-            found = wrong.faults
+            problems = wrong.faults
         except _NoPlaceError as wrong:
-            found = [place.fault("", "", str(wrong))]
+            problems = [place.fault("", "", str(wrong))]
         # Lines and columns within a setting would be taken for those of the file.
-        faults += [Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in found]
+        faults += [Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in problems]
     return root, faults
 
 

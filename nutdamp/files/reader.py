@@ -1,12 +1,7 @@
-"""File -> Spacecraft, all faults at once; JSON Schema; shipped examples.
+"""Spacecraft files, YAML or JSON -> `Spacecraft`, in principal axes, SI and radians; all faults at once.
 
-Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians.
-
-Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
-
-JSON Schema of the spacecraft file, from the sections that read it.
-
-Spacecraft files to start from, which ship with the package: the built-in example, and those of ``configs/``.
+Faults are those of the spelling of keys, of types and ranges, and the findings of `rules`. The JSON Schema follows from
+the same sections. Files to start from ship with the package: the built-in example, and those of ``configs/``.
 """
 
 from __future__ import annotations
@@ -66,7 +61,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 @cache
 def _places() -> dict[str, Path]:
-    """Where the file of each name lies: an installed package holds the folder ``configs``, a checkout has it beside."""
+    """Paths of the shipped files by name: an installed package holds ``configs``, a checkout has it beside."""
     folders = (_PACKAGE / "data" / "configs", _PACKAGE.parent / "configs")
     shipped = next((sorted(folder.glob("*.yaml")) for folder in folders if folder.is_dir()), [])
     return {path.stem: path for path in (_PACKAGE / "data" / f"{BUILT_IN}.yaml", *shipped)}
@@ -83,7 +78,7 @@ def example_text(name: str = BUILT_IN) -> str:
 
 
 def example_subject(name: str) -> str:
-    """What the file of that ``name`` is about: the comment it begins with, up to the line that ends a sentence."""
+    """Subject of the file of that ``name``: the comment at its beginning, up to the line that ends a sentence."""
     lines: list[str] = []
     for line in example_text(name).splitlines():
         lines.append(line.removeprefix("#").strip())
@@ -105,16 +100,16 @@ def read_contents(
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
+    faulty = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
-        from nutdamp.files.loop_rules import loop_findings  # few files have one
+        from nutdamp.files.loop_rules import loop_findings
 
-        found += loop_findings(root)
+        faulty += loop_findings(root)
     problems: Problems = []
     contents = SpacecraftFile.read(root.plain(), problems)
-    judged = {finding.path for finding in found if not finding.at_key}
-    found += [Finding(path, problem) for path, problem in problems if path not in judged]
-    faults += [_placed(finding, root, name) for finding in found]
+    judged = {finding.path for finding in faulty if not finding.at_key}
+    faulty += [Finding(path, problem) for path, problem in problems if path not in judged]
+    faults += [_placed(finding, root, name) for finding in faulty]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
         warn(doubt)
     if faults or contents is None:
@@ -168,7 +163,7 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
 
 
 def _holds_names(annotation: Any) -> bool:
-    """Whether the type of a field is that of a mapping by names."""
+    """True where the type of a field is that of a mapping by names."""
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
@@ -178,11 +173,11 @@ Vector = NDArray[np.float64]
 Part = TypeVar("Part")
 
 Warn = Callable[[Fault], None]
-"""Is given each number that is hardly what was meant."""
+"""Receiver of each number that is hardly meant."""
 
 
 GROWS = {"grows": True, "decays": False, None: None}
-"""What ``dissipation.nutation`` says."""
+"""Values of ``dissipation.nutation``."""
 
 
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
@@ -236,7 +231,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
 
 
 def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
-    """What a section describes, where it is given: keys have the names of fields, but for ``others``."""
+    """The object that a section describes, where given: keys have the names of fields, but for ``others``."""
     if section is None:
         return None
     named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
@@ -312,10 +307,10 @@ def _tank(section: TankSection | None) -> Tank | None:
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
-    """What a thruster of ``thrust`` N makes of commands; None where that is full thrust from start to end."""
+    """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start to end."""
     if entry.impulse_bit is None and entry.valve is None and every is None:
         return None
-    from nutdamp.physics import thruster  # few files have any
+    from nutdamp.physics import thruster
 
     if entry.impulse_bit is not None:
         assert thrust is not None
@@ -447,9 +442,9 @@ def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, A
             properties[name]["default"] = key.default
     required = [name for name, key in section.fields().items() if key.default is REQUIRED]
     about = " ".join((section.__doc__ or "").split())
-    found: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
-    found |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
-    return {**found, "required": required} if required else found
+    schema: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
+    schema |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
+    return {**schema, "required": required} if required else schema
 
 
 def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
@@ -458,7 +453,7 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin is Annotated:
         return _ruled_schema(of[0], of[1:], parts)
     if origin in (Union, UnionType):
-        given = [_schema(one, parts) for one in of if one is not NoneType]
+        given = [_schema(part, parts) for part in of if part is not NoneType]
         return given[0] if len(given) == 1 else {"oneOf": given}
     if origin is Literal:
         return {"type": "string", **({"enum": list(of)} if len(of) > 1 else {"const": of[0]})}
@@ -470,7 +465,7 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin is list:
         return {"type": "array", "items": _schema(of[0], parts)}
     if origin is tuple:
-        entries = [_schema(one, parts) for one in of]
+        entries = [_schema(part, parts) for part in of]
         return {"type": "array", "prefixItems": entries, "minItems": len(of), "maxItems": len(of)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(of[1], parts)}
@@ -488,4 +483,4 @@ def _in_order(schema: Any, within: str = "") -> Any:
     if isinstance(schema, dict):
         names = schema if within in ("properties", "default") else sorted(schema)
         return {name: _in_order(schema[name], name if within != "properties" else "") for name in names}
-    return [_in_order(one, within) for one in schema] if isinstance(schema, list) else schema
+    return [_in_order(entry, within) for entry in schema] if isinstance(schema, list) else schema

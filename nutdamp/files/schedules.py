@@ -1,14 +1,11 @@
 """Schedules and command blocks as CSV, written and read.
 
-Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
+Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. The action of a channel of the
+spacecraft file follows from there; the columns of torque, impulse, propellant and date are only compared with it.
+Pulses of the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the
+schedule.
 
-Those are start_s (or t_s, the centre), on_time_s and channel. What a channel of the spacecraft file does follows from
-there; the columns of torque, impulse, propellant and date are looked at only to say where they contradict. Pulses of
-the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the schedule.
-
-Command blocks as CSV: ``plan --blocks`` writes them, ``simulate --blocks`` fires them, edited or not.
-
-Schedules as CSV, as ``plan`` writes them; `schedules` reads them.
+Command blocks are written by ``plan --blocks``; ``simulate --blocks`` fires them, edited or not.
 """
 
 from __future__ import annotations
@@ -216,7 +213,7 @@ TIMES = ("delay", "width")
 
 
 def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
-    """Whether delay or width of the blocks is given by counts alone, of the commands that the spacecraft file has."""
+    """True where delay or width of the blocks is given by counts alone, of the commands in the spacecraft file."""
     alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
     if alone and spacecraft.commands is None:
         problem = f"the spacecraft file has no commands to count the {name} in; expected the column {name}_s"
@@ -236,7 +233,8 @@ def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Blo
     if width == 0.0:
         column = "width_s" if "width_s" in cells else "width_counts"
         table.fault(line, column, "0 s fires nothing; expected a time above 0")
-    first, count = (_whole(table, line, cells, *one) for one in (("first_sun_pulse", LATEST), ("count", MOST_FIRED)))
+    first = _whole(table, line, cells, "first_sun_pulse", LATEST)
+    count = _whole(table, line, cells, "count", MOST_FIRED)
     every = _whole(table, line, cells, "every", LATEST) if cells.get("every") else 1
     if len(table.faults) > faults or None in (delay, width, first, count, every):
         return None
@@ -334,8 +332,8 @@ def read_plan(
     ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
     """
     pulses, warnings = read_pulses(path, spacecraft)
-    made = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
-    return made, (*warnings, *broken_limits(spacecraft, pulses))
+    plan = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
+    return plan, (*warnings, *broken_limits(spacecraft, pulses))
 
 
 class _ScheduleReader:
@@ -362,7 +360,7 @@ class _ScheduleReader:
     def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
         """The pulses as strong as they are one after the other, compared with what their rows say."""
         supply = Supply(self.spacecraft)
-        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda one: one[1].loaded[0]):
+        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda row: row[1].loaded[0]):
             fired = supply.fire(pulse, self.channels.get(pulse.channel))
             if line in self.commanded:
                 self._expect(line, self.commanded[line], fired)
@@ -372,8 +370,8 @@ class _ScheduleReader:
 
     def _instead(self, name: str) -> str:
         """The channel that is meant by a name not in the file, or all there are."""
-        found = nearest(name, list(self.channels))
-        return f"it has {', '.join(map(shown, self.channels))}" if found is None else f"did you mean {shown(found)}?"
+        close = nearest(name, list(self.channels))
+        return f"it has {', '.join(map(shown, self.channels))}" if close is None else f"did you mean {shown(close)}?"
 
     def _on_times(self, cells: Cells) -> str:
         """The on-times that the channel of a row can have, in words."""
@@ -488,7 +486,7 @@ class _ScheduleReader:
         return pulse
 
     def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
-        """What a row lacks whose torque or impulse does not follow from the spacecraft file."""
+        """Columns missing in a row whose torque or impulse does not follow from the spacecraft file."""
         impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
         columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
         if channel is not None:
@@ -517,8 +515,6 @@ class _ScheduleReader:
             self.table.warn(line, "steerable torque", text)
         rate = torquer.propellant_per_impulse
         return None if rate is None else rate * float(np.linalg.norm(impulse))
-
-    # --- cells -------------------------------------------------------------------------------------------------------
 
     def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
         """Three numbers; None where none is given, or one is a fault."""

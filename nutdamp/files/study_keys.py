@@ -68,7 +68,7 @@ def unit_kinds(kind: str) -> list[str]:
 
 
 def by_name(value: Mapping[str, object]) -> bool:
-    """Whether a mapping holds tolerances by thruster, and is not itself one."""
+    """True where a mapping holds tolerances by thruster, and is not itself one."""
     return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
 
 
@@ -114,7 +114,7 @@ class _Tolerance(Rule):
 
 def _json_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of a tolerance of ``kind``."""
-    texts = [{"type": "string", "pattern": pattern(one)} for one in unit_kinds(kind)]
+    texts = [{"type": "string", "pattern": pattern(unit)} for unit in unit_kinds(kind)]
     spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
     return {
         "type": "object",
@@ -239,21 +239,21 @@ def dispersions(
             return tolerance
         return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
 
-    found: dict[str, Any] = {}
-    for key in (one.name for one in fields(Dispersions)):
+    entries: dict[str, Any] = {}
+    for key in (field.name for field in fields(Dispersions)):
         entry = getattr(section, key)
         if key == "correlation":
-            found[key] = tuple((one, other, size) for one, other, size in entry)
+            entries[key] = tuple((first, second, size) for first, second, size in entry)
         elif isinstance(entry, ToleranceSection):
-            found[key] = entry.tolerance(key)
+            entries[key] = entry.tolerance(key)
         elif isinstance(entry, list | tuple):  # by axis
-            found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)
+            entries[key] = tuple(None if part is None else part.tolerance(key) for part in entry)
         elif entry is not None:  # by thruster
-            named = {name: one.tolerance(key) for name, one in entry.items()}
-            found[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
-    if "thrust" in found:
-        found["thrust"] = {name: fraction(name, tolerance) for name, tolerance in found["thrust"].items()}
-    return Dispersions(**found)
+            named = {name: part.tolerance(key) for name, part in entry.items()}
+            entries[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
+    if "thrust" in entries:
+        entries["thrust"] = {name: fraction(name, tolerance) for name, tolerance in entries["thrust"].items()}
+    return Dispersions(**entries)
 
 
 def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:
