@@ -1,4 +1,4 @@
-"""Command blocks as an operator loads them, and what they do to Sun angle, spin and nutation."""
+"""Command blocks to load, and their effect on Sun angle, spin and nutation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nutdamp.views.text import degrees, mass, moment, quantity
 
 
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
-    """The blocks of a flown schedule, and its figures before and after; ``velocity`` (3,) m/s is what it adds."""
+    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
     return Group(Text("Command blocks", style="bold"), blocks_table(flown), Text(), _effects(flown, velocity))
 
 
@@ -52,11 +52,11 @@ def blocks_table(flown: Flight, *, named: bool = False) -> Table:
 
 
 TOLD = 8
-"""Pulses of a block that a screen shows, at most: the first, the last, and every so many between."""
+"""Largest number of pulses of a block on a screen: the first, the last, and evenly some between."""
 
 
 def shown_pulses(made: Schedule) -> list[int]:
-    """Which pulses (from 0) a screen shows: all, but of long blocks only some."""
+    """Pulses (from 0) that a screen shows: all, but of long blocks only some."""
     if not made.blocks:
         return list(range(len(made)))
     shown: list[int] = []

@@ -1,4 +1,4 @@
-"""What ``budget`` writes: a row for each two thresholds, and the same as JSON."""
+"""Results of ``budget`` as CSV and JSON: a row for each pair of thresholds."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def _other(held: Held) -> dict[str, float | None] | None:
 
 
 def budget_csv(found: Budget) -> str:
-    """One row for each two thresholds; what is not known stays empty."""
+    """One row for each pair of thresholds; unknown values stay empty."""
     rows = ([*(number(value) for value in _numbers(one)), truth(one.meets_requirement), one.why] for one in found.held)
     return csv_text((*HEADER, "meets_requirement", "why"), rows)
 
 
 def budget_json(found: Budget) -> dict[str, Any]:
-    """How the nutation grows, and every row."""
+    """Growth of the nutation, and every row."""
     body = found.spacecraft
     return {
         **heading(body),

@@ -1,4 +1,4 @@
-"""The screen of ``budget``: how long until damping must begin, and what holding the nutation takes."""
+"""The screen of ``budget``: time until damping must begin, and cost of holding the nutation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SLOW = 0.1
 
 
 def budget_screen(found: Budget) -> RenderableType:
-    """Everything that ``budget`` shows."""
+    """All tables and notes of ``budget``."""
     body = found.spacecraft
     parts: list[RenderableType] = [header(body), Text()]
     if body.loop is not None and found.held:
@@ -34,7 +34,7 @@ def budget_screen(found: Budget) -> RenderableType:
 
 
 def _outlook(found: Budget) -> Iterator[str]:
-    """What the nutation does by itself, and when damping must begin."""
+    """Course of the nutation without firing, and the time when damping must begin."""
     body, limit = found.spacecraft, found.largest
     now = degrees(body.nutation)
     if body.growth == 0.0:
@@ -64,7 +64,7 @@ def _falls(found: Budget, limit: float) -> str:
 
 
 def _warnings(found: Budget) -> Iterator[str]:
-    """What of each pair of thresholds wastes propellant, of the present spin, and why there is no limit cycle."""
+    """Warnings of thresholds that waste propellant, of the present spin, and of a missing limit cycle."""
     body, seen = found.spacecraft, set()
     for one in found.held:
         named = f"{_pair(one)}: " if len(found.held) > 1 else ""
@@ -96,7 +96,7 @@ def _warnings(found: Budget) -> Iterator[str]:
 
 
 def _second(cycle: Cycle, other: Cycle) -> str:
-    """That there is another limit cycle, and what it takes."""
+    """Note on another limit cycle and its cost."""
     kept, takes = ("falls quiet between firings" if one.cycles > 0.0 else "never falls quiet" for one in (cycle, other))
     yearly = None if other.propellant is None else other.propellant * YEAR
     takes += f", with {other.pulses * DAY:.4g} pulses a day"
@@ -109,7 +109,7 @@ def _pair(one: Held) -> str:
 
 
 def _table(found: Budget) -> Table:
-    """A row for each two thresholds."""
+    """A row for each pair of thresholds."""
     tank, required = found.spacecraft.tank is not None, found.meets_requirement is not None
     names = [
         "start\ndeg",
@@ -143,7 +143,7 @@ def _days(time: float | None) -> str:
 
 
 def _notes(found: Budget) -> Table:
-    """What bounds the limit cycle, and how well the figures are known."""
+    """Notes on the bounds of the limit cycle, and on the accuracy of the figures."""
     table = facts()
     band = next((one.band for one in found.held if one.band is not None), None)
     if band is not None:

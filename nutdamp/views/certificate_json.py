@@ -1,4 +1,4 @@
-"""The file of ``plan --certificate``: all that it takes to check a least cost by hand, in SI.
+"""The file of ``plan --certificate``: all data to check a least cost by hand, in SI.
 
 It is about the transverse impulse of a symmetric body of small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)})
 and E2 = e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel

@@ -1,4 +1,4 @@
-"""What ``check --json`` gives: faults, or derived quantities, of each file."""
+"""Result of ``check --json``: faults, or derived quantities, of each file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
-    """A file that could not be read or says something that cannot be; ``doubts`` are warnings."""
+    """A file that could not be read or is faulty; ``doubts`` are warnings."""
     faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
     return {
         "file": name,
@@ -36,7 +36,7 @@ def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterab
 
 
 def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
-    """Each with its ``place`` as messages have it; line and column are null where that is no place in a file."""
+    """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
     return [
         {
             "place": fault.place,
@@ -98,7 +98,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
 
 
 def _valve_json(channel: Channel, spacecraft: Spacecraft) -> dict[str, Any]:
-    """What the shortest and the longest command of a channel give; nothing without a valve."""
+    """Pulses of the shortest and the longest command of a channel; nothing without a valve."""
     if channel.valve is None:
         return {}
     return {
@@ -146,7 +146,7 @@ def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """When Sun pulses come, and what command blocks can do by them; None without Sun or sensor in the file."""
+    """Times of the Sun pulses, and capability of command blocks; None without Sun or sensor in the file."""
     clock, commands = survey.sun_clock(spacecraft), spacecraft.commands
     if clock is None:
         return None
@@ -171,20 +171,20 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
 
 
 def _loop_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    """How far the channels of a loop are from feeding the nutation; nothing for a file without one."""
+    """Margins of the channels of a loop before they feed the nutation; nothing for a file without one."""
     if spacecraft.loop is None:
         return {}
     from nutdamp.control_loop.stability import margins
-    from nutdamp.views.loop_json import margins_json  # few files have one
+    from nutdamp.views.loop_json import margins_json
 
     return {"loop": margins_json(margins(spacecraft, spacecraft.loop))}
 
 
 def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """What a study could draw, sizes in SI or as factors, and what touches nothing that can fire."""
+    """Inputs that a study could draw, sizes in SI or as factors, and those without effect on any actuator."""
     if spacecraft.dispersions is None:
         return None
-    from nutdamp.montecarlo.inputs import reachable  # few files have dispersions
+    from nutdamp.montecarlo.inputs import reachable
 
     inputs, unused = reachable(spacecraft)
     from nutdamp.views.dispersion_json import correlation_json

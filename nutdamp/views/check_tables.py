@@ -1,4 +1,4 @@
-"""The screen of ``check``: derived quantities, what each channel can do, and the mounting angle for two pulses."""
+"""The screen of ``check``: derived quantities, capability of each channel, and the mounting angle for two pulses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from nutdamp.views.text import degrees, duration, in_degrees, moment, quantity, 
 
 
 def check_screen(spacecraft: Spacecraft) -> RenderableType:
-    """Everything that ``check`` shows of one valid file."""
+    """All tables of ``check`` for one valid file."""
     more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft))
     parts: list[RenderableType] = [header(spacecraft, more)]
     if spacecraft.channels:
@@ -57,7 +57,7 @@ def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    """When Sun pulses come, and how finely blocks are timed by them."""
+    """Times of the Sun pulses, and resolution of the timing of blocks by them."""
     clock, sensor, commands = survey.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
     if clock is None or sensor is None:
         return
@@ -81,13 +81,13 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def _view(sensor: SunSensor) -> str:
-    """From which angle to the spin axis to which it sees the Sun."""
+    """Range of angles from the spin axis in which the sensor sees the Sun."""
     low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
     return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
 
 
 def turns_table(found: Iterable[survey.Turns]) -> Table:
-    """By how much one pulse of a command block turns H."""
+    """Turn of H by one pulse of a command block."""
     table = columns(
         "command blocks\n", "least turn of H\ndeg", "by a pulse of\n", "largest turn\ndeg", "by a pulse of\n"
     )
@@ -124,7 +124,7 @@ def _consequences(found: survey.Consequence) -> list[str]:
 
 
 def channel_table(spacecraft: Spacecraft) -> Table:
-    """What each channel can do."""
+    """Torque, impulse and steps of each channel."""
     torque = "torque, file axes\nN m"
     table = columns("channel\n", torque, "on-time\n", "smallest step\ndeg", "largest step\ndeg", text=(torque,))
     for steps in survey.channel_steps(spacecraft):
@@ -140,7 +140,7 @@ def channel_table(spacecraft: Spacecraft) -> Table:
 
 
 def valve_table(spacecraft: Spacecraft) -> Table:
-    """What the shortest and the longest command of each channel give."""
+    """Pulses of the shortest and the longest command of each channel."""
     names = ("channel\n", "on-time\ncommanded", "effective\non-time", "impulse\nN m s", "centroid after\nthe start")
     table = columns(*names)
     alike: dict[tuple[str, ...], list[str]] = {}
@@ -153,7 +153,7 @@ def valve_table(spacecraft: Spacecraft) -> Table:
 
 
 def thrust_changes(spacecraft: Spacecraft) -> Iterator[str]:
-    """What cold nozzles and a tank in blowdown do to the thrust, a sentence or two each."""
+    """Effect of cold nozzles and of a tank in blowdown on the thrust, a sentence or two each."""
     if spacecraft.cold is not None:
         yield _cold(spacecraft.cold)
     if spacecraft.tank is not None:
@@ -183,7 +183,7 @@ def _on_times(channel: Channel) -> str:
 
 
 def _mounting(spacecraft: Spacecraft) -> RenderableType:
-    """Magnus' two fixed actuators, and which channels come nearest to them."""
+    """Magnus' two fixed actuators, and the channels that come nearest to them."""
     angle = survey.mounting_angle(spacecraft)
     lines = [
         f"Two fixed actuators, each pushing both ways, give both half pulses if mounted {math.degrees(angle):.2f} deg "
@@ -203,8 +203,8 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
 
 
 def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
-    """What the loop is, how far its channels are from feeding the nutation, and what feeds it already."""
-    from nutdamp.control_loop.stability import margins  # few files have a loop
+    """The loop, the margins of its channels before they feed the nutation, and the warnings of those that do."""
+    from nutdamp.control_loop.stability import margins
     from nutdamp.views.loop_tables import described, margin_table, warnings
 
     assert spacecraft.loop is not None
@@ -215,8 +215,8 @@ def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
 
 
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
-    """How far the true values may differ from the file's, and which tolerances touch nothing that can fire."""
-    from nutdamp.montecarlo.inputs import reachable  # few files have dispersions
+    """Differences allowed between true values and the file's, and tolerances without effect on any actuator."""
+    from nutdamp.montecarlo.inputs import reachable
     from nutdamp.views.dispersion_tables import unused_table
     from nutdamp.views.tolerance_tables import in_words, size_text
 

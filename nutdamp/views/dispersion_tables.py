@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "error of H, deg", "spin change, mrad/s", "propellant, g")
 NOTHING = 1e-9
-"""In these units, what is less is rounding."""
+"""Values, in these units, below which a number is rounding."""
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
-"""Of a case whose tank runs empty."""
+"""Note on a case whose tank runs empty."""
 
 
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
-    """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
+    """All tables of ``disperse``; ``nominal``: the nominal case, where its end is to be shown too."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
     parts.append(angles_note(results.study.model.spacecraft))
     if not results.exact:
@@ -86,7 +86,7 @@ def _percentiles(results: Results) -> Table:
 
 
 def _tails(found: Distribution, shares: Array) -> Iterator[tuple[str, list[float]]]:
-    """What these shares of the cases, and all, do not exceed; where values are negative, what they stay above too."""
+    """Quantiles of outputs by shares of the cases, and maxima; where values are negative, lower quantiles too."""
     upward, downward = found.maximum > 0.0, found.minimum < 0.0
     if upward or not downward:
         yield " ≤" * downward, [*found.quantiles(shares).tolist(), found.maximum]
@@ -95,7 +95,7 @@ def _tails(found: Distribution, shares: Array) -> Iterator[tuple[str, list[float
 
 
 def angles_note(body: Spacecraft) -> Text:
-    """From where the angles of H are counted in dispersed cases."""
+    """Note on the reference of the angles of H in dispersed cases."""
     aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
     said = f"Shift of H: from H at t = 0 of the same case; error of H: from {aim}."
     return Text(f"{said} The spin axis swings about H by the nutation.", style="dim")
@@ -112,7 +112,7 @@ def beside(value: float, largest: float) -> str:
 
 
 def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
-    """What is required, and whether as many cases comply as must."""
+    """The requirement, and the verdict on the number of cases that comply."""
     share, probability = results.met_fraction, results.probability
     if share is None:
         return [Text("The file has no requirement to meet.")]
@@ -132,7 +132,7 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[RenderableType]:
-    """How many cases break each cone, and how near the spin axis comes to its direction and how far from it."""
+    """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
     study = results.study
     nominal = study.nominal_aspects.tolist() if results.done and study.model.spacecraft.keep else ()
     for index, (keep, one) in enumerate(zip(study.model.spacecraft.keep, nominal, strict=False)):
@@ -147,7 +147,7 @@ def cone_lines(results: Results | LoopResults) -> Iterator[RenderableType]:
 
 
 def _emptied(results: Results) -> Iterator[RenderableType]:
-    """In how many cases the tank runs empty, where any does."""
+    """Number of cases in which the tank runs empty, where any does."""
     if results.emptied:
         share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
         yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
@@ -186,7 +186,7 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
 
 
 def _bounded(keep: Keep) -> list[str]:
-    """Which of the angles to the direction of a cone are bounded: the least, the largest."""
+    """Bounded ones of the angles to the direction of a cone: the least, the largest."""
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
 
 
@@ -206,7 +206,7 @@ def bounded(keep: Sequence[Keep], angles: Iterable[Iterable[float]]) -> list[flo
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:
-    """Names that share a reason are listed together."""
+    """Inputs without effect; names that share a reason are listed together."""
     table = facts()
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
@@ -217,7 +217,7 @@ def unused_table(unused: Iterable[Unused]) -> Table:
 
 
 def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
-    """Every input of one case: nominal, drawn, and by how much it is off."""
+    """Every input of one case: nominal, drawn, and the deviation."""
     inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
     for entry in drawn:
         unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
@@ -230,7 +230,7 @@ def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
 
 
 def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
-    """One case (from 0): every input, and how it and the nominal one end."""
+    """One case (from 0): every input, and the ends of it and of the nominal case."""
     inputs = inputs_table(study.model.inputs.drawn, draws)
     outcome = columns("", "nominal", "this case")
     cases: tuple[dict[str, float], ...] = {}, draws

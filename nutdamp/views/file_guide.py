@@ -15,9 +15,9 @@ from nutdamp.views.guide import FILE, Topic, TopicPart, TopicRows, meant
 
 
 class KeyGuide(NamedTuple):
-    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and what holds it.
+    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its declaration.
 
-    ``section`` is the model of what it holds, where that is a mapping or a list of mappings.
+    ``section`` is the model of its value, where that is a mapping or a list of mappings.
     """
 
     path: str
@@ -26,7 +26,7 @@ class KeyGuide(NamedTuple):
 
     @property
     def parent(self) -> str:
-        """Path of what it is in; empty at the root."""
+        """Path of the mapping it is in; empty at the root."""
         return self.path.rpartition(".")[0]
 
     @property
@@ -68,7 +68,7 @@ def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Ke
 def file_topic(below: str = "") -> Topic:
     """The keys of the file, or the one called ``below``, such as ``thrusters.force``, and those in it.
 
-    Raises BadRequest, which names what is near, where there is none.
+    Raises BadRequest, which names a near one, where there is none.
     """
     every = list(keys())
     if not below:
@@ -128,7 +128,7 @@ def _near(below: str, every: list[KeyGuide]) -> str:
 
 
 def _what(field: fields.Key) -> str:
-    """The units of a quantity, the words of a choice, or what else is to be written."""
+    """The units of a quantity, the words of a choice, or the form of another value."""
     quantity = _first(Quantity, (field.type,))
     if quantity is not None:
         factors = KINDS[quantity.kind].factors

@@ -1,4 +1,4 @@
-"""What ``fit --json`` says."""
+"""Result of ``fit --json``."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from nutdamp.views.plan_json import heading
 def fit_json(
     found: Fit, carried: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Estimates with sigmas, what the file says, the signals, the covariance of what dispersions draw; prospects.
+    """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions; prospects.
 
-    ``warnings`` of reading the record go into the notes, before all that makes the estimates doubtful.
+    ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
     """
     model = found.model
     return {

@@ -1,4 +1,4 @@
-"""The screen of ``fit``: what the telemetry tells, how well, and what it does not."""
+"""The screen of ``fit``: estimates, their accuracy, and limits of the telemetry."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ NOTHING = 1e-3
 """Sigmas below which a value, or a change, is zero."""
 
 MOST_PAIRS = 6
-"""Correlations that are named."""
+"""Largest number of correlations named."""
 
 SOURCES = {TOLD: "data", SHARED: "both", "file": "file"}
 
 
 def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> RenderableType:
-    """Everything that ``fit`` shows; the motion is that at ``time`` s, ``ahead`` what more telemetry would give."""
+    """All tables of ``fit``; the motion is that at ``time`` s, ``ahead`` the forecast with more telemetry."""
     rows = estimates(found, time)
     parts: list[RenderableType] = [Text(found.model.spacecraft.name, style="bold"), Text(), _record(found), Text()]
     parts += [Text(f"Estimates; the motion is that at t = {time:g} s", style="bold"), _table(rows), Text()]
@@ -48,7 +48,7 @@ def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> Rendera
 
 
 def _prospects(ahead: Outlook) -> Table:
-    """A row for each coast and probe pulse that was looked at."""
+    """A row for each coast and probe pulse of the forecast."""
     nutation = f"nutation\n{exact_percent(ahead.probability)}, deg"
     table = columns("coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", nutation, "comply\n%")
     for one in (*ahead.coasts, *ahead.probes):
@@ -61,7 +61,7 @@ def _prospects(ahead: Outlook) -> Table:
 
 
 def advice(ahead: Outlook) -> Iterator[str]:
-    """Whether more telemetry would pay: clauses."""
+    """Clauses on the value of more telemetry."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
     level = exact_percent(ahead.probability)
     today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
@@ -144,7 +144,7 @@ def _digits(one: Estimate) -> int:
 
 
 def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
-    """What the data do not tell, what is known together only, and what the file does not expect: clauses."""
+    """Clauses on parameters that the data do not determine, or only together, and on unexpected estimates."""
     yield from doubts(found)
     yield from untold(found.model.record)
     kept = [one.label for one in rows if one.source == "file"]

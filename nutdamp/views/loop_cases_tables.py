@@ -1,4 +1,4 @@
-"""The screens of ``disperse --loop``: what dispersed loops leave and take, how many settle; and one case alone."""
+"""The screens of ``disperse --loop``: final motion and cost of dispersed loops, share that settles; one case alone."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ NAMES = {
     "propellant": ("propellant, g", 1e3),
     "firings": ("firings", 1.0),
 }
-"""What people call the outputs, in few letters, and the factors to their units."""
+"""Short names of the outputs for people, and the factors to their units."""
 
 SHARED = ("settled", "nutation", "propellant")
-"""Outputs of which it is shown what they depend on."""
+"""Outputs whose dependence on the inputs is shown."""
 
 
 def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
-    """Everything that ``disperse --loop`` shows."""
+    """All tables of ``disperse --loop``."""
     study = results.study
     drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
@@ -122,7 +122,7 @@ def _dead_band(results: LoopResults) -> Text:
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:
-    """Which inputs what varies depends on."""
+    """Shares of the inputs in the variance of the outputs."""
     shares = {output: results.shares(output) for output in SHARED}
     inputs = [entry for entry in results.study.model.inputs.drawn if entry.sigma]
     if not inputs or not any(shares.values()):
@@ -173,7 +173,7 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
 
 
 def loop_case_screen(study: LoopStudy, case: int, flown: Flown) -> Group:
-    """One case (from 0), ``flown`` alone: every input, and how it ends beside the nominal one."""
+    """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
     table = columns("", "nominal", "this case")
     for output, *pair in zip(OUTPUTS, study.nominal.tolist(), values.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""What ``loop --json`` and ``verify --loop --json`` give."""
+"""Results of ``loop --json`` and ``verify --loop --json``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nutdamp.views.plan_json import final_json, heading, pulses_json, requiremen
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
-    """Firings with what was seen, how it ends, the dead band, and how far each channel is from feeding."""
+    """Firings with the nutation seen, final motion, dead band, and margin of each channel before it feeds."""
     run, body = plan.flown_run, plan.spacecraft
     seen = [{"decided_s": one.decided, "seen_deg": math.degrees(one.seen)} for one in run.fired]
     return {
@@ -39,7 +39,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
 
 
 def verified_json(found: LoopVerification) -> dict[str, Any]:
-    """What ``verify --loop --json`` gives: of each firing how far DOP853 differs."""
+    """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
     run = found.run
     return {
         **heading(run.spacecraft),
@@ -63,7 +63,7 @@ def verified_json(found: LoopVerification) -> dict[str, Any]:
 
 
 def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
-    """How far each channel is from feeding the nutation, at the start threshold."""
+    """Margin of each channel before it feeds the nutation, at the start threshold."""
     return [
         {
             "channel": one.channel,

@@ -1,4 +1,4 @@
-"""The screen of ``loop``, and what ``check`` says of a loop: verdict, firings, dead band, how far from feeding."""
+"""The screen of ``loop``, and the lines of ``check`` on a loop: verdict, firings, dead band, margins before feeding."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from nutdamp.views.plan_tables import header
 from nutdamp.views.text import degrees, duration, in_degrees, moment, most
 
 SHOWN = 40
-"""Firings in the table, at most."""
+"""Largest number of firings in the table."""
 
 
 def loop_screen(plan: LoopPlan) -> RenderableType:
-    """Everything that ``loop`` shows."""
+    """All tables of ``loop``."""
     run, decision = plan.flown_run, Decision(plan)
     parts: list[RenderableType] = [header(plan.spacecraft), Text(), Text(described(run.loop), style="bold")]
     why = stopped(run)
@@ -64,7 +64,7 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
 
 
 def stopped(run: Run) -> str:
-    """Why the loop was stopped; empty where it was flown to its end."""
+    """The reason why the loop was stopped; empty where it was flown to its end."""
     if not run.stop.fault:
         return ""
     count, after = len(run.fired), ""
@@ -86,7 +86,7 @@ def stopped(run: Run) -> str:
 
 
 def warnings(spacecraft: Spacecraft) -> Iterator[str]:
-    """What of the loop in the file will feed the nutation, or wastes propellant: before it is flown."""
+    """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is flown."""
     loop = spacecraft.loop
     if loop is None:
         return
@@ -135,7 +135,7 @@ def _outcome(plan: LoopPlan) -> Table:
 
 
 def _settled(run: Run) -> str:
-    """When the loop was first quiet."""
+    """The time when the loop was first quiet."""
     if run.settled is not None:
         return f"at {moment(run.settled)}"
     if not run.fired and not run.lost:
@@ -187,7 +187,7 @@ ROUNDING = 1e-12
 
 
 def margin_table(found: tuple[Margin, ...]) -> Table:
-    """How far each channel is from feeding the nutation."""
+    """Margin of each channel before it feeds the nutation."""
     table = columns("channel\n", "late\ndeg", "a firing leaves\n%", "growth in a period\n%", "delay margin\n")
     for one in found:
         margin = "none" if one.delay < 0.0 else duration(one.delay)

@@ -21,17 +21,17 @@ RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
-    """How the JSON of every command begins: the version, and the spacecraft."""
+    """Head of the JSON of every command: the version, and the spacecraft."""
     return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
 
 
 def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
-    """What the JSON file of any command holds where nothing that was asked for is feasible."""
+    """The JSON of any command where nothing requested is feasible."""
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
 def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
+    """The object of ``plan --json``; ``spoken`` are its words, such as the ``reason`` of the recommendation."""
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
@@ -84,7 +84,7 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:
-    """One plan; an infeasible one has no pulses, nulls, and why."""
+    """One plan; an infeasible one has no pulses, nulls, and the reason."""
     schedule, body = plan.schedule, plan.spacecraft
     return {
         "scheme": plan.scheme,
@@ -110,7 +110,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
 
 
 def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
-    """What is required, part by part, and what is left of it; None where nothing is, or without a schedule."""
+    """The requirement and the residuals, part by part; None where nothing is required, or without a schedule."""
     found = []
     for one in plan.held:
         if one.bound.required:
@@ -121,7 +121,7 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
 
 
 def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
-    """One pulse of ``body``; with an epoch ``utc`` is when it starts.
+    """One pulse of ``body``; with an epoch ``utc`` is its start.
 
     Through a valve start and on-time are those of the command, and the effective ones are there too.
     """
@@ -142,7 +142,7 @@ def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
-    """Where spin axis and angular momentum end, and what the body does from then on."""
+    """Final spin axis and angular momentum, and the motion from then on."""
     body, final = flown.spacecraft, flown.final
     return {
         "axis": direction_json(body, final.axis),
@@ -153,7 +153,7 @@ def final_json(flown: Flight) -> dict[str, Any]:
 
 
 def target_json(body: Spacecraft) -> dict[str, Any] | None:
-    """What is required of the end, in the form of `final_json`; None where nothing is."""
+    """The requirement on the end, in the form of `final_json`; None where nothing is required."""
     axis, spin = body.goal.axis, body.goal.spin
     if axis is None and spin is None:
         return None
@@ -161,7 +161,7 @@ def target_json(body: Spacecraft) -> dict[str, Any] | None:
 
 
 def aspects_json(found: tuple[Aspect, ...]) -> dict[str, Any]:
-    """How near the spin axis comes to each direction that is watched; nothing for a file that names none."""
+    """Range of angles of the spin axis from each direction that is watched; nothing for a file that names none."""
     entries = [
         {
             "name": one.keep.name,

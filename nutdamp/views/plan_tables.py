@@ -28,7 +28,7 @@ from nutdamp.views.text import MISSING, degrees, digits, duration, in_degrees, m
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:
-    """Everything that ``plan`` shows, the decision on top."""
+    """All tables of ``plan``, the decision on top."""
     decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
     found: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
     found += _reasons(compared)
@@ -89,7 +89,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
 
 
 def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
-    """What is required, and where it is not what the key of the file says."""
+    """The requirement, and the differences from the key of the file."""
     bounds = requirements.required(spacecraft)
     if bounds:
         yield verdicts.required(spacecraft)
@@ -98,7 +98,7 @@ def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
 
 
 def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
-    """What energy dissipation does to the nutation, and whether it is as slow as the model of it takes for granted."""
+    """Effect of energy dissipation on the nutation, and a note where it is too fast for its model."""
     if spacecraft.growth == 0.0:
         return "none: a sphere has no energy to lose"
     what = "grows" if spacecraft.growth > 0.0 else "decays"
@@ -108,7 +108,7 @@ def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
 
 
 def beyond_floors(spacecraft: Spacecraft) -> str:
-    """What the floors A|ω0| and C|ω3|β do not hold with, in words; empty where they hold."""
+    """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
     found = [
         *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
         *["dissipation"] * (spacecraft.growth != 0.0),
@@ -140,17 +140,17 @@ MILLISECONDS = 3
 Cell = Callable[[Plan], str]
 
 NOT = "✗"
-"""Sign before what is more than required."""
+"""Sign before a value above the requirement."""
 
 UNIT = re.compile(r"\d (\D+)$")
-"""What follows the last digit of a cell and a space."""
+"""Pattern of the unit behind the last digit of a cell and a space."""
 
 SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
 
 
 def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
-    """What the comparison shows of each feasible plan."""
+    """Rows of the comparison, with the values of each feasible plan."""
     (least, ratio), *others = ratios(compared.spacecraft)
     rows: list[tuple[str, Cell]] = [
         ("pulses", lambda plan: str(len(plan.pulses))),
@@ -207,7 +207,7 @@ def ratios(body: Spacecraft) -> Iterator[tuple[str, Cell]]:
 
 
 def _part(bound: Bound) -> tuple[str, Cell]:
-    """The row of one thing that is required: its bound, and what the plans leave of it."""
+    """The row of one part of the requirement: its bound, and the residuals of the plans."""
 
     def cell(plan: Plan) -> str:
         (found,) = (one for one in plan.held if one.bound == bound)
@@ -253,7 +253,7 @@ def _unit_first(name: str, cells: list[str]) -> tuple[str, list[str]]:
 
 
 def _reasons(compared: Comparison) -> list[RenderableType]:
-    """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
+    """Reasons why schemes are infeasible, and the remarks of the others; those that several share stand once."""
     schemes_of: dict[str, list[str]] = {}
     for plan in compared.plans:
         for remark in said(plan):
@@ -263,7 +263,7 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
 
 
 def pulse_table(plan: Plan) -> Table:
-    """One row a pulse: when, how long, which channel, and the nutation before and after.
+    """One row a pulse: time, duration, channel, and the nutation before and after.
 
     With an epoch the start in UTC takes the room of the centre. Through valves start and on-time are those of the
     command, and the effective on-time is shown beside it.
@@ -302,7 +302,7 @@ def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
 
 
 def flown_by(compared: Comparison) -> str:
-    """By which model schemes are flown beside each other, and which of them fire ideal impulses where others do not."""
+    """Model by which schemes are flown beside each other, with those that alone fire ideal impulses."""
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     return how if how != REAL_WIDTHS or not ideal else f"{how} (ideal impulses: {listed(ideal)})"

@@ -1,4 +1,4 @@
-"""What ``plan --robust --json`` adds to the plans."""
+"""Part of ``plan --robust --json`` beside the plans."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from nutdamp.views.plan_json import final_json, plan_json, target_json
 
 
 def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
-    """The candidates from the best down, the one to fly with its pulses, and what it costs against the usual one.
+    """The candidates from the best down, the one to fly with its pulses, and its cost against the usual one.
 
-    ``reason``: why that one, in words.
+    ``reason``: that of the choice, in words.
     """
     chosen, usual = found.chosen, found.usual
     return {

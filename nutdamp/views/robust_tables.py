@@ -1,4 +1,4 @@
-"""The screen of ``plan --robust``: candidates by how many cases comply, the one to fly and what it costs."""
+"""The screen of ``plan --robust``: candidates by the share of cases that comply, the one to fly and its cost."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from nutdamp.views.plan_tables import derived_table, pulse_table
 from nutdamp.views.text import in_degrees
 
 MOST_ROWS = 12
-"""Candidates that the table names."""
+"""Largest number of candidates in the table."""
 
 
 def robust_screen(found: RobustComparison) -> RenderableType:
-    """Everything that ``plan --robust`` shows."""
+    """All tables of ``plan --robust``."""
     body, decided, reason = found.comparison.spacecraft, found.decision, robust_verdicts.robust_reason(found)
     infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
@@ -51,7 +51,7 @@ def robust_screen(found: RobustComparison) -> RenderableType:
 
 
 def _fresh(found: RobustComparison) -> str:
-    """How the plan fares in new cases; nothing where none were flown."""
+    """Result of the plan in new cases; nothing where none were flown."""
     if found.fresh is None or found.chosen is None:
         return ""
     cases = found.fresh.cases
@@ -66,7 +66,7 @@ def _why(plan: Plan) -> str:
 
 
 def _fewer(found: RobustComparison) -> list[int]:
-    """With how many cases plans were given up."""
+    """Numbers of cases after which plans were given up."""
     return sorted({one.cases.samples for one in found.candidates} - {found.samples})
 
 

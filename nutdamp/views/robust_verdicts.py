@@ -1,4 +1,4 @@
-"""The words of a robust plan: why it, what it costs against the nominal one, which tolerances would have to shrink."""
+"""Words of a robust plan: its reason, its cost against the nominal one, and tolerances that would have to shrink."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def robust_reason(found: RobustComparison) -> str:
-    """Why the robust plan, or none."""
+    """The reason for the robust plan, or for none."""
     chosen, count = found.chosen, len(found.candidates)
     if chosen is None:
         return "no scheme is feasible"
@@ -69,7 +69,7 @@ def robust_cost(found: RobustComparison) -> str:
 
 
 def tightened(found: RobustComparison) -> str:
-    """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
+    """Tolerances that would have to shrink, and to which size, where too few cases comply; empty where not known."""
     from nutdamp.montecarlo.study import CONFIDENCE
     from nutdamp.views.tolerance_tables import in_words, stated_text
 
@@ -88,7 +88,7 @@ def tightened(found: RobustComparison) -> str:
 
 
 def left_name(spacecraft: Spacecraft) -> str:
-    """What a plan is to leave least of."""
+    """Name of the residual that a plan is to minimise."""
     return "nutation" if spacecraft.goal.axis is None else "nutation or error of H"
 
 

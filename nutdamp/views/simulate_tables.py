@@ -22,7 +22,7 @@ from nutdamp.views.verdicts import model_warnings
 
 
 def simulation_screen(simulation: Simulation) -> RenderableType:
-    """Everything that ``simulate`` shows."""
+    """All tables of ``simulate``."""
     flight, found, decided = simulation.shown, simulation.extremes, simulation.decision
     impulses, flown, pulses = simulation.impulses, simulation.flown, len(simulation.plan.pulses)
     how = f"{simulation.plan.scheme}, propagated by the {flight.model}"
@@ -61,7 +61,7 @@ def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
 
 
 def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
-    """What both models leave, and where they point, at ``until`` s."""
+    """Residuals and directions of both models at ``until`` s."""
     body = flown.spacecraft
     table = columns(f"at {moment(until)}", "by impulses (17)", "flown, real widths")
     rows = [

@@ -1,4 +1,4 @@
-"""What ``simulate --json`` gives."""
+"""Result of ``simulate --json``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nutdamp.views.plan_json import aspects_json, final_json, heading, pulses_js
 
 
 def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
-    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees."""
+    """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
     flight, found, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
     return {
@@ -46,5 +46,5 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
 
 
 def _turns(angles: tuple[float, float]) -> list[float]:
-    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, whatever lies between."""
+    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, for any range between."""
     return [math.degrees(full_turn(angle)) for angle in angles]

@@ -1,4 +1,4 @@
-"""What the actuators can do, before any plan: steps of each channel, and how well two of them suit a pair."""
+"""Capability of the actuators before any plan: steps of each channel, and best pair for two pulses."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Disturbance, Spacecraft
 
 SHORTEST, GRID = 1e-6, 600
-"""Part of the longest on-time from which on, and number of on-times among which, the largest step is looked for."""
+"""Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
 
 
 DIGITS = 9
-"""Of misses in rad, those that are no rounding: among equals the pair that is named first."""
+"""Digits of misses in rad that are no rounding: among equals the pair that is named first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class ChannelSteps:
 class SunPhases:
     """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
 
-    ``first`` is None where there is none, and ``refusal`` then says why.
+    ``first`` is None where there is none, and ``refusal`` is then the reason.
     """
 
     turn: float
@@ -58,7 +58,7 @@ class SunPhases:
 
 
 def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
-    """When Sun pulses come; None where the file says nothing of Sun and sensor."""
+    """The Sun pulses; None where the file has no Sun or no sensor."""
     if spacecraft.sun is None or spacecraft.sun_sensor is None:
         return None
     turn = block_model.spin_turn(spacecraft)
@@ -70,7 +70,7 @@ def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """By how much one pulse of a command block turns H at the spin of t = 0: least and most, rad, of which width, s."""
+    """Turn of H by one pulse of a command block at the spin of t = 0: least and most, rad, and their widths, s."""
 
     channel: Channel
     smallest: float
@@ -80,7 +80,7 @@ class Turns:
 
 
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
-    """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
+    """Turns of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
     found, commands, spin = [], spacecraft.commands, spacecraft.spin
     for channel in () if commands is None else usable(spacecraft):
         assert commands is not None
@@ -96,7 +96,7 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PairFit:
-    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is how far the second is off the direction needed."""
+    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is the error of direction of the second."""
 
     first: Channel
     second: Channel
@@ -117,7 +117,7 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """What a command of ``on_time`` s gives: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
+    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
 
     The centroid counts from the start of the command.
     """
@@ -130,7 +130,7 @@ class Acting:
 
 
 def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
-    """What the shortest and the longest command of each channel give, of those that have valves."""
+    """Pulses of the shortest and the longest command of each channel, of those that have valves."""
     found = []
     for channel in spacecraft.channels:
         if channel.valve is None:
@@ -144,7 +144,7 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
 
 
 def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
-    """Those among which the largest step is, s: the longest, but where the spin changes during the pulse."""
+    """On-times that include that of the largest step, s: the longest, but where the spin changes during the pulse."""
     if channel.axial == 0.0 or math.isinf(longest) or not 0.0 < longest > shortest:
         return [longest]
     return [*np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist(), longest]
@@ -185,7 +185,7 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """What one disturbance does in the long run.
+    """Effect of one disturbance in the long run.
 
     ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
     ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14).
@@ -212,7 +212,7 @@ RESONANT = 3.0
 
 
 def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
-    """What each disturbance does, in the order of the file."""
+    """Effect of each disturbance, in the order of the file."""
     return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
 
 
@@ -239,7 +239,7 @@ def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
 
 @dataclass(frozen=True, slots=True)
 class SpinAxis:
-    """Axis 3 as nature sees it.
+    """Principal axis 3 of inertia.
 
     ``kind`` of `stability.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `stability.growth`; ``tilt``
     (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the

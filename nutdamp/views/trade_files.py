@@ -53,7 +53,7 @@ def _row(index: int, front: Front, point: Point) -> list[str]:
 
 
 def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]:
-    """All fronts with their plans, as ``plan --json`` gives them."""
+    """All fronts with their plans, in the form of ``plan --json``."""
     numbers: dict[int, list[dict[str, Any]]] = {id(front): [] for front in found}
     for index, front, point in numbered(found):
         numbers[id(front)].append({"point": index, "horizon_s": point.horizon, **plan_json(point.plan)})
@@ -74,5 +74,5 @@ def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str]]
 
 
 def schedule_paths(folder: str, count: int) -> list[str]:
-    """Where the pulses of ``count`` points go."""
+    """Paths of the files of pulses of ``count`` points."""
     return [str(Path(folder) / f"point-{index}.csv") for index in range(1, count + 1)]

@@ -24,7 +24,7 @@ from nutdamp.views.verdicts import FARTHER
 
 
 def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableType:
-    """Everything that ``trade`` shows."""
+    """All tables of ``trade``."""
     return Group(header(spacecraft), *front_parts(spacecraft, found))
 
 
@@ -51,32 +51,32 @@ BELOW = (
     "The first-order least holds for small angles and for plans that leave no nutation: where a cost is below it, the "
     "plan leaves a little, or its flight at larger angles needs less than first order says."
 )
-"""Of points that cost less than their first-order least."""
+"""Note on points that cost less than their first-order least."""
 
 
 def _off(front: Front, point: Point) -> bool:
-    """Whether H ends visibly beside where a front has it."""
+    """True where H ends visibly beside its target of the front."""
     return front.shift == 0.0 and point.plan.flight.residual.axis_error > DAMPED_ANGLE
 
 
 OFF = (
     "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
 )
-"""Of points whose H ends a little beside where it is to end."""
+"""Note on points whose H ends a little beside its target."""
 
 
 def _below(front: Front, point: Point) -> bool:
-    """Whether it costs less than its first-order least, as the table writes both."""
+    """True where it costs less than its first-order least, as the table writes both."""
     least = front.least(point)
     return least is not None and point.cost < least and cost(point.cost, point.unit) != cost(least, point.unit)
 
 
 FAILS = "does not meet the requirement with nominal values"
-"""Of points that `fails` tells."""
+"""Note on points that do not meet the requirement of the file, or break a cone."""
 
 
 def fails(point: Point) -> bool:
-    """Whether it does not meet the requirement of the file, or breaks a cone."""
+    """True where it does not meet the requirement of the file, or breaks a cone."""
     return point.plan.meets_requirement is False
 
 
@@ -85,7 +85,7 @@ TOGETHER = 1e-3
 
 
 class _Better(NamedTuple):
-    """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier.
+    """A point better than the recommended plan: share of the cost saved, and s by which it ends earlier.
 
     ``only``: it meets the requirement, and the recommended plan does not.
     """
@@ -99,7 +99,7 @@ class _Better(NamedTuple):
 
     @property
     def how(self) -> str:
-        """What it is better in."""
+        """Words for its advantage."""
         if self.only:
             return "meets the requirement with nominal values, which the recommended plan does not"
         if self.saved:
@@ -128,13 +128,13 @@ def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
 
 
 def outdone(found: Sequence[Front], chosen: Plan) -> str:
-    """That a schedule of the fronts is better than the ``chosen`` one, for a headline; or nothing."""
+    """Headline that a schedule of the fronts is better than the ``chosen`` one; or nothing."""
     better = _better(found, chosen)
     return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
 
 
 def beats(found: Sequence[Front], chosen: Plan) -> str:
-    """Which schedule of the fronts is better than the ``chosen`` one, with the command that plans it; or nothing."""
+    """The schedule of the fronts that is better than the ``chosen`` one, with its command, in a sentence; or nothing."""
     better = _better(found, chosen)
     if better is None:
         return ""
@@ -159,7 +159,7 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
 
 
 def apart(found: Sequence[Front], chosen: Plan) -> str:
-    """Why the ``chosen`` plan may cost less than the schedules that are traded: it is of another scheme; or nothing."""
+    """The reason why the ``chosen`` plan may cost less than the schedules traded, by another scheme; or nothing."""
     points = {
         number: point
         for number, _, point in numbered(found)
@@ -193,11 +193,11 @@ def apart(found: Sequence[Front], chosen: Plan) -> str:
 ALIKE = (
     "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
 )
-"""Of a plan that costs as little less than the points as does not count."""
+"""Share of the cost by which a plan may be cheaper than the points and still count as equal."""
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """Whether a plan that saves that share of the cost, about none, ends clearly sooner and leaves H about as near."""
+    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H about as near."""
     shifts = [one.flight.residual.axis_error for one in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
@@ -225,12 +225,12 @@ def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> Renderab
 
 
 def _without_optimal(front: Front) -> str:
-    """Why a front has no points, or none of the scheme optimal."""
+    """The reason why a front has no points, or none of the scheme optimal."""
     return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
 
 
 def missing(spacecraft: Spacecraft, found: Sequence[Front]) -> list[str]:
-    """What a picture of the fronts does not show, and why: a sentence for each reason."""
+    """Sentences on fronts and points that a picture lacks, with the reasons."""
     pointing = spacecraft.goal.axis is not None
     fronts: dict[str, list[str]] = {}
     for one in found:
@@ -245,7 +245,7 @@ def schemes_of(found: Sequence[Front]) -> list[str]:
 
 
 def front_name(front: Front, *, pointing: bool) -> str:
-    """What is required of H, in words."""
+    """The requirement on H, in words."""
     if math.isinf(front.shift):
         return "H may end anywhere"
     if front.shift == 0.0:

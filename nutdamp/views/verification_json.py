@@ -1,4 +1,4 @@
-"""What ``verify --json`` gives."""
+"""Result of ``verify --json``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The screen of ``verify``: methods side by side, conservation, and what each imperfection costs."""
+"""The screen of ``verify``: methods side by side, conservation, and effect of each imperfection."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nutdamp.views.plan_tables import header
 from nutdamp.views.text import MISSING, in_degrees
 
 SHOWN = 1e-9 * math.pi / 180.0
-"""rad; differences that people see."""
+"""rad; smaller differences are shown as rounding."""
 
 
 BUDGET = "Error budget: what each imperfection leaves, alone"
@@ -25,7 +25,7 @@ BUDGET = "Error budget: what each imperfection leaves, alone"
 
 
 def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) -> RenderableType:
-    """Everything that ``verify`` shows of the schedule called ``name``."""
+    """All tables of ``verify`` for the schedule called ``name``."""
     missing = [Text(f"{method.name}: {method.missing}") for method in found.methods if method.missing]
     return Group(
         header(spacecraft),
@@ -46,7 +46,7 @@ def verification_screen(spacecraft: Spacecraft, name: str, found: Verification) 
 
 
 def verdict(found: Verification) -> str:
-    """Whether the integrations from outside confirm the flown motion, in a sentence."""
+    """Sentence whether the integrations from outside confirm the flown motion."""
     if not found.checks:
         return "NOT CONFIRMED: no independent integration was flown to the end."
     names = found.checks if found.agree else found.disagreeing
@@ -55,7 +55,7 @@ def verdict(found: Verification) -> str:
 
 
 def conservation(found: Verification) -> str:
-    """How far |H| and the energy change on coasts, and by what, in a sentence."""
+    """Sentence on the change of |H| and of the energy on coasts, and its cause."""
     both = found.momentum, found.energy
     if all(one.drift == 0.0 for one in both):
         return "On coasts |H| and the energy are constant to the last digit."
@@ -73,7 +73,7 @@ def _course(one: Conservation) -> str:
 
 
 def methods_table(found: Verification) -> Table:
-    """One row a way to fly the schedule: what it leaves, and how far it differs from the flown motion."""
+    """One row a way to fly the schedule: its residuals, and its difference from the flown motion."""
     left = ("nutation\nleft, deg", "shift of H\ndeg")
     table = columns("method\n", *left, "axis\ndiffers, rad", "H\nrad", "rates\nrelative")
     for method in found.methods:
@@ -90,7 +90,7 @@ def _difference(value: float | None) -> str:
 
 
 def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
-    """One row an imperfection: what it leaves, alone; then what is left without something that plans include."""
+    """One row an imperfection: residuals with it alone; then residuals without each effect that plans include."""
     aimed = spacecraft.goal.axis is not None
     table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
     for row in found.budget:
@@ -99,7 +99,7 @@ def budget_table(spacecraft: Spacecraft, found: Verification) -> Table:
 
 
 def budget_note(found: Verification, *, aimed: bool) -> str:
-    """What the rows that leave something out are, and why one thing may leave more than all; empty where neither is."""
+    """Note on rows that leave an effect out, and on one that leaves more than all; empty where neither is."""
     names = [row.name.removeprefix(WITHOUT) for row in found.budget if row.name.startswith(WITHOUT)]
     flown = next(row for row in found.budget if row.name == AS_FLOWN)
     single = [row for row in found.budget if row is not flown and not row.name.startswith(WITHOUT)]
@@ -122,7 +122,7 @@ def budget_note(found: Verification, *, aimed: bool) -> str:
 
 
 def _without(names: Sequence[str]) -> str:
-    """What rows without ``names`` are."""
+    """Description of the rows without ``names``."""
     return (
         f"The other rows are flown with {listed(names)}. Plans are checked by such flights, on which most schemes "
         f"correct them; a row 'without' shows what the same pulses leave on a body without "
