@@ -55,22 +55,22 @@ TOLD = 8
 """Largest number of pulses of a block on a screen: the first, the last, and evenly some between."""
 
 
-def shown_pulses(made: Schedule) -> list[int]:
+def shown_pulses(schedule: Schedule) -> list[int]:
     """Pulses (from 0) that a screen shows: all, but of long blocks only some."""
-    if not made.blocks:
-        return list(range(len(made)))
+    if not schedule.blocks:
+        return list(range(len(schedule)))
     shown: list[int] = []
-    for last, block in zip(accumulate(block.count for block in made.blocks), made.blocks, strict=True):
+    for last, block in zip(accumulate(block.count for block in schedule.blocks), schedule.blocks, strict=True):
         step = max(math.ceil((block.count - 1) / (TOLD - 1)), 1)
         shown += sorted({*range(last - block.count, last, step), last - 1})
-    return [index for index in shown if index < len(made)]  # a track may end before the last one
+    return [index for index in shown if index < len(schedule)]  # a track may end before the last one
 
 
 def _effects(flown: Flight, velocity: Vector | None) -> Table:
-    body, made, final = flown.spacecraft, flown.schedule, flown.final
+    body, schedule, final = flown.spacecraft, flown.schedule, flown.final
     before, after = flown.around_pulses()
     table = facts()
-    for name, pulse in (("first pulse", made.pulses[0]), ("last pulse", made.pulses[-1])):
+    for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
         start = pulse.loaded[0]
         dated = body.utc(start, 3)
         table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
@@ -82,7 +82,7 @@ def _effects(flown: Flight, velocity: Vector | None) -> Table:
     table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
     largest = float(max(before.nutation.max(), after.nutation.max()))
     table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
-    used = made.propellant
+    used = schedule.propellant
     tank = body.tank
     left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
     weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"

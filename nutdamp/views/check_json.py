@@ -77,15 +77,15 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
         "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": [
             {
-                "name": found.disturbance.name or None,
-                "precession_rad_s": found.precession,
-                "forced_tilt_deg": None if found.tilt is None else math.degrees(found.tilt),
-                "beat_deg": None if found.beat is None else math.degrees(found.beat),
-                "beat_period_s": found.beat_period,
-                "reaches": [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in found.resonant],
-                "spin_rate_rad_s2": found.spin_rate,
+                "name": consequence.disturbance.name or None,
+                "precession_rad_s": consequence.precession,
+                "forced_tilt_deg": None if consequence.tilt is None else math.degrees(consequence.tilt),
+                "beat_deg": None if consequence.beat is None else math.degrees(consequence.beat),
+                "beat_period_s": consequence.beat_period,
+                "reaches": [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in consequence.resonant],
+                "spin_rate_rad_s2": consequence.spin_rate,
             }
-            for found in survey.consequences(spacecraft)
+            for consequence in survey.consequences(spacecraft)
         ],
         **_loop_json(spacecraft),
         "dispersions": _dispersions_json(spacecraft),
@@ -104,13 +104,13 @@ def _valve_json(channel: Channel, spacecraft: Spacecraft) -> dict[str, Any]:
     return {
         "commands": [
             {
-                "on_time_s": one.on_time,
-                "effective_on_time_s": one.effective,
-                "impulse_Nms": one.impulse,
-                "centroid_s": one.centroid,
+                "on_time_s": pulse.on_time,
+                "effective_on_time_s": pulse.effective,
+                "impulse_Nms": pulse.impulse,
+                "centroid_s": pulse.centroid,
             }
-            for one in survey.acting(spacecraft)
-            if one.channel is channel
+            for pulse in survey.acting(spacecraft)
+            if pulse.channel is channel
         ]
     }
 
@@ -132,15 +132,15 @@ def _tank_json(tank: Tank | None) -> dict[str, Any]:
 
 
 def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    found = survey.spin_axis(spacecraft)
+    axis = survey.spin_axis(spacecraft)
     return {
-        "class": found.kind,
-        "squared_exponent_1_s2": found.exponent,
-        "growth_time_s": found.growth_time,
-        "tilt_deg": math.degrees(found.tilt),
-        "nutation_rate_body_rad_s": found.rates.body,
-        "nutation_rate_despun_rad_s": found.rates.despun,
-        "nutation_rate_inertial_rad_s": found.rates.inertial,
+        "class": axis.kind,
+        "squared_exponent_1_s2": axis.exponent,
+        "growth_time_s": axis.growth_time,
+        "tilt_deg": math.degrees(axis.tilt),
+        "nutation_rate_body_rad_s": axis.rates.body,
+        "nutation_rate_despun_rad_s": axis.rates.despun,
+        "nutation_rate_inertial_rad_s": axis.rates.inertial,
         "dissipation_growth_1_s": spacecraft.growth,
     }
 
@@ -159,13 +159,13 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
         "delay_max_deg": None if commands is None else spin * commands.delay_max,
         "channels": [
             {
-                "name": one.channel.name,
-                "smallest_turn_deg": math.degrees(one.smallest),
-                "smallest_turn_width_s": one.smallest_width,
-                "largest_turn_deg": math.degrees(one.largest),
-                "largest_turn_width_s": one.largest_width,
+                "name": turn.channel.name,
+                "smallest_turn_deg": math.degrees(turn.smallest),
+                "smallest_turn_width_s": turn.smallest_width,
+                "largest_turn_deg": math.degrees(turn.largest),
+                "largest_turn_width_s": turn.largest_width,
             }
-            for one in survey.turns(spacecraft)
+            for turn in survey.turns(spacecraft)
         ],
     }
 

@@ -31,8 +31,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
         parts += [Text(), turns_table(turns)]
     if survey.acting(spacecraft):
         parts += [Text(), valve_table(spacecraft)]
-    for said in thrust_changes(spacecraft):
-        parts += [Text(), Text(said)]
+    for change in thrust_changes(spacecraft):
+        parts += [Text(), Text(change)]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -44,14 +44,14 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
 
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    found = survey.spin_axis(spacecraft)
-    stable = f"stable, p² = {found.exponent:.4g} / s²" if found.exponent < 0.0 else "a sphere, no axis is special"
-    warning = " (not under dissipation)" if found.kind == "minimum" else ""
-    yield "spin axis", f"{found.kind} moment of inertia; {stable}{warning}"
-    body, despun, inertial = found.rates
+    spin = survey.spin_axis(spacecraft)
+    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
+    warning = " (not under dissipation)" if spin.kind == "minimum" else ""
+    yield "spin axis", f"{spin.kind} moment of inertia; {stable}{warning}"
+    body, despun, inertial = spin.rates
     yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
     if not spacecraft.inertia.aligned:
-        yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
+        yield "wobble", f"principal axis 3 is {degrees(spin.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
 
@@ -76,7 +76,7 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             yield "width", listed(widths, "or")
         else:
             yield "width", f"in steps of {duration(step_of_widths)}, {widths[0]} to {widths[-1]}"
-        every = listed([str(one) for one in commands.every], "or")
+        every = listed([str(count) for count in commands.every], "or")
         yield "block", f"up to {commands.max_count} pulses, one every {'spin' if every == '1' else f'{every} spins'}"
 
 
@@ -86,40 +86,40 @@ def _view(sensor: SunSensor) -> str:
     return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
 
 
-def turns_table(found: Iterable[survey.Turns]) -> Table:
+def turns_table(turns: Iterable[survey.Turns]) -> Table:
     """Turn of H by one pulse of a command block."""
     table = columns(
         "command blocks\n", "least turn of H\ndeg", "by a pulse of\n", "largest turn\ndeg", "by a pulse of\n"
     )
-    for one in found:
-        ends = ((one.smallest, one.smallest_width), (one.largest, one.largest_width))
+    for step in turns:
+        ends = ((step.smallest, step.smallest_width), (step.largest, step.largest_width))
         cells = [text for turn, width in ends for text in (in_degrees(turn), duration(width))]
-        table.add_row(one.channel.name, *cells)
+        table.add_row(step.channel.name, *cells)
     return table
 
 
 def disturbance_table(spacecraft: Spacecraft) -> Table:
     """The forced tilt, the beat, or the times to reach a cone at resonance."""
     table = columns("disturbance", "does", text=("does",))
-    for number, found in enumerate(survey.consequences(spacecraft), start=1):
-        name = found.disturbance.name or f"number {number}"
-        table.add_row(name, "; ".join(_consequences(found)))
+    for number, consequence in enumerate(survey.consequences(spacecraft), start=1):
+        name = consequence.disturbance.name or f"number {number}"
+        table.add_row(name, "; ".join(_consequences(consequence)))
     return table
 
 
-def _consequences(found: survey.Consequence) -> list[str]:
+def _consequences(consequence: survey.Consequence) -> list[str]:
     texts = []
-    if found.resonant or found.tilt is None:
-        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in found.resonant)
+    if consequence.resonant or consequence.tilt is None:
+        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in consequence.resonant)
         texts.append(f"resonant with the nutation: drives it to {reached}")
-    elif found.disturbance.transverse != 0.0:
+    elif consequence.disturbance.transverse != 0.0:
         texts.append(
-            f"forces a tilt of {degrees(found.tilt)}, precession at {quantity(found.precession, 'rad/s')}; "
-            f"from rest the nutation beats up to {degrees(found.beat)} "
-            f"every {duration(found.beat_period)}"
+            f"forces a tilt of {degrees(consequence.tilt)}, precession at {quantity(consequence.precession, 'rad/s')}; "
+            f"from rest the nutation beats up to {degrees(consequence.beat)} "
+            f"every {duration(consequence.beat_period)}"
         )
-    if found.spin_rate != 0.0:
-        texts.append(f"changes the spin by {found.spin_rate:.4g} rad/s²")
+    if consequence.spin_rate != 0.0:
+        texts.append(f"changes the spin by {consequence.spin_rate:.4g} rad/s²")
     return texts
 
 
@@ -144,9 +144,9 @@ def valve_table(spacecraft: Spacecraft) -> Table:
     names = ("channel\n", "on-time\ncommanded", "effective\non-time", "impulse\nN m s", "centroid after\nthe start")
     table = columns(*names)
     alike: dict[tuple[str, ...], list[str]] = {}
-    for one in survey.acting(spacecraft):
-        times = (duration(time) for time in (one.on_time, one.effective))
-        alike.setdefault((*times, f"{one.impulse:.4g}", duration(one.centroid)), []).append(one.channel.name)
+    for pulse in survey.acting(spacecraft):
+        times = (duration(time) for time in (pulse.on_time, pulse.effective))
+        alike.setdefault((*times, f"{pulse.impulse:.4g}", duration(pulse.centroid)), []).append(pulse.channel.name)
     for cells, channels in alike.items():
         table.add_row(", ".join(channels), *cells)
     return table
@@ -233,7 +233,7 @@ def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
         table.add_row(tolerance, kind, size, ", ".join(names))
     yield table
     given = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
-    pairs = [f"{in_words(one)} and {in_words(other)} {size:g}" for one, other, size in given]
+    pairs = [f"{in_words(first)} and {in_words(second)} {size:g}" for first, second, size in given]
     if pairs:
         yield Text(f"Correlated: {', '.join(pairs)}.")
     if unused:

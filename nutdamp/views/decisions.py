@@ -56,8 +56,8 @@ def _at_end(decision: Decision) -> str:
         if nominal:
             return verdicts.cases_verdict(cases.complying, cases.probability)
         return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
-    said = f"{'met' if nominal else 'NOT met'} with nominal values"
-    return f"{said}; dispersed cases were not flown" if decision.undispersed else said
+    result = f"{'met' if nominal else 'NOT met'} with nominal values"
+    return f"{result}; dispersed cases were not flown" if decision.undispersed else result
 
 
 def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
@@ -80,13 +80,13 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
 
 def _turned(decision: Decision) -> list[str]:
     """Unrequested change of axis and spin by a plan, where it is large enough to be mentioned."""
-    body, final, found = decision.plan.spacecraft, decision.flight.residual, []
+    body, final, changes = decision.plan.spacecraft, decision.flight.residual, []
     if body.goal.axis is None and final.momentum_shift > TURNED:
-        found.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
+        changes.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
     change = decision.final.spin - body.spin
     if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
-        found.append(f"changes the spin by {quantity(change, 'rad/s')}")
-    return found
+        changes.append(f"changes the spin by {quantity(change, 'rad/s')}")
+    return changes
 
 
 TURNED = math.radians(0.1)
@@ -130,16 +130,16 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
         dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
         cells = (limit(line.bound), size(line.bound, line.nominal), *dispersed, size(line.bound, line.margin))
         table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
-    for one in decision.aspects:
-        for bound, angle, left in cone_margins(one):
+    for aspect in decision.aspects:
+        for bound, angle, left in cone_margins(aspect):
             kept, none = left >= -SLACK, [""] * (cases is not None)
-            said = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
-            table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
+            words = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
+            table.add_row(f"axis from {aspect.keep.name}", bound, degrees(angle), *none, degrees(left), words)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        said = coloured(verdicts.VERDICT[cases.met], cases.met)
-        table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
+        words = coloured(verdicts.VERDICT[cases.met], cases.met)
+        table.add_row(COUNT, f"≥ {least}", "", share, margin, words)
     return table
 
 

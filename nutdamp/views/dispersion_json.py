@@ -56,17 +56,21 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
 
 
 def _percentiles(results: Results, output: str, column: str) -> dict[str, float | None]:
-    found = results.distribution(output)
-    nominal = None if found is None else float(results.study.outputs_of({})[OUTPUTS.index(output)])
-    return percentiles_json(column, nominal, found)
+    distribution = results.distribution(output)
+    nominal = None if distribution is None else float(results.study.outputs_of({})[OUTPUTS.index(output)])
+    return percentiles_json(column, nominal, distribution)
 
 
-def percentiles_json(column: str, nominal: float | None, found: Distribution | None) -> dict[str, float | None]:
+def percentiles_json(column: str, nominal: float | None, distribution: Distribution | None) -> dict[str, float | None]:
     """The ``nominal`` value of an output, and its distribution; nulls for unknown values."""
     names = ("nominal", "min", *(f"{percent:g}" for percent in PERCENTS), "max")
     spread: list[float | None] = [None] * (len(names) - 1)
-    if found is not None:
-        spread = [found.minimum, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
+    if distribution is not None:
+        spread = [
+            distribution.minimum,
+            *distribution.quantiles(np.array(PERCENTS) / 100.0).tolist(),
+            distribution.maximum,
+        ]
     values = zip(names, (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
 
@@ -156,13 +160,13 @@ def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any
 
 def _angles_of(study: Study, draws: dict[str, float]) -> dict[str, Any]:
     """Least and largest angle from the axis to the direction of each cone in one case; nothing without cones."""
-    found = study.aspects_of(draws)
-    return {} if found is None else angles_json(study.model.spacecraft, found)
+    angles = study.aspects_of(draws)
+    return {} if angles is None else angles_json(study.model.spacecraft, angles)
 
 
-def angles_json(spacecraft: Spacecraft, found: Array) -> dict[str, Any]:
+def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
     """Least and largest angle to the direction of each cone, of angles (m, 2) rad."""
     if not spacecraft.keep:
         return {}
-    named = zip(spacecraft.keep, np.degrees(found).tolist(), strict=True)
+    named = zip(spacecraft.keep, np.degrees(angles).tolist(), strict=True)
     return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}

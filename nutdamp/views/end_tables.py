@@ -80,13 +80,17 @@ def lasting(flown: Flight) -> str:
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 
-def add_aspects(table: Table, found: Iterable[Aspect]) -> None:
+def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
     """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it is broken."""
-    for one in found:
-        keep = one.keep
-        mark, bounds = "" if one.kept else "✗ ", bounds_text(keep)
-        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (one[1:3], one[3:5]))
-        seen = f"{near} to {far}" if one.largest_at > 0.0 or one.least_at > 0.0 else f"{degrees(one.least)} at t = 0"
+    for aspect in aspects:
+        keep = aspect.keep
+        mark, bounds = "" if aspect.kept else "✗ ", bounds_text(keep)
+        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
+        seen = (
+            f"{near} to {far}"
+            if aspect.largest_at > 0.0 or aspect.least_at > 0.0
+            else f"{degrees(aspect.least)} at t = 0"
+        )
         table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
 
 
@@ -97,10 +101,10 @@ def bounds_text(keep: Keep) -> str:
     return " and ".join(filter(None, (least, largest)))
 
 
-def cone_margins(one: Aspect) -> Iterator[tuple[str, float, float]]:
+def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:
     """Each bound of a cone, the angle that comes nearest to it, and its margin, rad."""
-    keep = one.keep
+    keep = aspect.keep
     if keep.least > 0.0:
-        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
+        yield f"≥ {most(keep.least)}", aspect.least, aspect.least - keep.least
     if keep.most < math.pi:
-        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest
+        yield f"≤ {most(keep.most)}", aspect.largest, keep.most - aspect.largest

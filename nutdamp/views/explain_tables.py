@@ -49,7 +49,10 @@ def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
     from nutdamp.views.guide import EQUATIONS
 
-    rows = [(one.number, "\n".join([f"{one.subject}: {one.place}", *one.remarks])) for one in EQUATIONS]
+    rows = [
+        (equation.number, "\n".join([f"{equation.subject}: {equation.place}", *equation.remarks]))
+        for equation in EQUATIONS
+    ]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 

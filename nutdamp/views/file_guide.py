@@ -100,14 +100,14 @@ def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
         return
     listed = get_origin(_plain(key.field.type)) is list
     title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
-    children = [one for one in every if one.parent == key.path]
+    children = [entry for entry in every if entry.parent == key.path]
     about = " ".join((key.section.__doc__ or "").split())
     yield TopicPart(title, (about, TopicRows(tuple(child.row for child in children))))
     below = [child for child in children if child.section is not None]
     if below and all(child.section is ToleranceSection for child in below):
-        alike = [one for one in every if one.parent == below[0].path]
+        alike = [entry for entry in every if entry.parent == below[0].path]
         names = ", ".join(child.name for child in below)
-        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(one.row for one in alike)),))
+        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(entry.row for entry in alike)),))
         return
     for child in below:
         yield from _sections(child, every)
@@ -143,9 +143,9 @@ def _what(field: fields.Key) -> str:
 def _first(kind: type[Quantity], parts: tuple[Any, ...]) -> Quantity | None:
     """The first ``kind`` within types and their annotations."""
     for part in parts:
-        found = part if isinstance(part, kind) else _first(kind, get_args(part))
-        if found is not None:
-            return found
+        match = part if isinstance(part, kind) else _first(kind, get_args(part))
+        if match is not None:
+            return match
     return None
 
 
@@ -159,7 +159,7 @@ def _plain(annotation: Any) -> Any:
     """A type without None and without annotations."""
     if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
         return annotation
-    return next((_plain(one) for one in get_args(annotation) if one is not type(None)), None)
+    return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
 
 
 def _either(names: Any) -> str:

@@ -197,9 +197,9 @@ def _equation(source: str, number: str) -> Topic:
 
     section = "." in number
     name = number if section else f"{source.upper() if source == 'k' else 'M'}({number})"
-    for one in EQUATIONS:
-        if one.number == name:
-            return one.topic
+    for equation in EQUATIONS:
+        if equation.number == name:
+            return equation.topic
     raise BadRequest(f"there is no equation {name}; there are M(1) to M(27), K(5) to K(15) and 24.4")
 
 

@@ -61,7 +61,7 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
 def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Derived quantities of a spacecraft at t = 0."""
     inertia = spacecraft.inertia
-    found = spacecraft.widest
+    motion = spacecraft.widest
     return {
         "name": spacecraft.name,
         "A_kgm2": inertia.A,
@@ -71,9 +71,9 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "moments_kgm2": list(inertia.moments),
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
-        "nutation_deg": math.degrees(found.nutation),
-        "body_cone_deg": math.degrees(found.body),
-        "space_cone_deg": math.degrees(found.space),
+        "nutation_deg": math.degrees(motion.nutation),
+        "body_cone_deg": math.degrees(motion.body),
+        "space_cone_deg": math.degrees(motion.space),
         "nutation_at_start_deg": math.degrees(spacecraft.tilt),
         "body_nutation_period_s": spacecraft.body_period,
         "inertial_nutation_period_s": spacecraft.inertial_period,
@@ -111,13 +111,13 @@ def plan_json(plan: Plan) -> dict[str, Any]:
 
 def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
     """The requirement and the residuals, part by part; None where nothing is required, or without a schedule."""
-    found = []
-    for one in plan.held:
-        if one.bound.required:
-            unit, scale = ("rad_s", 1.0) if one.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
-            left, most = scale * one.left, scale * one.bound.most
-            found.append({"part": one.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": one.met})
-    return found or None
+    parts = []
+    for part in plan.held:
+        if part.bound.required:
+            unit, scale = ("rad_s", 1.0) if part.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            left, most = scale * part.left, scale * part.bound.most
+            parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
+    return parts or None
 
 
 def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
@@ -160,20 +160,20 @@ def target_json(body: Spacecraft) -> dict[str, Any] | None:
     return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
 
 
-def aspects_json(found: tuple[Aspect, ...]) -> dict[str, Any]:
+def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
     """Range of angles of the spin axis from each direction that is watched; nothing for a file that names none."""
     entries = [
         {
-            "name": one.keep.name,
-            "least_deg": math.degrees(one.least),
-            "least_s": one.least_at,
-            "largest_deg": math.degrees(one.largest),
-            "largest_s": one.largest_at,
-            "min_deg": math.degrees(one.keep.least),
-            "max_deg": math.degrees(one.keep.most),
-            "kept": one.kept,
+            "name": aspect.keep.name,
+            "least_deg": math.degrees(aspect.least),
+            "least_s": aspect.least_at,
+            "largest_deg": math.degrees(aspect.largest),
+            "largest_s": aspect.largest_at,
+            "min_deg": math.degrees(aspect.keep.least),
+            "max_deg": math.degrees(aspect.keep.most),
+            "kept": aspect.kept,
         }
-        for one in found
+        for aspect in aspects
     ]
     return {"aspects": entries} if entries else {}
 

@@ -30,18 +30,18 @@ from nutdamp.views.text import MISSING, degrees, digits, duration, in_degrees, m
 def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the decision on top."""
     decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
-    found: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
-    found += _reasons(compared)
+    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
+    results += _reasons(compared)
     needless = verdicts.needless(compared)
     parts = [name] if needless is None else [name, Text.assemble(("No pulse needed: ", "bold"), f"{needless}.")]
     if decided is None:
         parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
-        return Group(*parts, *found)
+        return Group(*parts, *results)
     if decided.plan.pulses.blocks:
-        found += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
+        results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
-        found += [Text(), pulse_table(decided.plan)]
-    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *found)
+        results += [Text(), pulse_table(decided.plan)]
+    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *results)
 
 
 def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
@@ -52,7 +52,7 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
-    found = spacecraft.widest
+    motion = spacecraft.widest
     table = facts()
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
@@ -61,8 +61,8 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
         table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
     table.add_row("spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0))
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
-    cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
-    table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
+    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
+    table.add_row("nutation", f"{now}{degrees(motion.nutation)} = {cones}")
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
@@ -109,12 +109,12 @@ def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
 
 def beyond_floors(spacecraft: Spacecraft) -> str:
     """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
-    found = [
+    causes = [
         *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
         *["dissipation"] * (spacecraft.growth != 0.0),
         *["disturbances"] * bool(spacecraft.disturbances),
     ]
-    return " and ".join(found)
+    return " and ".join(causes)
 
 
 def _turning(spacecraft: Spacecraft) -> float:
@@ -191,7 +191,7 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
             rows.append((f"  {COUNT}", lambda plan: verdicts.share_text(compared.shares.get(plan))))
         rows += [_part(bound) for bound in requirements.required(compared.spacecraft)]
         cones = enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)])
-        rows += [_cone(at, one.keep.name, kept) for at, one in cones for kept, _, _ in cone_margins(one)]
+        rows += [_cone(at, cone.keep.name, kept) for at, cone in cones for kept, _, _ in cone_margins(cone)]
     return rows
 
 
@@ -210,8 +210,8 @@ def _part(bound: Bound) -> tuple[str, Cell]:
     """The row of one part of the requirement: its bound, and the residuals of the plans."""
 
     def cell(plan: Plan) -> str:
-        (found,) = (one for one in plan.held if one.bound == bound)
-        return size(bound, found.left) if found.met else f"{NOT} {size(bound, found.left)}"
+        (part,) = (part for part in plan.held if part.bound == bound)
+        return size(bound, part.left) if part.met else f"{NOT} {size(bound, part.left)}"
 
     return f"  {bound.part.label} {limit(bound)}", cell
 
@@ -220,8 +220,8 @@ def _cone(at: int, name: str, kept: str) -> tuple[str, Cell]:
     """The row of one bound of the cone with the number ``at``, and the angle at which the plans come nearest to it."""
 
     def cell(plan: Plan) -> str:
-        found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
-        return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in found)
+        angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
+        return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in angles)
 
     return f"  from {name} {kept}", lambda plan: cell(plan) if plan.feasible else MISSING
 
@@ -245,7 +245,7 @@ def _comparison(compared: Comparison) -> Table:
 
 def _unit_first(name: str, cells: list[str]) -> tuple[str, list[str]]:
     """The name of a row with the unit that all its numbers share, and these without it; else both as they are."""
-    units = {found.group(1) for found in map(UNIT.search, cells) if found}
+    units = {match.group(1) for match in map(UNIT.search, cells) if match}
     if len(units) != 1:
         return name, cells
     (unit,) = units

@@ -20,7 +20,7 @@ WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
 def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.void]:
     """One row a scheme; residuals are those of the flight through real widths. Unknown values are NaN or empty.
 
-    ``decided``: the decision on the recommended plan; ``met_fraction`` is the share that complies, where all have flown.
+    ``decided``: decision on the recommended plan; ``met_fraction``: share of cases that comply, where all have flown.
     """
     chosen, shares = None if decided is None else decided.plan, compared.shares
     rows = []

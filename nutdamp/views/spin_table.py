@@ -53,7 +53,7 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
     starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])
-    for pulse, index in zip(starts, np.searchsorted(begins, [one.loaded[0] for one in starts], "right"), strict=True):
+    for pulse, index in zip(starts, np.searchsorted(begins, [each.loaded[0] for each in starts], "right"), strict=True):
         fired.setdefault(max(int(index) - 1, 0), []).append(pulse)
     rows = []
     spins = pairwise(begins[: int(np.searchsorted(begins, last, "right")) + 1].tolist())
@@ -62,7 +62,11 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
         phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
-        several = ([one.channel for one in firing], map(_number, phases), (_number(one.loaded[1]) for one in firing))
+        several = (
+            [each.channel for each in firing],
+            map(_number, phases),
+            (_number(each.loaded[1]) for each in firing),
+        )
         times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
         rows.append([str(first + index), *times, *map(BETWEEN.join, several)])
     return csv_text(HEADER, rows)
@@ -82,9 +86,9 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
     for _ in range(2):  # where the spin falls, turns get longer
         flown = propagation.flown(body, schedule, until)
         if body.sun is not None and body.sun_sensor is not None:
-            found = sun_pulses(flown, until)
-            at_once = len(found) > 0 and found[0] < SAME * turn
-            first, begins = (1, found) if at_once else (0, np.append(0.0, found))
+            times = sun_pulses(flown, until)
+            at_once = len(times) > 0 and times[0] < SAME * turn
+            first, begins = (1, times) if at_once else (0, np.append(0.0, times))
         else:
             first, begins = 1, _turns(flown, until)
         if len(begins) > 2 and begins[-1] > last:
@@ -110,10 +114,10 @@ def _turns(flown: Flight, until: float) -> Vector:
     whole = 2.0 * math.pi * np.arange(math.floor(total[-1] / (2.0 * math.pi)) + 1)
     piece = np.clip(np.searchsorted(total, whole, "right") - 1, 0, len(gained) - 1)
     begin, length = times[piece], np.diff(times)[piece]
-    found = begin + length * (whole - total[piece]) / gained[piece]
+    ends = begin + length * (whole - total[piece]) / gained[piece]
     for _ in range(NEWTON):
-        found += (whole - total[piece] - _turned(flown, begin, found)) * length / gained[piece]
-    return np.asarray(found)
+        ends += (whole - total[piece] - _turned(flown, begin, ends)) * length / gained[piece]
+    return np.asarray(ends)
 
 
 def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:

@@ -81,7 +81,7 @@ class Turns:
 
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
     """Turns of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
-    found, commands, spin = [], spacecraft.commands, spacecraft.spin
+    steps, commands, spin = [], spacecraft.commands, spacecraft.spin
     for channel in () if commands is None else usable(spacecraft):
         assert commands is not None
         widths = commandable_widths(commands, channel)
@@ -90,8 +90,8 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
             each = precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
             least, most = int(np.argmin(each)), int(np.argmax(each))
             ends = (float(value[at]) for at in (least, most) for value in (each, widths))
-            found.append(Turns(channel, *ends))
-    return tuple(found)
+            steps.append(Turns(channel, *ends))
+    return tuple(steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ class Acting:
 
 def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
     """Pulses of the shortest and the longest command of each channel, of those that have valves."""
-    found = []
+    pulses = []
     for channel in spacecraft.channels:
         if channel.valve is None:
             continue
@@ -139,8 +139,8 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
             if 0.0 < on_time < math.inf:
                 thrust = channel.valve.thrust(on_time)
                 impulse = channel.strength * thrust.on_time
-                found.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
-    return tuple(found)
+                pulses.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
+    return tuple(pulses)
 
 
 def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
@@ -216,25 +216,25 @@ def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
     return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
 
 
-def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
+def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequence:
     inertia, spin = spacecraft.inertia, spacecraft.spin
     A, C = inertia.A, inertia.C
-    spin_rate = one.axial / C
-    if one.transverse == 0.0:
-        return Consequence(one, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
-    largest, period = response.beat(A, C, spin, one.transverse, one.rate)
+    spin_rate = disturbance.axial / C
+    if disturbance.transverse == 0.0:
+        return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+    largest, period = response.beat(A, C, spin, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
     if period > RESONANT * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
-            (mark, response.resonant_time(A, C, omega0, spin, one.transverse, mark))
+            (mark, response.resonant_time(A, C, omega0, spin, disturbance.transverse, mark))
             for mark in MARKS
             if mark > spacecraft.nutation
         )
-        return Consequence(one, None, None, None, period, times, spin_rate)
-    steady = abs(response.steady_response(A, C, spin, one.transverse, one.rate))
+        return Consequence(disturbance, None, None, None, period, times, spin_rate)
+    steady = abs(response.steady_response(A, C, spin, disturbance.transverse, disturbance.rate))
     tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
-    return Consequence(one, steady, float(tilt), float(swell), period, (), spin_rate)
+    return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,7 +94,7 @@ def lasting(value: float | None) -> str:
     """A time given in s that may be long: in s, hours, days or years."""
     if value is None or not math.isfinite(value):
         return quantity(value, "s")
-    unit, size = next(one for one in LONG if value < one[2])[:2]
+    unit, size = next(row for row in LONG if value < row[2])[:2]
     return quantity(value / size, unit)
 
 

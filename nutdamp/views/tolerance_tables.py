@@ -83,7 +83,7 @@ def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
 
 def _named(entries: list[Input]) -> tuple[str, str]:
     """Name and size of an input, or of correlated ones."""
-    name, size = (", ".join(map(text, entries)) for text in (lambda one: in_words(one.name), size_text))
+    name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
     return (f"{name} (correlated)" if len(entries) > 1 else name), size
 
 
@@ -107,7 +107,7 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
         table.add_row(Text(name, style="dim"), size, *cells)
     remainder = [
-        1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
+        1.0 - math.fsum(fractions[output] for fractions in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
         for output, _ in budgeted
     ]
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
@@ -134,7 +134,7 @@ def _dominating(results: Results) -> list[RenderableType]:
             entries = [first.inputs[row] for row in rows]
             key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
             sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        ranked = sorted(sums.items(), key=lambda one: -one[1])
+        ranked = sorted(sums.items(), key=lambda item: -item[1])
         leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
         leading = leading or [ranked[0][0]]
         verb = "dominates" if len(leading) == 1 else "dominate"

@@ -51,28 +51,28 @@ def needless(compared: Comparison) -> str | None:
     else:
         verdict = f"already count{count} as damped"
     lasting = f", up to the horizon of {duration(body.horizon)} too" if body.growth > 0.0 else ""
-    plans = "; the plans below reduce it further" if any(len(one.pulses) for one in compared.plans) else ""
+    plans = "; the plans below reduce it further" if any(len(plan.pulses) for plan in compared.plans) else ""
     return f"{' and '.join(there)} {verdict}{lasting}{plans}"
 
 
 def reason(compared: Comparison) -> str:
     """The reason for the recommended plan, or for none."""
-    found, body = compared.recommendation, compared.spacecraft
-    if found.plan is None and any(one.feasible for one in compared.plans):
+    recommendation, body = compared.recommendation, compared.spacecraft
+    if recommendation.plan is None and any(entry.feasible for entry in compared.plans):
         return "no plan can be sent as command blocks; with --timed pulses are timed one by one"
-    if found.plan is None:
-        untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
+    if recommendation.plan is None:
+        untried = _optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels))
         damped = requirements.subsides(body) if requirements.only_nutation(body) else None
         idle = "" if damped is None else f"; without a pulse the requirement is met from {quantity(damped, 's')} on"
         return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}{idle}"
-    if found.ground is Ground.ONLY:
+    if recommendation.ground is Ground.ONLY:
         return _only(compared)
-    cones = " and keep the cones" * bool(found.plan.kept)
-    cost = "propellant" if found.by_propellant else "impulse"
-    if found.ground is Ground.CASES:
-        return f"most cases comply of the {found.count} feasible plans{cones.replace(' and', ' that')}"
-    if found.standing is Standing.COMPLIES:
-        among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
+    cones = " and keep the cones" * bool(recommendation.plan.kept)
+    cost = "propellant" if recommendation.by_propellant else "impulse"
+    if recommendation.ground is Ground.CASES:
+        return f"most cases comply of the {recommendation.count} feasible plans{cones.replace(' and', ' that')}"
+    if recommendation.standing is Standing.COMPLIES:
+        among = f"of the {recommendation.count} plans that {_those(body, recommendation.plan)}{cones}"
         least, equal = f"least {cost} {among}", "; of those that cost as much within 0.1 %"
         then = {
             Ground.PULSES: f"{equal}, fewest pulses",
@@ -80,16 +80,16 @@ def reason(compared: Comparison) -> str:
             Ground.SHIFT: f"{equal}, least shift of H",
             Ground.END: f"{equal}, it ends first",
         }
-        return f"{least}{then.get(found.ground or Ground.COST, '')}"
-    meeting = found.standing is Standing.MEETS
+        return f"{least}{then.get(recommendation.ground or Ground.COST, '')}"
+    meeting = recommendation.standing is Standing.MEETS
     those = (
-        f"plans that {_meeting(found.plan, 'meet')}{cones}"
+        f"plans that {_meeting(recommendation.plan, 'meet')}{cones}"
         if meeting
         else f"feasible plans{cones.replace(' and', ' that')}"
     )
-    among = f"of the {found.count} {those}"
+    among = f"of the {recommendation.count} {those}"
     least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
-    if found.ground is Ground.NEAREST:
+    if recommendation.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if requirements.required(body) else f"{least} {among}"
     least_cost = f", within {degrees(requirements.DAMPED_ANGLE)}; of these least {cost}"
     then = {
@@ -99,22 +99,22 @@ def reason(compared: Comparison) -> str:
         Ground.SHIFT: f"{least_cost}, then least shift of H",
         Ground.END: f"{least_cost}, then it ends first",
     }
-    return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
+    return f"{least} {among}{then.get(recommendation.ground or Ground.LEFT, '')}"
 
 
 def _only(compared: Comparison) -> str:
     """The reason for a plan that had no rival of its standing."""
-    found, body = compared.recommendation, compared.spacecraft
+    recommendation, body = compared.recommendation, compared.spacecraft
     verdict = {
-        Standing.COMPLIES: _those(body, found.plan, plural=False),
-        Standing.MEETS: _meeting(found.plan, "meets"),
+        Standing.COMPLIES: _those(body, recommendation.plan, plural=False),
+        Standing.MEETS: _meeting(recommendation.plan, "meets"),
         Standing.MISSES: "",
-    }[found.standing or Standing.MISSES]
+    }[recommendation.standing or Standing.MISSES]
     if len(compared.plans) == 1:
         return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
-    cones = "keeps the cones" if found.plan is not None and found.plan.kept else ""
-    said = " and ".join(filter(None, ("can be commanded" * compared.restricted, verdict, cones)))
-    return f"the only {'' if verdict else 'feasible '}plan{f' that {said}' * bool(said)}"
+    cones = "keeps the cones" if recommendation.plan is not None and recommendation.plan.kept else ""
+    merits = " and ".join(filter(None, ("can be commanded" * compared.restricted, verdict, cones)))
+    return f"the only {'' if verdict else 'feasible '}plan{f' that {merits}' * bool(merits)}"
 
 
 def _those(body: Spacecraft, chosen: Plan | None = None, *, plural: bool = True) -> str:
@@ -137,33 +137,33 @@ def warnings(compared: Comparison, *, beside_verdict: bool = False) -> tuple[str
     Then the cones that the spin axis breaks; ``beside_verdict``: only the plans that keep them, since the verdict says
     the rest.
     """
-    found = compared.recommendation
-    if found.plan is None:
+    recommendation = compared.recommendation
+    if recommendation.plan is None:
         return ()
-    return (*_missed(found.plan, compared), *_cones_broken(found.plan, compared, beside_verdict))
+    return (*_missed(recommendation.plan, compared), *_cones_broken(recommendation.plan, compared, beside_verdict))
 
 
 def _cones_broken(chosen: Plan, compared: Comparison, beside_verdict: bool) -> Iterator[str]:
     """The cones that the spin axis breaks with the recommended plan, and the plans that keep them."""
-    keeping = [one.scheme for one in compared.plans if one.feasible and one.kept]
+    keeping = [entry.scheme for entry in compared.plans if entry.feasible and entry.kept]
     if beside_verdict:
         yield from [sentence(f"plans that keep all cones: {listed(keeping) or 'none'}")] * (chosen.kept is False)
         return
     those = f"{listed(keeping)} keep{'s' * (len(keeping) == 1)} all cones" if keeping else "no plan compared keeps it"
-    yield from (sentence(f"{strays(one)}; {those}") for one in chosen.aspects if not one.kept)
+    yield from (sentence(f"{strays(entry)}; {those}") for entry in chosen.aspects if not entry.kept)
 
 
 def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
     """Requirements that the recommended plan misses, and the causes."""
-    found, body = compared.recommendation, compared.spacecraft
-    if found.standing is Standing.COMPLIES:
+    recommendation, body = compared.recommendation, compared.spacecraft
+    if recommendation.standing is Standing.COMPLIES:
         return
     share = compared.shares.get(chosen)
     if share is not None and not share.met and chosen.standing is not Standing.MISSES:
         if chosen.kept is not False:  # else the cones are the reason
             yield _too_few(chosen, compared)
         return
-    required = found.standing is Standing.MISSES and bool(requirements.required(body))
+    required = recommendation.standing is Standing.MISSES and bool(requirements.required(body))
     does, do, what = ("damps", "damp", "nutation") if body.goal.axis is None else ("reaches", "reach", "target")
     if required:
         does, do, what = "meets", "meet", "requirement"
@@ -212,9 +212,9 @@ def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
         return ()
     required = {bound.part for bound in requirements.required(flown.spacecraft)}
     parts = []
-    for one in apart:
-        most = "a tenth of the requirement" if one.part in required else degrees(one.most)
-        parts.append(f"{one} (more than {most})")
+    for part in apart:
+        most = "a tenth of the requirement" if part.part in required else degrees(part.most)
+        parts.append(f"{part} (more than {most})")
     return (f"the impulse sum (17) and real widths differ by {' and '.join(parts)}. What is flown counts.",)
 
 
@@ -251,20 +251,20 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
 def _optimal_untried(compared: Comparison) -> bool:
     """True where there are channels that optimal can fire, and it was not compared."""
     able = any(channel.damps for channel in compared.spacecraft.channels)
-    return able and OPTIMAL.name not in {one.scheme for one in compared.plans}
+    return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
 
 
 def _unplanned(compared: Comparison) -> str:
     """Changes by planning with the disturbances."""
-    one, body = len(compared.plans) == 1, compared.spacecraft
-    made = f"The plan{' was' if one else 's were'} made without the disturbances of the file"
+    single, body = len(compared.plans) == 1, compared.spacecraft
+    planned = f"The plan{' was' if single else 's were'} made without the disturbances of the file"
     aware = compared.with_disturbances
     if aware is not None and aware.standing is Standing.COMPLIES:
-        return f"With --with-disturbances {aware.scheme} {_those(body, plural=False)}. {made}."
-    plans = f"{made}; --with-disturbances plans with them"
+        return f"With --with-disturbances {aware.scheme} {_those(body, plural=False)}. {planned}."
+    plans = f"{planned}; --with-disturbances plans with them"
     if aware is None:
         return f"{plans}."
-    return f"{plans}, but then too {'it does not ' if one else 'no scheme compared '}{_those(body, plural=one)}."
+    return f"{plans}, but then too {'it does not ' if single else 'no scheme compared '}{_those(body, plural=single)}."
 
 
 def _spent(plan: Plan) -> str:
@@ -291,11 +291,11 @@ def hints(compared: Comparison) -> tuple[str, ...]:
 
 def hint(compared: Comparison, other: Plan) -> str:
     """Advantage of one of the alternatives over the recommended plan, and its drawbacks."""
-    found = compared.recommendation
-    chosen = found.plan
+    recommendation = compared.recommendation
+    chosen = recommendation.plan
     assert chosen is not None
-    gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
-    better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
+    gains = [_gain(goal, other, chosen) for goal, plan in recommendation.alternatives.items() if plan is other]
+    better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, recommendation.by_propellant)}"
     worse = listed([*_drawbacks(other, chosen)])
     return f"{'; '.join(filter(None, (better, f'but it {worse}' * bool(worse))))}."
 
@@ -335,10 +335,10 @@ def _shift(plan: Plan) -> str:
     return degrees(plan.flown.momentum_shift)
 
 
-def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
+def _dearer(plan: Plan, other: Plan, by_propellant: bool) -> str:
     """Extra cost of a plan against another, with the share of it."""
     unit, what = ("kg", "propellant") if by_propellant else ("N m s", "impulse")
-    more, less = one.pulses.cost_in(unit), other.pulses.cost_in(unit)
+    more, less = plan.pulses.cost_in(unit), other.pulses.cost_in(unit)
     if more <= less * (1.0 + ROUNDING):
         return f"no more {what}"
     extra = mass(more - less) if by_propellant else quantity(more - less, unit)
