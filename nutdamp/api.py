@@ -157,7 +157,7 @@ class Trade:
 
 @dataclass(frozen=True, eq=False)
 class Dispersion:
-    """A schedule flown in many dispersed cases; ``core`` holds the distributions of what they leave."""
+    """A schedule flown in many dispersed cases; ``core`` holds the distributions of the results."""
 
     core: Results
     scheme: str
@@ -181,7 +181,7 @@ class Dispersion:
 
 @dataclass(frozen=True, eq=False)
 class LoopDispersion:
-    """The loop of a file flown in many dispersed cases; ``core`` holds what each does."""
+    """The loop of a file flown in many dispersed cases; ``core`` holds the result of each."""
 
     core: LoopResults
 
@@ -204,7 +204,7 @@ class LoopDispersion:
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """A schedule flown by independent methods: ``core`` holds them, what is conserved, and the error budget."""
+    """A schedule flown by independent methods: ``core`` holds them, the conserved quantities, and the error budget."""
 
     core: verification.Verification
     plan: Plan
@@ -406,8 +406,8 @@ def fit(
 ) -> Fitted:
     """Estimate a spacecraft from a CSV file of telemetry, as ``nutdamp fit`` does.
 
-    ``schedule``: what was fired during the record (`nutdamp.load_schedule`); ``sun_pulses``: a CSV file of their times.
-    Warns of columns that are ignored, and of what makes the estimates doubtful. Raises CannotRead, FaultyFile,
+    ``schedule``: pulses fired during the record (`nutdamp.load_schedule`); ``sun_pulses``: a CSV file of their times.
+    Warns of columns that are ignored, and of doubts about the estimates. Raises CannotRead, FaultyFile,
     BadRequest, and Infeasible where the record tells nothing.
     """
     from nutdamp.files.telemetry import read_telemetry
@@ -505,7 +505,7 @@ class Report:
 
     @property
     def good(self) -> bool:
-        """True where nothing is missed, not even what is not required."""
+        """True where nothing is missed, whether required or not."""
         return self.page.good
 
 
@@ -521,7 +521,7 @@ def report(
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
-    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: an HTML file; ``disperse``: in how many
+    ``spacecraft``: one of `load`, or an argument of `load`; ``output``: an HTML file; ``disperse``: in how many
     dispersed cases to fly the plans, as ``samples`` of `compare`; ``points``: how many horizons to try for each front
     of time against cost, none by default; ``control``: title, document, issue, author, date, as `controlled` takes
     them. Raises as `load` and `compare` do, BadRequest for another ending, MissingExtra without the extra plot,

@@ -15,7 +15,7 @@ class NutdampError(Exception):
 
 
 def printable(text: str) -> str:
-    """A text such as the name of a file, with escapes in place of what cannot be printed, or would steer a terminal."""
+    """A text such as the name of a file, with unprintable and control characters escaped."""
     if text.isprintable():
         return text
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in text)
@@ -48,7 +48,7 @@ class Fault(NamedTuple):
 
     @property
     def place(self) -> str:
-        """``FILE:LINE:COLUMN``; what has no line is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
+        """``FILE:LINE:COLUMN``; without a line it is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
         file = printable(self.file)
         return f"{file}:{self.line}:{self.column}" if self.line else file
 
@@ -68,7 +68,7 @@ MOST_SHOWN = 100
 
 
 class FaultyFile(NutdampError):
-    """An input file says something that cannot be; carries all its faults, in the order of the file."""
+    """An input file with impossible contents; carries all its faults, in the order of the file."""
 
     def __init__(self, faults: list[Fault]) -> None:
         self.faults = in_order(faults)
@@ -81,11 +81,11 @@ class FaultyFile(NutdampError):
 
 
 class BadRequest(NutdampError):
-    """A call or a command line that needs something impossible, whatever the spacecraft."""
+    """A call or a command line that asks for something impossible with any spacecraft."""
 
 
 class Unsuitable(BadRequest):
-    """A value of the spacecraft file that does not do for what is requested, and else is none of its faults.
+    """A value of the spacecraft file that does not suit the request, and else is none of its faults.
 
     ``where`` is the path of keys to it, such as ``("attitude", "epoch")``.
     """
@@ -121,7 +121,7 @@ class CannotRead(NutdampError):
 
 
 class CannotWrite(NutdampError):
-    """A file that could not be written; what was there before is kept."""
+    """A file that could not be written; its earlier contents are kept."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
@@ -150,7 +150,7 @@ class MissingPandas(NutdampError):
 
 
 class Infeasible(NutdampError):
-    """A scheme that cannot work with this spacecraft within its limits; the text says why."""
+    """A scheme that cannot work with this spacecraft within its limits; the text is the reason."""
 
 
 class TooShort(Infeasible):

@@ -64,10 +64,10 @@ KINDS: dict[str, Kind] = {
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }
-"""The kinds of quantity by name; ``number`` is for what has no unit, such as the parts of a quaternion."""
+"""The kinds of quantity by name; ``number`` has no unit, such as the parts of a quaternion."""
 
 LARGEST = 1e15
-"""Magnitudes above are refused, in SI: nothing physical, and what is computed from them could overflow."""
+"""Largest magnitude in SI: nothing physical is larger, and results of larger values could overflow."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
@@ -95,7 +95,7 @@ def parse(value: object, kind: str, *, bare: bool = False) -> float:
     """SI value of a quantity: a number, or a text with a unit of ``kind``.
 
     ``bare`` accepts a text that is only a number, as command lines give it; in a file that is a slip.
-    Raises ValueError, with a message that says what is wrong and what is allowed; also for NaN, infinite and
+    Raises ValueError, with a message on the fault and the values allowed; also for NaN, infinite and
     unphysically large values.
     """
     expected = KINDS[kind]
@@ -186,7 +186,7 @@ def path(name: str, value: str | PathLike[str], expected: str = "the name of a f
 
 
 def changes(value: Any) -> Mapping[str, object]:
-    """Keys and what to set them to; raises BadRequest."""
+    """Keys and their new values; raises BadRequest."""
     if value is None:
         return {}
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
@@ -252,7 +252,7 @@ def is_count(value: Any) -> bool:
 
 
 def as_given(value: object) -> str:
-    """A value as a message names it: what is short as it is, anything else by its type."""
+    """A value as a message names it: short ones in full, others by their type."""
     text = repr(value) if isinstance(value, str | Real | None) else ""
     kind = type(value)
     return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
@@ -276,7 +276,7 @@ def replaced(value: Record, fields: Mapping[str, object]) -> Record:
 
 
 def _array(kind: Any) -> bool:
-    """True for the type hint of three numbers; what it is made of differs between versions of numpy."""
+    """True for the type hint of three numbers; its parts differ between versions of numpy."""
     import numpy as np
     from numpy.typing import NDArray
 

@@ -85,7 +85,7 @@ def _looked_into(
 ) -> tuple[dict[str, Any], RenderableType]:
     """Results of the check of a file, for JSON and for the screen; warnings are added to ``doubts``.
 
-    Raises CannotRead, and FaultyFile also for what turns out to be wrong only when consequences are worked out.
+    Raises CannotRead, and FaultyFile, also for faults that appear only in derived quantities.
     """
     from nutdamp.errors import Fault, FaultyFile, NutdampError
     from nutdamp.views.check_json import checked_json
@@ -210,7 +210,7 @@ def _list() -> None:
 
 
 def _known(name: str) -> str:
-    """The ``name`` if there is such an example; a usage error says which one a misspelt name may mean."""
+    """The ``name`` if there is such an example; a usage error suggests the nearest one to a misspelt name."""
     from nutdamp.errors import nearest
     from nutdamp.files.reader import example_names
 

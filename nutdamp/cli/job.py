@@ -138,7 +138,7 @@ def parsed(
     aim: Aim | None = None,
     doubts: list[Fault] | None = None,
 ) -> Spacecraft:
-    """The spacecraft in what `source` gives; ``aim`` replaces the goal in it, warnings are added to ``doubts``."""
+    """The spacecraft in the text of `source`; ``aim`` replaces its goal, warnings are added to ``doubts``."""
     from nutdamp.files.reader import read_spacecraft
 
     def warn(doubt: Fault) -> None:
@@ -205,7 +205,7 @@ def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show ``what`` is under way, with the search that runs and the share spent of its budget of `work`.
+    """Show ``what`` is under way, with the search that runs and the share spent of its work budget.
 
     Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
     """
@@ -493,8 +493,8 @@ def deliver(
 ) -> None:
     """Write the files requested, and show results on standard output.
 
-    A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
-    those that are ``unsaved`` already. Raises CannotWrite.
+    A file that cannot be saved keeps back neither the others nor the results: it is reported at the end, together
+    with those that are ``unsaved`` already. Raises CannotWrite.
     """
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.

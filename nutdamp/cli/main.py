@@ -47,7 +47,7 @@ def run(group: click.Group) -> None:
     except click.ClickException as wrong:
         message = io.StringIO()
         wrong.show(file=message)
-        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as what steers a terminal
+        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as a control character
         status = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
@@ -60,7 +60,7 @@ def run(group: click.Group) -> None:
         _silence_stdout()
         status = UNREADABLE
     except OSError as wrong:
-        # Files name themselves and become CannotRead or CannotWrite; what has no name is standard output.
+        # Files name themselves and become CannotRead or CannotWrite; an error without a name is of standard output.
         if wrong.filename is not None:
             raise
         _silence_stdout()
@@ -105,7 +105,7 @@ def _open_streams() -> None:
 
 
 def _silence_stdout() -> None:
-    """Let what is still buffered for standard output go nowhere, so that Python does not stumble over it at exit."""
+    """Discard text still buffered for standard output, so that Python does not stumble over it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -141,7 +141,7 @@ def _upright(panel: BraillePanel) -> dict[int, str]:
 
 
 def framed(panel: BraillePanel, title: str, x: str, y: str) -> list[Text]:
-    """The panel with its title, its two scales and what they measure; all lines equally wide."""
+    """The panel with its title, its two scales and their quantities; all lines equally wide."""
     (left, low), (right, _) = panel.middle - panel.half, panel.middle + panel.half
     upright = _upright(panel)
     margin = max(len(text) for text in upright.values())

@@ -81,7 +81,7 @@ def overview(results: Results) -> Figure:
 
 
 def cases(results: Results) -> Figure:
-    """Histogram and distribution function of nutation and shift of H, with what is required of them."""
+    """Histogram and distribution function of nutation and shift of H, with their requirements."""
     figure = style.sheet(7.4, 5.6)
     _cases(figure, results)
     return figure

@@ -161,8 +161,8 @@ def _settle(
 ) -> Bbox | None:
     """Place of one label, which covers few of the curves and, if it can, none of the lines from other labels.
 
-    ``inked``: points of curves, and of stars and lines of other labels; ``window`` is that of the panel, ``points`` how
-    many pixels a point is.
+    ``inked``: points of curves, and of stars and lines of other labels; ``window`` is that of the panel, ``points`` the
+    number of pixels in a point.
     """
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)

@@ -51,7 +51,7 @@ STEPS = (1.0, 2.0, 3.0, 5.0)
 class View:
     """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
 
-    ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines stay what they are.
+    ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines remain so.
     """
 
     plane: Vector
@@ -250,7 +250,7 @@ def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:
             filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
             axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
             axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
-            if within is not rim:  # a rim that does not close: what it fills has an outline of its own
+            if within is not rim:  # a rim that does not close: its filled circle has its own outline
                 axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
     places = geometry.on_sky(plane, np.array([rolling.momentum, rolling.rotation, rolling.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")

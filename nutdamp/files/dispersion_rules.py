@@ -1,4 +1,4 @@
-"""Constraints between the dispersions of a spacecraft file, their correlations, and what they vary."""
+"""Constraints between the dispersions of a spacecraft file, their correlations, and the quantities they vary."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EACH_PULSE = ("thrust_per_pulse", "timing")
 def correlation_findings(
     facts: Facts, entries: Iterable[ToleranceEntry], thrusters: Iterable[str]
 ) -> Iterator[Finding]:
-    """Pairs of what is not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
+    """Pairs of inputs not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
 
     ``entries`` are the tolerances of the file, ``thrusters`` the names that may have some of their own.
     """
@@ -179,7 +179,7 @@ def _each(facts: Facts, key: str) -> list[KeyPath]:
 
 
 def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
-    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``.
+    """The kind of a tolerance and the depth of draws below its nominal value, three sigma or all, in SI of ``kind``.
 
     One in % is that of the ``nominal`` value, where that is known.
     """
@@ -241,7 +241,7 @@ def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
 
 
 def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
-    """The value that a tolerance is compared with, and what it is; None where it cannot be read, or nothing bounds."""
+    """The value that a tolerance is compared with, and its name; None where it cannot be read, or nothing bounds it."""
     if key in ("A", "C"):
         moments = moments_of(facts)
         return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)

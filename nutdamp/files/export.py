@@ -53,7 +53,7 @@ def basilisk_script(plan: Plan) -> str:
 
 
 def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
-    """Rows of the schedule: what fires, how long, torque; an ideal impulse lasts no time and gives its impulse."""
+    """Rows of the schedule: channel, duration, torque; an ideal impulse lasts no time and gives its impulse."""
     pulses, axes = plan.pulses, body.inertia.axes
     longest = default_step(body, pulses, pulses.end)
     edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})

@@ -1,7 +1,7 @@
 r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once, and as JSON Schema.
 
-A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of what YAML and
-JSON hold, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s. The kinds of values
+A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of YAML and
+JSON values, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s. Kinds of values
 in a spacecraft file follow: quantities with units and bounds, directions, lists, names, dates, counts.
 """
 
@@ -32,7 +32,7 @@ REQUIRED: Any = ...
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of a section: the ``type`` of what it holds, what it means, and what holds where it is left out."""
+    """A key of a section: the ``type`` of its value, its description, and its default."""
 
     type: Any
     default: Any
@@ -129,7 +129,7 @@ class Section:
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``, as YAML gives it; what is wrong is added to ``problems``.
+        """The section in ``value``, as YAML gives it; problems are added to ``problems``.
 
         Unknown keys and empty values are not looked for here.
         """
@@ -209,7 +209,7 @@ def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Probl
 
 
 def _meant(parts: tuple[Any, ...], value: Any) -> Any:
-    """The type of a union that a value is of: a section for a mapping, else the other; None is for what is left out."""
+    """The type of a union that a value is of: a section for a mapping, else the other; None is for a key left out."""
     types = [part for part in parts if part is not NoneType]
     return next((kind for kind in types if isinstance(value, dict) == (section_of(kind) is kind)), types[0])
 
@@ -234,7 +234,7 @@ def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyP
 
 
 SMALLEST = 1e-15
-"""Values that must be above zero and are smaller count as zero, in SI: what is divided by them could overflow."""
+"""Smaller values that must be above zero count as zero, in SI: a division by them could overflow."""
 
 _BOUNDS = {
     "minimum": (operator.ge, "of at least"),
@@ -252,7 +252,7 @@ class Quantity(Rule):
         self.kind, self.bounds = kind, bounds
 
     def check(self, value: object) -> float:
-        """SI value; raises ValueError, which says what would be right."""
+        """SI value; raises ValueError with the values allowed."""
         result = parse(value, self.kind)
         if not self._allows(result):
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{self._degrees(value)}")
@@ -300,7 +300,7 @@ class AxialShorthand(Rule):
     single = Quantity("torque")
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """Three components; raises ValueError, which says what would be right."""
+        """Three components; raises ValueError with the form allowed."""
         return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -309,7 +309,7 @@ class AxialShorthand(Rule):
 
 
 class ListOf(Rule):
-    """Annotation of a list of lists, each ``written`` so, that says how a single one is put into a list."""
+    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
 
     def __init__(self, written: str) -> None:
         self.written = written
@@ -333,7 +333,7 @@ class OrWord(Rule):
         self.word = word
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The angles or the word; raises ValueError, which says what would be right."""
+        """The angles or the word; raises ValueError with the forms allowed."""
         if value == self.word:
             return value
         if not isinstance(value, list):
@@ -349,7 +349,7 @@ class _DateAndTime(Rule):
     """Annotation of a text that is a date and a time."""
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The text as it is; raises ValueError for what is no date and time."""
+        """The text as it is; raises ValueError unless it is a date and a time."""
         text = inner(value)
         try:
             if text is not None:

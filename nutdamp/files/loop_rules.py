@@ -42,7 +42,7 @@ LARGEST_BIAS, FARTHEST = 1e3, 1e3
 """m/s² and m of an accelerometer beyond which it is none of a spacecraft: its nutation would be lost in rounding."""
 
 SCALES = (0.1, 10.0)
-"""Sizes of scales between which a sensor shows what it measures."""
+"""Sizes of scales between which a sensor still measures."""
 
 SENSOR: KeyPath = ("loop", "sensor")
 
@@ -192,7 +192,7 @@ def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
 
 
 def _lags(facts: Facts, period: float) -> Iterator[Finding]:
-    """Times after which what the sensor shows is of no use; ``period`` s is that of the nutation in the body."""
+    """Delays after which the signal of the sensor is of no use; ``period`` s is that of the nutation in the body."""
     lags = ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle"))
     for path, most in (*((path, LATE) for path in lags), (("loop", "min_interval"), LONGEST_WAIT)):
         value = facts.number("time", *path)

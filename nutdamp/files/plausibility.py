@@ -22,7 +22,7 @@ LOOKED_AT = 4000
 
 
 class Foreign(NamedTuple):
-    """A kind of file: the ``pattern`` of its first lines, what it ``is``, and what to do with it."""
+    """A kind of file: the ``pattern`` of its first lines, its description ``is_``, and its cure."""
 
     pattern: str
     is_: str
@@ -99,7 +99,7 @@ ANGLES: tuple[KeyPath, ...] = (("state", "phase"), ("goal", "azimuth"), ("goal",
 
 
 def doubts(root: Node) -> Iterator[Finding]:
-    """Numbers that are beyond what can be meant in SI."""
+    """Numbers beyond any plausible value in SI."""
     facts = Facts(root)
     for path in ANGLES:
         value = _bare(facts, path)

@@ -90,9 +90,9 @@ def example_subject(name: str) -> str:
 def read_contents(
     text: str, name: str, settings: Sequence[Setting] = (), warn: Callable[[Fault], None] = lambda _: None
 ) -> SpacecraftFile:
-    """The checked contents of a spacecraft file with ``settings`` in place of what it says.
+    """The checked contents of a spacecraft file, with ``settings`` replacing its values.
 
-    ``warn`` is given what is hardly meant. Raises `FaultyFile` with all faults, sorted by place.
+    ``warn`` is given each implausible number. Raises `FaultyFile` with all faults, sorted by place.
     """
     other = foreign(text.removeprefix("\ufeff"))
     if other is not None:
@@ -118,7 +118,7 @@ def read_contents(
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
-    """The finding with its place; what is missing is reported at the key of its parent."""
+    """The finding with its place; a missing key is reported at the key of its parent."""
     path = finding.path
     if finding.at_key:
         place = root.key_place_of(path)
@@ -132,7 +132,7 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
 def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
     """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
 
-    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too; any
+    A misspelt key is put right in the tree, so that one slip makes one fault and its value is checked too; any
     other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
     names, of entries of the ``model``.
     """
@@ -188,7 +188,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in the text of a file; ``name`` is that of the file in messages.
 
-    ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
+    ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
     """
     contents = read_contents(text, name, settings, warn)
     inertia = _inertia(contents.inertia)
@@ -251,7 +251,7 @@ def _inertia(section: InertiaSection) -> Inertia:
 def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/(I3|ω3|), Magnus 1970 (19).
 
-    So θ is the angle between H and the spin axis at t = 0, whatever I1 and I2 are.
+    So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
     """
     if contents.omega0 is not None:
         rates: Vector = inertia.axes.T @ np.array(contents.omega0)

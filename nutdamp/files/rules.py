@@ -1,6 +1,6 @@
 """Constraints between the keys of a spacecraft file: body, motion, goal, disturbances, limits and directions in space.
 
-The rules read the raw tree (`Facts`) and skip what cannot be read, so that they speak up whatever else is wrong.
+The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other fault.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Facts:
         return None if None in numbers else np.array(numbers, dtype=np.float64)
 
     def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and what is there."""
+        """Keys or positions at ``path``, and their nodes."""
         node = self.root.get(*path)
         return [] if node is None else list(node.children())
 
@@ -192,7 +192,7 @@ def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
 def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     """Faults of a direction, by two angles or by a word."""
     if not facts.has("attitude") and facts.has(*path):
-        yield Finding(path, NO_ATTITUDE, True)  # at the key: what is written there is judged too
+        yield Finding(path, NO_ATTITUDE, True)  # at the key, since its value is judged too
     declination = facts.number("angle", *path, 1)
     if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
         angle = f"{math.degrees(declination):g} deg"
@@ -383,7 +383,7 @@ def spin_axis(facts: Facts) -> Vector:
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
-    """The rate about principal axis 3, and where it is; what rounding leaves of a transverse rate is zero."""
+    """The rate about principal axis 3, and its path; a transverse rate that is rounding counts as zero."""
     omega0, tensor = facts.vector("rate", 3, "omega0"), tensor_of(facts)
     if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
         return (), None
@@ -411,7 +411,7 @@ def _disturbances(facts: Facts) -> Iterator[Finding]:
             turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
             kind = disturbance_kind(facts.text(*path, "kind"), bool(turning))
             if facts.has(*path, "kind") and facts.text(*path, "kind") is None:
-                kind = ""  # what it is cannot be read
+                kind = ""  # unreadable
             yield from _turning(facts, path, kind, turning)
             yield from _disturbing_torque(facts, path, kind)
 

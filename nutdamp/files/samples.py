@@ -26,7 +26,7 @@ SHORTEST = 12
 
 
 def cone_columns(spacecraft: Spacecraft) -> list[str]:
-    """Headings of the least and the largest angle to the direction of each cone: its name with what they are."""
+    """Headings of the least and the largest angle to the direction of each cone."""
     names = [keep.name.replace(" ", "_") for keep in spacecraft.keep]
     return [f"{name}_{angle}" for name in names for angle in ("least_deg", "largest_deg")]
 

@@ -87,7 +87,7 @@ def pulses_array(flown: Flight) -> NDArray[np.void]:
 
 
 def pulses_csv(flown: Flight) -> str:
-    """The rows of `pulses_array` as CSV; what is not known is empty."""
+    """The rows of `pulses_array` as CSV; unknown values are empty."""
     table = pulses_array(flown)
     texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
     return csv_text(table.dtype.names or PULSES_HEADER, texts)
@@ -120,7 +120,7 @@ LATEST = 100_000
 
 
 def blocks_csv(flown: Flight) -> str:
-    """The blocks of a flown schedule, one row each; what is not known is empty."""
+    """The blocks of a flown schedule, one row each; unknown values are empty."""
     body, commands = flown.spacecraft, flown.spacecraft.commands
     _, after = flown.around_pulses()
     pulses, rows = flown.schedule.pulses, []
@@ -280,7 +280,7 @@ def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int
 
 
 def _against_commands(table: Table, line: int, cells: Cells, block: Block, spacecraft: Spacecraft) -> None:
-    """Warn of what cannot be commanded: it is flown as given."""
+    """Warn of pulses that cannot be commanded: they are flown as given."""
     commands = spacecraft.commands
     if commands is None:
         return
@@ -310,13 +310,13 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
 
 
 AGREES = 1e-6
-"""Relative difference up to which columns of a schedule say the same."""
+"""Relative difference up to which columns of a schedule agree."""
 
 STARTS = ("start_s", "t_s")
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
-    """A schedule from a CSV file, and warnings: what columns contradict and so are ignored, channels not in the file.
+    """A schedule from a CSV file, and warnings of contradicting columns, which are ignored, and of unknown channels.
 
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
@@ -358,7 +358,7 @@ class _ScheduleReader:
         return Schedule(tuple(self._supplied(pulses))), self.table.warned
 
     def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
-        """The pulses as strong as they are one after the other, compared with what their rows say."""
+        """The pulses at the strength of their place in the sequence, compared with their rows."""
         supply = Supply(self.spacecraft)
         for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda row: row[1].loaded[0]):
             fired = supply.fire(pulse, self.channels.get(pulse.channel))
@@ -450,7 +450,7 @@ class _ScheduleReader:
         return thrust.centroid
 
     def _expect(self, line: int, cells: Cells, pulse: Pulse) -> None:
-        """Warn where the row of a pulse says something else than the spacecraft file, which says what it does."""
+        """Warn where the row of a pulse contradicts the spacecraft file, which rules."""
         if pulse.torque is None:
             return
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
@@ -498,7 +498,7 @@ class _ScheduleReader:
     def _propellant(
         self, line: int, name: str, channel: Channel | None, impulse: Vector, torque: Vector | None
     ) -> float | None:
-        """Propellant of a pulse that flies as the schedule has it, kg; warns of what is not as in the file."""
+        """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
         if channel is not None:
             ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
             self.table.warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
@@ -534,7 +534,7 @@ class _ScheduleReader:
         meant: str,
         scale: float | None = None,
     ) -> None:
-        """Warn where ``columns`` are given and say something else than what counts."""
+        """Warn where ``columns`` are given and contradict the values in use."""
         texts = [cells.get(column, "") for column in columns]
         if not any(texts):
             return

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.equipment import Steerable, Thruster
 
 READING = "reading"
-"""The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
+"""The kind of the signal of a sensor: an angular rate of a gyro, an acceleration of an accelerometer."""
 
 RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
@@ -43,9 +43,9 @@ ALL = ""
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
-    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and whether it is a fraction.
+    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and True for a fraction.
 
-    Raises ValueError, which says what would be right.
+    Raises ValueError with the sizes allowed.
     """
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
@@ -268,7 +268,7 @@ class Reading(Quantity):
         super().__init__("rate", **bounds)
 
     def check(self, value: object) -> float:
-        """SI value; raises ValueError, which says what would be right."""
+        """SI value; raises ValueError with the values allowed."""
         try:
             result = parse(value, "acceleration")
         except ValueError:

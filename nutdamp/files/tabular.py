@@ -43,10 +43,10 @@ ATTEMPTS = 10
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
-    """Write ``content`` to ``path``, or leave what was there; ``-`` is standard output. Raises CannotWrite.
+    """Write ``content`` to ``path``, or leave it as it was; ``-`` is standard output. Raises CannotWrite.
 
-    What is long writes itself: it is called with the stream. Text becomes UTF-8; what has no place there, such as a
-    byte of a file name that is not UTF-8, becomes \\udcff.
+    Long content is a function that writes to the stream. Text becomes UTF-8; a character without a place there, such as
+    a byte of a file name that is not UTF-8, becomes \\udcff.
     """
     with whole_file(path) as stream:
         if callable(content):
@@ -271,11 +271,11 @@ class Table:
     """The rows of one file, below its first line, which names the columns.
 
     ``header`` (the names) and ``rows``, each the number of its line and its cells. Raises CannotRead, and FaultyFile
-    for what is no table.
+    for a file that is no table.
     """
 
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
-        """``columns`` that are known; ``what`` a row is, for messages."""
+        """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
         self.name, self.known = str(path), columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}

@@ -1,4 +1,4 @@
-"""Telemetry from CSV files: times, and whatever of the motion was measured; an empty cell is a sample that is missing.
+"""Telemetry from CSV files: times, and measurements of the motion; an empty cell is a missing sample.
 
 Columns: t_s (from t = 0 of the spacecraft file) or utc; omega_1_rad_s to omega_3_rad_s (or _deg_s); axis_ra_deg and
 axis_dec_deg, or axis_x, axis_y, axis_z; acceleration_m_s2; sun_pulse, 1 from the sample on that has seen one. A track

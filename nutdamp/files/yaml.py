@@ -83,7 +83,7 @@ MAX_DEPTH = 32
 class Place(NamedTuple):
     """Line and column of a value, both from 1; 0 where there are none.
 
-    What does not come from the file but is set beside it says so in ``setting``, as messages name it.
+    A value set beside the file has its name in messages in ``setting``.
     """
 
     line: int = 0
@@ -122,7 +122,7 @@ class Node:
         return node
 
     def children(self) -> Iterator[tuple[str | int, Node]]:
-        """Keys or positions, and what is there; nothing for a scalar."""
+        """Keys or positions, and their nodes; nothing for a scalar."""
         if isinstance(self.value, dict):
             yield from self.value.items()
         elif isinstance(self.value, list):
@@ -259,7 +259,7 @@ class _Builder:
         return event
 
     def document(self, needed: str, single: str) -> Node:
-        """The only document of the stream; ``needed`` and ``single`` say what to do about none and about several."""
+        """The only document of the stream; ``needed`` and ``single`` are the cures for none and for several."""
         self.next()
         event = self.next()
         if isinstance(event, yaml.StreamEndEvent):
@@ -391,7 +391,7 @@ _BASES = {"dec": 10, "oct": 8, "hex": 16}
 
 
 def resolve(text: str) -> Scalar:
-    """Value of a plain scalar by the core schema of YAML 1.2 (10.3.2); what is nothing else is text."""
+    """Value of a plain scalar by the core schema of YAML 1.2 (10.3.2); any other scalar is text."""
     if text in _WORDS:
         return _WORDS[text]
     match = _NUMBER.fullmatch(text)
@@ -404,7 +404,7 @@ def resolve(text: str) -> Scalar:
     return int(match[kind], _BASES[kind]) if len(text) <= 300 else math.inf
 
 
-# What PyYAML's scanner and parser say, and what a person can do about it; True where the slip lies where the
+# Messages of PyYAML's scanner and parser, and their cures for a person; True where the slip lies where the
 # construct began and not where reading it failed.
 _SYNTAX = (
     (r"'\\t' that cannot start", "a tab indents here; use spaces", False),

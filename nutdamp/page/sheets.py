@@ -115,7 +115,7 @@ def pulse_sheet(plan: Plan) -> Sheet:
 
 
 def on_times(pulses: Schedule) -> tuple[Column, list[str]]:
-    """The column of on-times to be loaded, which says so where valves make others of them."""
+    """The column of on-times to be loaded; its name tells where valves change them."""
     name = "on-time, commanded" if pulses.through_valves else "on-time"
     return Column(name, "s"), ["ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}" for pulse in pulses]
 

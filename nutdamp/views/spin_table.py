@@ -34,7 +34,7 @@ SAME = 1e-9
 """Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
 
 PIECES = 16
-"""Pieces of each turn over which ω3 is integrated by `velocity_change.LEGENDRE`."""
+"""Pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`."""
 
 NEWTON = 3
 """Newton steps to the end of a turn within its piece: the second one is at rounding already."""

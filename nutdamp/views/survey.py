@@ -36,8 +36,8 @@ DIGITS = 9
 class ChannelSteps:
     """A channel and the nutation angles (rad) that its pulses take out or put in.
 
-    ``smallest`` is that of the shortest on-time that can be commanded, `limits.shortest_on_time`, and is 0 without any;
-    ``largest`` the most of on-times up to `limits.longest_useful`, a right angle where nothing bounds it.
+    ``smallest`` is that of the shortest on-time to be commanded, `constraints.shortest_on_time`, and is 0 without any;
+    ``largest`` the most of on-times up to `constraints.longest_useful`, a right angle where nothing bounds it.
     """
 
     channel: Channel
@@ -159,7 +159,7 @@ def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
 
 
 def mounting_angle(spacecraft: Spacecraft) -> float:
-    """`damping.mounting_angle` of the spacecraft, rad."""
+    """`body.mounting_angle` of the spacecraft, rad."""
     inertia = spacecraft.inertia
     return rigid_body.mounting_angle(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
 
@@ -241,7 +241,7 @@ def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequenc
 class SpinAxis:
     """Principal axis 3 of inertia.
 
-    ``kind`` of `stability.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `stability.growth`; ``tilt``
+    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt``
     (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the
     despun frame and inertially, K(7), K(10), K(13), rad/s.
     """

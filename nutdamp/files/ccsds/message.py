@@ -67,7 +67,7 @@ _SPIN = (
     *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
 )
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
-"""Keywords that say where H is, and how fast the spin axis turns about it."""
+"""Keywords of the direction of H, and of the rate of the spin axis about it."""
 
 HEADER = (
     *_text("CLASSIFICATION", required=False),
@@ -181,7 +181,7 @@ class MessageEntry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MessageBlock:
-    """Keywords that belong together; ``name`` is that of the layout, empty for what is outside of blocks."""
+    """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
 
     name: str
     entries: tuple[MessageEntry, ...]
@@ -252,7 +252,7 @@ def comment(text: str) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Without accents and without what ASCII does not have."""
+    """Text in ASCII: accents and other characters are dropped."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return "".join(character if character.isprintable() else " " for character in plain)
 
@@ -334,7 +334,7 @@ def _block(block: MessageBlock) -> list[str]:
 
 
 def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
+    """The blocks of an APM, the first for keywords outside of blocks, and the faults of notation.
 
     Lines count from 1; ``name`` is that of the file in faults.
     """

@@ -42,7 +42,7 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Checked:
-    """A block by keyword; what is wrong goes to ``faults``, and what cannot be read is then None."""
+    """A block by keyword; problems go to ``faults``, and an unreadable value is then None."""
 
     def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
         self.file, self.block, self.faults = file, block, faults
@@ -139,7 +139,7 @@ UNIT = 1e-4
 """Deviation from length one up to which a quaternion counts as rounded."""
 
 AGREES = 1e-4
-"""Difference up to which SPIN says the same as the other blocks: rad, and relative for rates."""
+"""Difference up to which SPIN agrees with the other blocks: rad, and relative for rates."""
 
 SAME_AXES = {"ICRF": "GCRF"}
 """Frames whose axes are those of another that a spacecraft file knows."""
@@ -169,8 +169,8 @@ class ApmContents:
     """Contents of a message, in body axes.
 
     ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m².
-    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` what a reader
-    should know.
+    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` are for
+    the reader.
     """
 
     name: str
@@ -217,7 +217,7 @@ def _refuse_other_versions(path: str, outside: MessageBlock, faults: list[Fault]
 
 
 class _MessageReader:
-    """One message; what is wrong goes to ``faults``."""
+    """One message; problems go to ``faults``."""
 
     def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
         self.path, self.faults = path, faults
@@ -370,7 +370,7 @@ class _MessageReader:
         return None
 
     def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
-        """Fills in what the other blocks do not say; remarks where it says something else."""
+        """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
         block = self._one("SPIN")
         if block is None or self._endpoints(block, reversible=False) is None:
             return quaternion, rates
@@ -469,7 +469,7 @@ SAME_NUTATION, ROUNDED = 0.01, 1e-5
 def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
     """Text of the spacecraft file, the spacecraft in it, and the manoeuvres as a schedule (empty without any).
 
-    Raises FaultyFile, with lines of the message, where what it says cannot be a spacecraft for nutdamp.
+    Raises FaultyFile, with lines of the message, where its contents cannot be a spacecraft for nutdamp.
     """
     bare = _read(spacecraft_text(contents, path, None), contents, path)
     torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]

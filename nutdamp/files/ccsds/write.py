@@ -122,7 +122,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
 
 
 def header(plan: Plan, created: Epoch) -> MessageBlock:
-    """Who made the message, when, and of what."""
+    """Originator, date and object of the message."""
     moment = created.text.partition(".")[0]
     values: Values = {
         "CREATION_DATE": moment,
@@ -198,7 +198,7 @@ def _spin(body: Spacecraft) -> Values:
 
 
 def _inertia(body: Spacecraft) -> Values:
-    """Moments and products; the products are minus what is off the diagonal (annex F6)."""
+    """Moments and products; the products are minus the entries off the diagonal (annex F6)."""
     tensor = body.inertia.tensor.tolist()
     return {
         "INERTIA_REF_FRAME": BODY_FRAME,
