@@ -37,7 +37,7 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """The certificate as data."""
     body, program, proof = certificate.spacecraft, certificate.program, certificate.proof
     equations = zip(certificate.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
-    names = [entry.name for entry in program.channels]
+    names, pulses = [channel.name for channel in program.channels], certificate.plan.pulses
     return {
         "nutdamp": __version__,
         "certificate": 1,
@@ -68,11 +68,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "burns": [_burn(certificate, burn) for burn in certificate.burns],
         "burns_cost": certificate.cost,
         "plan": {
-            "cost": certificate.plan.pulses.cost_in(certificate.problem.unit),
-            "pulses": [
-                {"channel": entry.channel, "t_s": entry.t, "on_time_s": entry.on_time}
-                for entry in certificate.plan.pulses
-            ],
+            "cost": pulses.cost_in(certificate.problem.unit),
+            "pulses": [{"channel": pulse.channel, "t_s": pulse.t, "on_time_s": pulse.on_time} for pulse in pulses],
         },
         "primer": [
             {"t_s": times.tolist(), "q": dict(zip(names, certificate.primer(times).T.tolist(), strict=True))}

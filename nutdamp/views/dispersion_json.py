@@ -66,11 +66,8 @@ def percentiles_json(column: str, nominal: float | None, distribution: Distribut
     names = ("nominal", "min", *(f"{percent:g}" for percent in PERCENTS), "max")
     spread: list[float | None] = [None] * (len(names) - 1)
     if distribution is not None:
-        spread = [
-            distribution.minimum,
-            *distribution.quantiles(np.array(PERCENTS) / 100.0).tolist(),
-            distribution.maximum,
-        ]
+        shares = np.array(PERCENTS) / 100.0
+        spread = [distribution.minimum, *distribution.quantiles(shares).tolist(), distribution.maximum]
     values = zip(names, (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
 

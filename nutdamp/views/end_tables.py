@@ -86,11 +86,8 @@ def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
         keep = aspect.keep
         mark, bounds = "" if aspect.kept else "✗ ", bounds_text(keep)
         near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
-        seen = (
-            f"{near} to {far}"
-            if aspect.largest_at > 0.0 or aspect.least_at > 0.0
-            else f"{degrees(aspect.least)} at t = 0"
-        )
+        moves = aspect.largest_at > 0.0 or aspect.least_at > 0.0
+        seen = f"{near} to {far}" if moves else f"{degrees(aspect.least)} at t = 0"
         table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
 
 

@@ -49,10 +49,7 @@ def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
     from nutdamp.views.guide import EQUATIONS
 
-    rows = [
-        (equation.number, "\n".join([f"{equation.subject}: {equation.place}", *equation.remarks]))
-        for equation in EQUATIONS
-    ]
+    rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in EQUATIONS]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 

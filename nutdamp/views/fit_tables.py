@@ -156,11 +156,8 @@ def told(fit: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
     tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
         yield f"correlated: {', '.join(tied)}"
-    far = [
-        f"{estimate.label} ({_changed(estimate.change)})"
-        for estimate in rows
-        if estimate.change is not None and abs(estimate.change) > FAR
-    ]
+    changes = [(row.label, row.change) for row in rows if row.change is not None]
+    far = [f"{label} ({_changed(change)})" for label, change in changes if abs(change) > FAR]
     if far:
         yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:

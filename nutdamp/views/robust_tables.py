@@ -22,11 +22,8 @@ MOST_ROWS = 12
 
 def robust_screen(robust: RobustComparison) -> RenderableType:
     """All tables of ``plan --robust``."""
-    body, decided, reason = (
-        robust.comparison.spacecraft,
-        robust.decision,
-        robust_verdicts.robust_reason(robust),
-    )
+    body, decided = robust.comparison.spacecraft, robust.decision
+    reason = robust_verdicts.robust_reason(robust)
     infeasible = [plan for plan in robust.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
     if decided is None or robust.chosen is None:
@@ -59,9 +56,8 @@ def _fresh(robust: RobustComparison) -> str:
     if robust.fresh is None or robust.chosen is None:
         return ""
     cases = robust.fresh.cases
-    met, low, high = (
-        verdicts.percent(share, robust.probability) for share in (robust.fresh.met, *robust.fresh.interval)
-    )
+    shares = (robust.fresh.met, *robust.fresh.interval)
+    met, low, high = (verdicts.percent(share, robust.probability) for share in shares)
     few = f", fewer than the {verdicts.exact_percent(robust.probability)} required" * robust.lucky
     new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
     return f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
@@ -85,9 +81,7 @@ def _candidates(robust: RobustComparison) -> RenderableType:
     heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg", *["nominal\ncones"] * cones)
     table = columns(*heads, *["cases that\ncomply"] * counted, text=("variant\n",))
     named = list(robust.candidates[:MOST_ROWS])
-    named += [
-        candidate for candidate in (robust.chosen, robust.usual) if candidate is not None and candidate not in named
-    ]
+    named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     for candidate in named:
         plan, pulses = candidate.plan, candidate.plan.pulses
         spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse

@@ -62,11 +62,8 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
         phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
-        several = (
-            [each.channel for each in firing],
-            map(_number, phases),
-            (_number(each.loaded[1]) for each in firing),
-        )
+        on_times = (_number(each.loaded[1]) for each in firing)
+        several = ([each.channel for each in firing], map(_number, phases), on_times)
         times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
         rows.append([str(first + index), *times, *map(BETWEEN.join, several)])
     return csv_text(HEADER, rows)

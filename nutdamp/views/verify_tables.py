@@ -26,6 +26,7 @@ BUDGET = "Error budget: what each imperfection leaves, alone"
 
 def verification_screen(spacecraft: Spacecraft, name: str, verification: Verification) -> RenderableType:
     """All tables of ``verify`` for the schedule called ``name``."""
+    note = budget_note(verification, aimed=spacecraft.goal.axis is not None)
     missing = [Text(f"{method.name}: {method.missing}") for method in verification.methods if method.missing]
     return Group(
         header(spacecraft),
@@ -41,11 +42,7 @@ def verification_screen(spacecraft: Spacecraft, name: str, verification: Verific
         Text(BUDGET, style="bold"),
         Text(),
         budget_table(spacecraft, verification),
-        *[
-            Text(note, style="dim")
-            for note in (budget_note(verification, aimed=spacecraft.goal.axis is not None),)
-            if note
-        ],
+        *[Text(note, style="dim")] * bool(note),
     )
 
 
