@@ -1,16 +1,4 @@
-"""nutdamp as a library: load, plan, compare, fly, trade, disperse, verify, fit, report, export.
-
-What the commands trade, disperse, verify and export do, for plans in memory; the numbers are those of their JSON.
-
-The page of ``nutdamp report``, from Python and for the command.
-
-Telemetry fitted, and the spacecraft that it makes.
-
-A spacecraft as a file, a text or a dict describes it, and variants of it.
-
-Plan schemes, compare them, and read schedules.
-
-nutdamp as a library: load a spacecraft, plan a scheme, fly it, and take the numbers along.
+"""nutdamp as a library: load a spacecraft, plan, compare, fly, trade, disperse, verify, fit, report, export.
 
     import nutdamp
 
@@ -19,9 +7,9 @@ nutdamp as a library: load a spacecraft, plan a scheme, fly it, and take the num
     flight = plan.fly()
     flight.to_csv("track.csv")
 
-It is what the command line calls. The types are those of the modules below; how they show and write themselves is in
-`views`. Attributes are SI and radians, vectors in principal axes unless they say that they are in the axes of the
-spacecraft file; arrays with named fields carry the names and units of the CSV files.
+The command line calls the same functions, so that both give the same numbers. Attributes are SI and radians, vectors in
+principal axes unless stated to be in the axes of the spacecraft file; arrays with named fields carry the names and
+units of the CSV files.
 """
 
 from __future__ import annotations
@@ -81,7 +69,7 @@ if TYPE_CHECKING:
 
 
 class Source(NamedTuple):
-    """What a spacecraft was read from: the text of the file, its name in messages, and the keys set beside it."""
+    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside it."""
 
     text: str
     name: str
@@ -139,7 +127,7 @@ def _read(source: Source, above: int = 3) -> Spacecraft:
     body = read_spacecraft(source.text, source.name, source.settings, doubts.append)
     for doubt in doubts:
         warnings.warn(doubt.as_warning, stacklevel=above)
-    object.__setattr__(body, "source", source)  # which its fields are not made of: `replace` drops it
+    object.__setattr__(body, "source", source)  # not a field, so that `dataclasses.replace` drops it
     return body
 
 
@@ -150,7 +138,7 @@ def expected(spacecraft: Spacecraft) -> Spacecraft:
 
 @dataclass(frozen=True, eq=False)
 class Trade:
-    """What time costs: ``fronts`` of schedules of the scheme optimal, one for each shift of H allowed."""
+    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each shift of H allowed."""
 
     spacecraft: Spacecraft
     fronts: tuple[tradeoff.Front, ...]
@@ -161,7 +149,7 @@ class Trade:
         return tuple(point.plan for _, _, point in tradeoff.numbered(self.fronts))
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``trade --json`` gives."""
+        """The object of ``trade --json``."""
         from nutdamp.views.trade_files import trade_json
 
         return finite(trade_json(self.spacecraft, self.fronts))
@@ -169,7 +157,7 @@ class Trade:
 
 @dataclass(frozen=True, eq=False)
 class Dispersion:
-    """A schedule flown in many dispersed cases; ``core`` holds the distributions of what they leave."""
+    """A schedule flown in many dispersed cases; ``core`` holds the distributions of the results."""
 
     core: Results
     scheme: str
@@ -181,11 +169,11 @@ class Dispersion:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether as many cases meet it as the file requires; None where nothing is required."""
+        """True where as many cases meet it as the file requires; None where nothing is required."""
         return self.core.meets_requirement
 
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
-        """What ``disperse --json`` gives, with as many ``worst`` cases."""
+        """The object of ``disperse --json``, with as many ``worst`` cases."""
         from nutdamp.views.dispersion_json import dispersion_json
 
         return finite(dispersion_json(self.core, scheme=self.scheme, worst=worst))
@@ -193,7 +181,7 @@ class Dispersion:
 
 @dataclass(frozen=True, eq=False)
 class LoopDispersion:
-    """The loop of a file flown in many dispersed cases; ``core`` holds what each does."""
+    """The loop of a file flown in many dispersed cases; ``core`` holds the result of each."""
 
     core: LoopResults
 
@@ -208,7 +196,7 @@ class LoopDispersion:
         return self.core.met_fraction
 
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
-        """What ``disperse --loop --json`` gives, with as many ``worst`` cases."""
+        """The object of ``disperse --loop --json``, with as many ``worst`` cases."""
         from nutdamp.views.loop_cases import loop_cases_json
 
         return finite(loop_cases_json(self.core, worst=worst))
@@ -216,18 +204,18 @@ class LoopDispersion:
 
 @dataclass(frozen=True, eq=False)
 class Verified:
-    """A schedule flown by independent methods: ``core`` holds them, what is conserved, and the error budget."""
+    """A schedule flown by independent methods: ``core`` holds them, the conserved quantities, and the error budget."""
 
     core: verification.Verification
     plan: Plan
 
     @property
     def agree(self) -> bool:
-        """Whether an independent integration was flown, and all of them confirm the flown motion."""
+        """True where an independent integration was flown, and all of them confirm the flown motion."""
         return self.core.agree
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``verify --json`` gives."""
+        """The object of ``verify --json``."""
         from nutdamp.views.verification_json import verification_json
 
         return finite(verification_json(self.plan.flight, self.plan.scheme, self.core))
@@ -235,18 +223,18 @@ class Verified:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """What it takes to hold the nutation against energy dissipation; ``core`` holds a row for each two thresholds."""
+    """Cost of holding the nutation against energy dissipation; ``core`` holds a row for each pair of thresholds."""
 
     core: limit_cycle.Budget
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``budget --json`` gives."""
+        """The object of ``budget --json``."""
         from nutdamp.views.budget_files import budget_json
 
         return finite(budget_json(self.core))
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write what ``budget --csv`` writes; raises CannotWrite."""
+        """Write the file of ``budget --csv``; raises CannotWrite."""
         from nutdamp.files.tabular import write_whole
         from nutdamp.views.budget_files import budget_csv
 
@@ -293,8 +281,8 @@ def budget(
     if pairs and body.loop is None:
         raise BadRequest("thresholds: expected a spacecraft with a loop")
     seed = units.instance("seed", seed, int, "a whole number")
-    made = [limit_cycle.Thresholds(*pair) for pair in pairs]
-    return Budget(limit_cycle.budget(body, made, largest, seed=seed, progress=progress))
+    rows = [limit_cycle.Thresholds(*pair) for pair in pairs]
+    return Budget(limit_cycle.budget(body, rows, largest, seed=seed, progress=progress))
 
 
 def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispersion.SEED) -> Dispersion:
@@ -325,9 +313,9 @@ def disperse_loop(
     body, count = expected(spacecraft), units.count("samples", samples)
     _expect_seed(seed)
     end = None if until is None else units.end_of_flight(until)
-    found = dispersion.loop_study(body, end, seed=seed)
-    found.expect_affordable(count)
-    return LoopDispersion(dispersion.run(dispersion.LoopResults(found, count)))
+    study = dispersion.loop_study(body, end, seed=seed)
+    study.expect_affordable(count)
+    return LoopDispersion(dispersion.run(dispersion.LoopResults(study, count)))
 
 
 def _expect_seed(seed: int) -> None:
@@ -342,22 +330,23 @@ def verify(plan: Plan) -> Verified:
 
 
 def export(plan: Plan, format: str, path: str | PathLike[str], *, until: float | None = None) -> None:  # noqa: A002 - as --format
-    """Write what ``nutdamp export`` writes in one of its formats; CCSDS messages as XML where the name says .xml.
+    """Write a plan in a format of ``nutdamp export``; CCSDS messages become XML where the name ends in .xml.
 
     ``until``: end of a history or spin table, s. Raises Infeasible, BadRequest or CannotWrite.
     """
     from nutdamp.files.tabular import write_whole
     from nutdamp.views.exchange import FORMATS, export_text
 
-    made, form = feasible(plan), units.one_of("format", format, tuple(FORMATS))
+    feasible(plan)
+    form = units.one_of("format", format, tuple(FORMATS))
     name = units.path("path", path)
     end = None if until is None else units.end_of_flight(until)
-    write_whole(name, export_text(made, form, xml=FORMATS[form].message and name.lower().endswith(".xml"), until=end))
+    write_whole(name, export_text(plan, form, xml=FORMATS[form].message and name.lower().endswith(".xml"), until=end))
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What telemetry tells of a spacecraft; ``core`` holds parameters, covariance, noise and residuals.
+    """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and residuals.
 
     ``warnings`` are those of reading the record.
     """
@@ -370,7 +359,7 @@ class Fitted:
         return results.estimates(self.core, at)
 
     def outlook(self, at: float = 0.0) -> forecast.Outlook:
-        """What longer coasts and probe pulses would leave of a plan from ``at`` s, as ``fit --next`` does."""
+        """Forecast of longer coasts and probe pulses for a plan from ``at`` s, as ``fit --next`` does."""
         return forecast.outlook(self.core, at)
 
     def text(self, at: float = 0.0) -> str:
@@ -402,7 +391,7 @@ class Fitted:
         return fit_figure(self.core)
 
     def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
-        """What ``fit --json`` gives; with an `forecast`, what ``fit --next --json`` gives."""
+        """The object of ``fit --json``; with the forecast ``ahead``, that of ``fit --next --json``."""
         from nutdamp.views.fit_json import fit_json
 
         return finite(fit_json(self.core, results.carried(self.core, at), ahead, self.warnings))
@@ -417,8 +406,8 @@ def fit(
 ) -> Fitted:
     """Estimate a spacecraft from a CSV file of telemetry, as ``nutdamp fit`` does.
 
-    ``schedule``: what was fired during the record (`nutdamp.load_schedule`); ``sun_pulses``: a CSV file of their times.
-    Warns of columns that are ignored, and of what makes the estimates doubtful. Raises CannotRead, FaultyFile,
+    ``schedule``: pulses fired during the record (`nutdamp.load_schedule`); ``sun_pulses``: a CSV file of their times.
+    Warns of columns that are ignored, and of doubts about the estimates. Raises CannotRead, FaultyFile,
     BadRequest, and Infeasible where the record tells nothing.
     """
     from nutdamp.files.telemetry import read_telemetry
@@ -427,10 +416,10 @@ def fit(
     fired = None if schedule is None else units.instance("schedule", schedule, Plan, "a Plan").pulses
     times = None if sun_pulses is None else units.path("sun_pulses", sun_pulses)
     record, remarks = read_telemetry(name, body, times, fired)
-    found = estimation.fit(body, record)
-    for remark in (*remarks, *doubts(found)):
+    estimate = estimation.fit(body, record)
+    for remark in (*remarks, *doubts(estimate)):
         warnings.warn(remark, stacklevel=2)
-    return Fitted(found, tuple(remarks))
+    return Fitted(estimate, tuple(remarks))
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: Choice = None) -> Plan:
@@ -469,10 +458,10 @@ def load_schedule(path: str | PathLike[str], spacecraft: Spacecraft) -> Plan:
     from nutdamp.files.schedules import read_plan
 
     body, name = expected(spacecraft), units.path("path", path)
-    made, remarks = read_plan(name, body)
+    schedule, remarks = read_plan(name, body)
     for remark in remarks:
         warnings.warn(remark, stacklevel=2)
-    return made
+    return schedule
 
 
 def _names(values: Iterable[str]) -> tuple[str, ...]:
@@ -489,7 +478,7 @@ def _names(values: Iterable[str]) -> tuple[str, ...]:
 
 
 def _options(value: Choice) -> Choice:
-    """The options of one scheme or several; raises BadRequest for what is none."""
+    """The options of one scheme or several; raises BadRequest for anything else."""
     if value is None or isinstance(value, Options | SchemeOptions):
         return value
     raise BadRequest(f"options: expected nutdamp.Options(…), got {as_given(value)}")
@@ -497,7 +486,7 @@ def _options(value: Choice) -> Choice:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """A page: of what comparison, with which dispersed cases, what it says, and ``content``, what is in its file."""
+    """The report page: its comparison, its dispersed cases, the page itself, and ``content``, the text of its file."""
 
     comparison: Comparison
     dispersed: Results | None
@@ -506,17 +495,17 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """What is on top of the page."""
+        """Sentence at the top of the page."""
         return self.page.verdict
 
     @property
     def met(self) -> bool | None:
-        """Whether the requirement is met; None where nothing is required, and without a feasible plan."""
+        """True where the requirement is met; None where nothing is required, and without a feasible plan."""
         return self.page.met
 
     @property
     def good(self) -> bool:
-        """Whether nothing is missed, what is not required either."""
+        """True where nothing is missed, whether required or not."""
         return self.page.good
 
 
@@ -532,7 +521,7 @@ def report(
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
-    ``spacecraft``: one as `load` gives it, or what `load` takes; ``output``: an HTML file; ``disperse``: in how many
+    ``spacecraft``: one of `load`, or an argument of `load`; ``output``: an HTML file; ``disperse``: in how many
     dispersed cases to fly the plans, as ``samples`` of `compare`; ``points``: how many horizons to try for each front
     of time against cost, none by default; ``control``: title, document, issue, author, date, as `controlled` takes
     them. Raises as `load` and `compare` do, BadRequest for another ending, MissingExtra without the extra plot,
@@ -550,13 +539,13 @@ def report(
     given |= {key: repr(value) for key, value in control.items()}
     more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
     named = f", {list(names)!r}" if names else ""
-    made = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), kept, fronts)
-    write_whole(name, made.content)
-    return made
+    page = made_of(compared, _repeat(body, f"{name!r}{named}{more}"), kept, fronts)
+    write_whole(name, page.content)
+    return page
 
 
 def controlled(**given: str) -> Control:
-    """What configuration control writes on a page; without a date that of SOURCE_DATE_EPOCH, where it is set.
+    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where that is set.
 
     Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
     """
@@ -582,9 +571,9 @@ def made_of(
 
 
 def _repeat(body: Spacecraft, how: str) -> Repeat:
-    """How to make the page again in Python; where fields were replaced, no file says of what."""
+    """The call that makes the page again in Python; where fields were replaced, no file stands for the spacecraft."""
     source = body.source
     if not isinstance(source, Source):
         return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
-    settings = tuple((dotted(one.path), str(one.value)) for one in source.settings)
+    settings = tuple((dotted(setting.path), str(setting.value)) for setting in source.settings)
     return Repeat(f"nutdamp.report({source.name!r}, {how})", source.name, source.text, settings)

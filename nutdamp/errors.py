@@ -1,9 +1,4 @@
-"""Exceptions and faults with their place, as data.
-
-What can go wrong, as data: the command line turns it into messages and exit statuses in one place.
-
-Lists and spans as sentences have them.
-"""
+"""Exceptions, and faults with their place, as data; the command line turns them into messages and exit statuses."""
 
 from __future__ import annotations
 
@@ -15,20 +10,20 @@ from typing import NamedTuple
 class NutdampError(Exception):
     """Root of all errors that a user can cause and cure; anything else is a bug and keeps its traceback.
 
-    What an error was made of is in ``args``, so that it can be pickled, as passing it between processes needs.
+    The arguments of the constructor are in ``args``, so that an error can be pickled and passed between processes.
     """
 
 
 def printable(text: str) -> str:
-    """A text such as the name of a file, with escapes in place of what cannot be printed, or would steer a terminal."""
+    """A text such as the name of a file, with unprintable and control characters escaped."""
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode("ascii") for one in text)
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in text)
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The one of some names that a misspelt ``word`` may be meant as, whatever its case."""
-    import difflib  # here, because few runs meet a misspelt word
+    """The name closest to a misspelt ``word``, whatever its case; None where none is close."""
+    import difflib
 
     folded = {name.casefold(): name for name in known}
     close = difflib.get_close_matches(word.casefold(), folded, n=1)
@@ -53,13 +48,13 @@ class Fault(NamedTuple):
 
     @property
     def place(self) -> str:
-        """``FILE:LINE:COLUMN``; what has no line is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
+        """``FILE:LINE:COLUMN``; without a line it is a file as a whole, or a setting such as ``--set KEY=VALUE``."""
         file = printable(self.file)
         return f"{file}:{self.line}:{self.column}" if self.line else file
 
     @property
     def as_warning(self) -> str:
-        """How it reads where the file is taken all the same."""
+        """The text of the fault where the file is accepted all the same."""
         return str(self._replace(problem=f"warning: {self.problem}"))
 
 
@@ -73,7 +68,7 @@ MOST_SHOWN = 100
 
 
 class FaultyFile(NutdampError):
-    """An input file says something that cannot be; carries all its faults, in the order of the file."""
+    """An input file with impossible contents; carries all its faults, in the order of the file."""
 
     def __init__(self, faults: list[Fault]) -> None:
         self.faults = in_order(faults)
@@ -86,11 +81,11 @@ class FaultyFile(NutdampError):
 
 
 class BadRequest(NutdampError):
-    """A call or a command line that needs something impossible, whatever the spacecraft."""
+    """A call or a command line that asks for something impossible with any spacecraft."""
 
 
 class Unsuitable(BadRequest):
-    """A value of the spacecraft file that does not do for what is requested, and else is none of its faults.
+    """A value of the spacecraft file that does not suit the request, and else is none of its faults.
 
     ``where`` is the path of keys to it, such as ``("attitude", "epoch")``.
     """
@@ -126,7 +121,7 @@ class CannotRead(NutdampError):
 
 
 class CannotWrite(NutdampError):
-    """A file that could not be written; what was there before is kept."""
+    """A file that could not be written; its earlier contents are kept."""
 
     def __init__(self, path: str, reason: str) -> None:
         self.path, self.reason = path, reason
@@ -155,11 +150,11 @@ class MissingPandas(NutdampError):
 
 
 class Infeasible(NutdampError):
-    """A scheme that cannot work with this spacecraft within its limits; the text says why."""
+    """A scheme that cannot work with this spacecraft within its limits; the text is the reason."""
 
 
 class TooShort(Infeasible):
-    """The same, where a longer horizon would do: ``why``, and a ``cure`` that names one, where one is known."""
+    """A scheme that a longer horizon would make feasible: ``why``, and a ``cure`` that names the horizon, if known."""
 
     def __init__(self, why: str, cure: str = "") -> None:
         self.why, self.cure = why, cure

@@ -1,12 +1,8 @@
-"""Quantities: units, parsing, ranges; arguments of Python users checked.
+"""Quantities: units, parsing and ranges; checks of the arguments of Python users.
 
-Units of the files and of the command line: one small table that leads from "60 rpm" to 6.283… rad/s.
-
-A quantity is a number, which is SI, or a text with a unit. What is not in the table is refused with the units
-that are: revolutions are left out on purpose, and Hz is for sampling rates alone, since nobody can tell whether they
-count turns or radians.
-
-What Python users hand over, looked at before it is used: each refusal says what was expected, and what came.
+A quantity is a number, which is SI, or a text with a unit of the table `KINDS`. Any other unit is refused, and the
+message names those allowed: revolutions are left out on purpose, and Hz is for sampling rates alone, since nobody can
+tell whether they count turns or radians.
 """
 
 from __future__ import annotations
@@ -44,7 +40,7 @@ class Kind:
 
     @property
     def expected(self) -> str:
-        """What may be written, for messages: ``a number in kg, or a text in kg or g``."""
+        """The forms allowed, for messages: ``a number in kg, or a text in kg or g``."""
         if not self.factors:
             return "no unit, no quotes"
         return f"a number{' in ' * bool(self.si)}{self.si}, or a text in {self.units}"
@@ -68,10 +64,10 @@ KINDS: dict[str, Kind] = {
     "ratio": Kind("a ratio", {"%": 0.01}),
     "number": Kind("a plain number", {}),
 }
-"""The kinds of quantity by name; ``number`` is for what has no unit, such as the parts of a quaternion."""
+"""The kinds of quantity by name; ``number`` has no unit, such as the parts of a quaternion."""
 
 LARGEST = 1e15
-"""Magnitudes above are refused, in SI: nothing physical, and what is computed from them could overflow."""
+"""Largest magnitude in SI: nothing physical is larger, and results of larger values could overflow."""
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
@@ -92,14 +88,14 @@ _UNITS = [
     for name, kind in KINDS.items()
     for unit, factor in kind.factors.items()
 ]
-"""What is read as a unit, its kind and its factor to SI."""
+"""Spellings of each unit, its kind and its factor to SI."""
 
 
 def parse(value: object, kind: str, *, bare: bool = False) -> float:
     """SI value of a quantity: a number, or a text with a unit of ``kind``.
 
     ``bare`` accepts a text that is only a number, as command lines give it; in a file that is a slip.
-    Raises ValueError, with a message that says what is wrong and what is allowed; also for NaN, infinite and
+    Raises ValueError, with a message on the fault and the values allowed; also for NaN, infinite and
     unphysically large values.
     """
     expected = KINDS[kind]
@@ -136,15 +132,15 @@ def _split(text: str, kind: str, bare: bool) -> tuple[float, float]:
         raise ValueError(f"{shown(text)} is not {expected.noun}: {expected.expected}")
     if not unit:
         raise ValueError(f"{shown(text)} has no unit; add {expected.units}, or leave the quotes out")
-    found = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
-    if found is None or (found[0] == "frequency" and kind != "frequency"):
+    known = next(((name, factor) for spelling, name, factor in _UNITS if spelling.fullmatch(unit)), None)
+    if known is None or (known[0] == "frequency" and kind != "frequency"):
         noun = expected.noun.partition(" ")[2]
         turns = kind in ("rate", "angle") and _TURNS.fullmatch(unit)
         hint = f" ({match[2]} hides a factor 2π)" if turns else ""
         raise ValueError(f"{shown(text)}: {shown(match[2])} is not a unit of {noun}; use {expected.units}{hint}")
-    if found[0] != kind:
-        raise ValueError(f"{shown(text)} is {KINDS[found[0]].noun}; expected {expected.noun}: {expected.expected}")
-    return number, found[1]
+    if known[0] != kind:
+        raise ValueError(f"{shown(text)} is {KINDS[known[0]].noun}; expected {expected.noun}: {expected.expected}")
+    return number, known[1]
 
 
 def pattern(kind: str) -> str:
@@ -190,7 +186,7 @@ def path(name: str, value: str | PathLike[str], expected: str = "the name of a f
 
 
 def changes(value: Any) -> Mapping[str, object]:
-    """Keys and what to set them to; raises BadRequest."""
+    """Keys and their new values; raises BadRequest."""
     if value is None:
         return {}
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
@@ -222,7 +218,7 @@ def count(name: str, value: Any) -> int:
 def shifts(value: Any) -> tuple[float, ...]:
     """Angles in rad, infinite where any will do; raises BadRequest."""
     angles = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
-    if angles and all((is_number(one) or one == math.inf) and one >= 0.0 for one in angles):
+    if angles and all((is_number(angle) or angle == math.inf) and angle >= 0.0 for angle in angles):
         return tuple(map(float, angles))
     raise BadRequest(f"allow = {as_given(value)}: expected angles of at least 0, in rad, such as (0.0, math.inf)")
 
@@ -235,7 +231,7 @@ def thresholds(value: Any) -> tuple[tuple[float, float], ...]:
         if not (len(angles) == 2 and all(map(is_number, angles)) and 0.0 <= angles[1] < angles[0] < 0.5 * math.pi):
             what = "pairs of angles in rad below a right angle, the second smaller, such as [(0.01, 0.002)]"
             raise BadRequest(f"thresholds: expected {what}, got {as_given(pair)}")
-    return tuple((float(one), float(other)) for one, other in pairs)
+    return tuple((float(start), float(stop)) for start, stop in pairs)
 
 
 def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
@@ -246,17 +242,17 @@ def one_of(name: str, value: Any, names: tuple[str, ...]) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Whether Python or numpy would call it a real number, of sensible size."""
+    """True for a real number of Python or numpy, of sensible size."""
     return issubclass(type(value), Real) and type(value) is not bool and abs(value) <= LARGEST
 
 
 def is_count(value: Any) -> bool:
-    """Whether it is a whole number of at least 1."""
+    """True for a whole number of at least 1."""
     return issubclass(type(value), Integral) and type(value) is not bool and value >= 1
 
 
 def as_given(value: object) -> str:
-    """A value as a message names it: what is short as it is, anything else by its type."""
+    """A value as a message names it: short ones in full, others by their type."""
     text = repr(value) if isinstance(value, str | Real | None) else ""
     kind = type(value)
     return text if 0 < len(text) <= 60 else f"a {kind.__module__}.{kind.__qualname__}".replace("builtins.", "")
@@ -264,31 +260,31 @@ def as_given(value: object) -> str:
 
 def replaced(value: Record, fields: Mapping[str, object]) -> Record:
     """A dataclass with some of its fields replaced, looked at by their types; raises BadRequest."""
-    import numpy as np  # here, because the command line knows options without it
+    import numpy as np
 
     kinds = get_type_hints(type(value))
     known = [field.name for field in dataclasses.fields(value) if field.init]
-    made: dict[str, Any] = {}
-    for name, one in fields.items():
+    values: dict[str, Any] = {}
+    for name, entry in fields.items():
         if name not in known:
             raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(known)}")
         kind = kinds[name]
-        if not _fits(one, kind):
-            raise BadRequest(f"{name}: expected {_described(kind)}, got {as_given(one)}")
-        made[name] = np.array(one, dtype=float) if _array(kind) else one
-    return dataclasses.replace(value, **made)
+        if not _fits(entry, kind):
+            raise BadRequest(f"{name}: expected {_described(kind)}, got {as_given(entry)}")
+        values[name] = np.array(entry, dtype=float) if _array(kind) else entry
+    return dataclasses.replace(value, **values)
 
 
 def _array(kind: Any) -> bool:
-    """True for the type hint of three numbers; what it is made of differs between versions of numpy."""
-    import numpy as np  # here, because the command line knows options without it
+    """True for the type hint of three numbers; its parts differ between versions of numpy."""
+    import numpy as np
     from numpy.typing import NDArray
 
     return bool(kind == NDArray[np.float64])
 
 
 def _fits(value: object, kind: Any) -> bool:
-    """Whether a value is of a kind that a type hint names; an array is three numbers."""
+    """True where a value is of the kind that a type hint names; an array is three numbers."""
     parts = get_args(kind)
     if get_origin(kind) is UnionType:
         return any(_fits(value, part) for part in parts)
@@ -297,7 +293,7 @@ def _fits(value: object, kind: Any) -> bool:
         sized = isinstance(value, Sequence) or getattr(value, "ndim", 0) == 1
         return sized and len(numbers) == 3 and all(map(is_number, numbers))
     if get_origin(kind) is tuple:
-        return isinstance(value, tuple) and all(_fits(one, parts[0]) for one in value)
+        return isinstance(value, tuple) and all(_fits(entry, parts[0]) for entry in value)
     return is_number(value) if kind is float else isinstance(value, kind)
 
 

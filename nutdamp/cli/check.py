@@ -1,15 +1,4 @@
-"""``nutdamp check``, ``verify``, ``explain``, ``init`` and ``schema``.
-
-``nutdamp verify``: fly a schedule by independent means, with an error budget.
-
-``nutdamp check``: validate spacecraft files and show what follows from them.
-
-``nutdamp init``: a commented spacecraft file to start from.
-
-``nutdamp explain``: the guide.
-
-``nutdamp schema``: the JSON Schema of the spacecraft file.
-"""
+"""``nutdamp check``, ``verify``, ``explain``, ``init`` and ``schema``."""
 
 from __future__ import annotations
 
@@ -94,9 +83,9 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
 def _looked_into(
     given: FileInput, remark: Callable[[str], None], doubts: list[Fault]
 ) -> tuple[dict[str, Any], RenderableType]:
-    """What follows from a file, for JSON and for the screen; warnings are added to ``doubts``.
+    """Results of the check of a file, for JSON and for the screen; warnings are added to ``doubts``.
 
-    Raises CannotRead, and FaultyFile also for what turns out to be wrong only when consequences are worked out.
+    Raises CannotRead, and FaultyFile, also for faults that appear only in derived quantities.
     """
     from nutdamp.errors import Fault, FaultyFile, NutdampError
     from nutdamp.views.check_json import checked_json
@@ -144,16 +133,16 @@ def verify_command(
     plan = plan_or_read(job, flown, options)
     with working("verifying", quiet=quiet):
         verified = verify(plan)
-    found = verified.core
-    job.deliver([(json, verified.to_dict)], lambda: verification_screen(job.spacecraft, plan.scheme, found))
-    if found.disagreeing:
-        others = " and ".join(found.disagreeing)
+    core = verified.core
+    job.deliver([(json, verified.to_dict)], lambda: verification_screen(job.spacecraft, plan.scheme, core))
+    if core.disagreeing:
+        others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
-    elif not found.checks:
+    elif not core.checks:
         say("nutdamp: no independent integration was flown to the end, so the flown motion is not confirmed")
-    for one in found.drifting:
-        say(f"nutdamp: {one} is not constant on coasts, where nothing changes it; please report this")
-    leave(failed=bool(found.disagreeing or found.drifting), infeasible=not found.checks)
+    for quantity in core.drifting:
+        say(f"nutdamp: {quantity} is not constant on coasts, where nothing changes it; please report this")
+    leave(failed=bool(core.disagreeing or core.drifting), infeasible=not core.checks)
 
 
 def _verify_loop(job: Job, json: str | None) -> None:
@@ -165,12 +154,12 @@ def _verify_loop(job: Job, json: str | None) -> None:
 
     require_loop(job.spacecraft)
     with working("verifying", quiet=job.quiet):
-        found = verify_loop(job.spacecraft)
-    job.deliver([(json, lambda: verified_json(found))], lambda: verification_screen(found))
-    if found.missing:
-        say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {found.missing}")
+        comparison = verify_loop(job.spacecraft)
+    job.deliver([(json, lambda: verified_json(comparison))], lambda: verification_screen(comparison))
+    if comparison.missing:
+        say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
         leave(infeasible=True)
-    if not found.agree:
+    if not comparison.agree:
         say("nutdamp: the loop and the same by DOP853 do not agree; please report this")
         leave(failed=True)
 
@@ -211,7 +200,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
 
 
 def _list() -> None:
-    """Prints the examples."""
+    """Print the examples."""
     from nutdamp.cli.screen import show
     from nutdamp.files.reader import example_names, example_subject
     from nutdamp.views.explain_tables import examples_screen
@@ -221,7 +210,7 @@ def _list() -> None:
 
 
 def _known(name: str) -> str:
-    """The ``name`` if there is such an example; a usage error says which one a misspelt name may mean."""
+    """The ``name`` if there is such an example; a usage error suggests the nearest one to a misspelt name."""
     from nutdamp.errors import nearest
     from nutdamp.files.reader import example_names
 

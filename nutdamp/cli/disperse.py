@@ -1,9 +1,4 @@
-"""``nutdamp disperse``, of a schedule or of a closed loop.
-
-``nutdamp disperse``: fly one schedule in many dispersed cases.
-
-What ``nutdamp disperse --loop`` does: fly the closed loop of the file in many dispersed cases.
-"""
+"""``nutdamp disperse``: fly one schedule, or the closed loop of the file, in many dispersed cases."""
 
 from __future__ import annotations
 
@@ -42,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class Requested(NamedTuple):
-    """What the command line says."""
+    """Options of the command line."""
 
     samples: int
     seed: int
@@ -55,7 +50,7 @@ class Requested(NamedTuple):
 
 
 def disperse_loop(job: Job, requested: Requested) -> None:
-    """Fly the loops and show what becomes of them, or of one case."""
+    """Fly the loops and show their ends, or the flight of one case."""
     require_loop(job.spacecraft)
     require_dispersions(job.spacecraft)
 
@@ -120,7 +115,7 @@ def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
 
 
 FIGURES = ("overview", "cases", "momentum", "budget")
-"""What --plot draws."""
+"""Figures that ``--plot`` draws."""
 
 
 @click.command("disperse", cls=PlanningCommand)
@@ -165,7 +160,6 @@ def command(
     Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
     Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    # Long by its options, each a parameter, and by the two ways to fly, cases of a schedule and of a loop.
     if case is not None and (csv or plot):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
     if until is not None and not looped:

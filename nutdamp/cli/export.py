@@ -1,9 +1,4 @@
-"""``nutdamp export`` and ``import``.
-
-``nutdamp export``: a plan in the formats that flight dynamics reads.
-
-``nutdamp import``: a spacecraft file from a message of flight dynamics.
-"""
+"""``nutdamp export`` and ``import``: plans and spacecraft files in the formats of flight dynamics."""
 
 from __future__ import annotations
 

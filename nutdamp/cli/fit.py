@@ -71,26 +71,26 @@ def command(
     record, read = read_telemetry(telemetry, job.spacecraft, sun_pulses, fired)
     job.doubt(read)
     with working("fitting", quiet=quiet):
-        found = fit(job.spacecraft, record)
-    now = carried(found, at)
-    job.warn(notes(found, now))
-    prospects = _outlook(found, at, quiet) if ahead else None
+        estimate = fit(job.spacecraft, record)
+    now = carried(estimate, at)
+    job.warn(notes(estimate, now))
+    prospects = _outlook(estimate, at, quiet) if ahead else None
     outputs: list[Output] = [
-        (output, partial(fitted_text, *job.source, spacecraft.settings, found, now)),
-        (json, partial(fit_json, found, now, prospects, read)),
-        (plot, partial(_picture, found)),
+        (output, partial(fitted_text, *job.source, spacecraft.settings, estimate, now)),
+        (json, partial(fit_json, estimate, now, prospects, read)),
+        (plot, partial(_picture, estimate)),
     ]
-    job.deliver(outputs, partial(fit_screen, found, at, prospects))
+    job.deliver(outputs, partial(fit_screen, estimate, at, prospects))
 
 
-def _outlook(found: Fit, at: float, quiet: bool) -> Outlook:
+def _outlook(estimate: Fit, at: float, quiet: bool) -> Outlook:
     from nutdamp.estimation.forecast import outlook
 
     with working("looking ahead", quiet=quiet):
-        return outlook(found, at)
+        return outlook(estimate, at)
 
 
-def _picture(found: Fit) -> Figure:
+def _picture(estimate: Fit) -> Figure:
     from nutdamp.figures.fit import fit_figure
 
-    return fit_figure(found)
+    return fit_figure(estimate)

@@ -1,4 +1,4 @@
-"""What a command flies: the plan of a scheme, the pulses of a schedule file, or those that command blocks fire."""
+"""Pulses that a command flies: those of the plan of a scheme, of a schedule file, or of command blocks."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 JITTER_SEED = 1
-"""Of the errors of the Sun pulses from which blocks are fired: the same in every run."""
+"""Seed of the errors of the Sun pulses from which blocks are fired: the same in every run."""
 
 
 class FlownChoice(NamedTuple):
-    """What a command flies: the plan of a ``scheme``, the pulses of a ``schedule`` file, those that the command blocks
-    of a file fire, else the recommended plan.
+    """Source of the pulses that a command flies: the plan of a ``scheme``, a ``schedule`` file, the command blocks of a
+    file, else the recommended plan.
     """
 
     scheme: str | None
@@ -44,7 +44,7 @@ class FlownChoice(NamedTuple):
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
     """``--scheme``, ``--schedule`` and ``--blocks``, gathered into ``flown`` (`FlownChoice`) for `plan_or_read`.
 
-    ``verb`` says what the command does with the pulses, ``scheme`` is the help of ``--scheme`` where that is more.
+    ``verb`` says how the command uses the pulses, ``scheme`` is the help of ``--scheme`` where that is longer.
     A usage error for two of them.
     """
     default = f"{verb} this scheme with default options; without it the recommended one."
@@ -71,7 +71,7 @@ def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], C
 def compared_with(
     job: Job, names: Sequence[str], options: Options, samples: int | None = None, *, timed: bool = False
 ) -> Comparison:
-    """The schemes named, else the usual ones, compared; which options none of them reads is said before."""
+    """Comparison of the schemes named, else the usual ones; a remark names the options that none of them reads."""
     from nutdamp.cli.job import working
     from nutdamp.planning.decision import compare, usual
 
@@ -102,7 +102,7 @@ def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str, option
 
 
 def plan_or_read(job: Job, flown: FlownChoice, options: Options, *, jitter: bool = False, judged: bool = False) -> Plan:
-    """What a command flies, as a plan; raises Infeasible where there is none.
+    """The pulses that a command flies, as a plan; raises Infeasible where there is none.
 
     ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
     ``judged``: a verdict on the screen names the cones that are broken.
@@ -170,6 +170,6 @@ def _fired(job: Job, path: str, options: Options, *, jitter: bool) -> Plan:
     blocks, warnings = read_blocks(path, body)
     if jitter and body.sun_sensor is not None and body.sun_sensor.jitter > 0.0:
         job.remark(f"the Sun pulses come with a jitter of {body.sun_sensor.jitter:g} s (one sigma, seed {JITTER_SEED})")
-    made = fired(body, blocks, JITTER_SEED if jitter else None)
-    job.doubt((*warnings, *broken_limits(body, made)))
-    return Plan(body, printable(path), made, options=options.of(SchemeOptions), from_file=True)
+    pulses = fired(body, blocks, JITTER_SEED if jitter else None)
+    job.doubt((*warnings, *broken_limits(body, pulses)))
+    return Plan(body, printable(path), pulses, options=options.of(SchemeOptions), from_file=True)

@@ -1,12 +1,6 @@
-"""A command from its spacecraft file to what it delivers: output files, screen, progress.
+"""A command from its spacecraft file to its results: input and output files, screen, progress, interruption.
 
-How a command begins and ends: its files checked and its spacecraft read; its results written and shown.
-
-What several commands share: the spacecraft argument, options of pictures, what a file must have.
-
-What a long run shows while it runs, and how it is stopped.
-
-Where the files of a command line lie: no output may take the place of what is read, or of another output.
+No output file may take the place of an input, or of another output.
 """
 
 from __future__ import annotations
@@ -58,7 +52,7 @@ dispersions:
   omega0: {normal: 0.1 deg/s}
   thrust: {normal: 3 %}
   timing: {uniform: 5 ms}"""
-"""What is said of a file that should have dispersions."""
+"""Message for a file that should have dispersions."""
 
 LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
 
@@ -67,7 +61,7 @@ loop:
   law: four-pulse
   start: 0.5 deg
   stop: 0.05 deg"""
-"""What is said of a file that should have a loop."""
+"""Message for a file that should have a loop."""
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -75,7 +69,7 @@ quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on s
 
 
 class FileInput(NamedTuple):
-    """The spacecraft that a command line names: the ``path`` of a file, and what ``--set`` changes in it."""
+    """The spacecraft that a command line names: the ``path`` of a file, and the changes of ``--set``."""
 
     path: str | None
     settings: tuple[Setting, ...] = ()
@@ -129,7 +123,7 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
 
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """``--plot FILE`` and which of the pictures ``names`` it is to be, the default first."""
+    """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
     which = click.option(
         "--figure", type=NameType(names), default=names[0], show_default=True, help="What --plot draws."
     )
@@ -144,7 +138,7 @@ def parsed(
     aim: Aim | None = None,
     doubts: list[Fault] | None = None,
 ) -> Spacecraft:
-    """The spacecraft in what `source` gives; ``aim`` replaces the goal in it, warnings are added to ``doubts``."""
+    """The spacecraft in the text of `source`; ``aim`` replaces its goal, warnings are added to ``doubts``."""
     from nutdamp.files.reader import read_spacecraft
 
     def warn(doubt: Fault) -> None:
@@ -173,7 +167,7 @@ def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
 
 
 def require_dispersions(body: Spacecraft) -> None:
-    """Raises BadRequest, which shows what to write, for a spacecraft without dispersions."""
+    """Raise BadRequest, with an example to write, for a spacecraft without dispersions."""
     from nutdamp.errors import BadRequest
 
     if body.dispersions is None:
@@ -181,7 +175,7 @@ def require_dispersions(body: Spacecraft) -> None:
 
 
 def require_loop(body: Spacecraft) -> None:
-    """Raises BadRequest, which shows what to write, for a spacecraft without a closed loop."""
+    """Raise BadRequest, with an example to write, for a spacecraft without a closed loop."""
     from nutdamp.errors import BadRequest
 
     if body.loop is None:
@@ -192,12 +186,12 @@ PATIENCE = 1.0
 """Seconds that pass before a bar appears."""
 
 LONG = 10.0
-"""Seconds after which a line says how far the work is, where standard error is no terminal."""
+"""Seconds after which a line gives the progress, where standard error is no terminal."""
 
 
 @contextmanager
 def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """A function to call now and then with how many of ``total`` are done.
+    """A function to be called now and then with the number done of ``total``.
 
     It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
     behind. Elsewhere one line says how far it is, after `LONG`.
@@ -211,7 +205,7 @@ def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Says ``what`` is done while it is done: which search, and how much of its budget of `work` is spent.
+    """Show ``what`` is under way, with the search that runs and the share spent of its work budget.
 
     Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
     """
@@ -240,7 +234,7 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
 
 
 class _Doing:
-    """``what`` is done, with the search that a ``watch`` sees and how far it is at the moment it is shown."""
+    """Text of ``what`` is under way, with the search that a ``watch`` sees and its progress when shown."""
 
     def __init__(self, what: str, watch: Watch) -> None:
         self.what, self.watch = what, watch
@@ -253,7 +247,7 @@ class _Doing:
 
 
 class _ProgressLine:
-    """What is shown where there is no terminal: one line, once, that names the share done and the time left."""
+    """Progress where there is no terminal: one line, once, that names the share done and the time left."""
 
     def __init__(self, what: str, total: int) -> None:
         self.what, self.total = what, total
@@ -269,7 +263,7 @@ class _ProgressLine:
         say(f"{self.what}: {min(done, self.total):,} of {self.total:,} done after {passed:.0f} s{rest}")
 
     def close(self) -> None:
-        """Nothing is to be cleared."""
+        """Do nothing: there is no bar to clear."""
 
 
 class _Bar:
@@ -312,18 +306,18 @@ class _Bar:
 
 
 class Interruption:
-    """Whether a run was requested to stop, and by which signal."""
+    """Request to stop a run, and the signal that made it."""
 
     number: int | None = None
 
     def __call__(self) -> bool:
-        """Whether it was."""
+        """True where a stop was requested."""
         return self.number is not None
 
 
 @contextmanager
 def stoppable() -> Iterator[Interruption]:
-    """Tells whether the run was requested to stop, by Ctrl-C or SIGTERM, so that it can end in order.
+    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run can end in order.
 
     A second Ctrl-C interrupts at once.
     """
@@ -347,7 +341,7 @@ STANDARD = "-"
 
 
 def expect_outputs(*read: FileInput | str | None, **written: str | Sequence[str] | None) -> bool:
-    """Whether an output file is standard output, so that nothing else may go there.
+    """True where an output file is standard output, so that nothing else may go there.
 
     A usage error where an output, given by its option, is one of the files ``read`` or another output, under whatever
     name: relative, or through links.
@@ -383,7 +377,7 @@ def _path_of(given: FileInput | str | None) -> str | None:
 
 
 def _identity(path: str, standard: int) -> Hashable:
-    """What tells one file from all others; None for what is no file, such as a terminal or /dev/null.
+    """Identity of a file among all others; None for a terminal, /dev/null and the like.
 
     ``standard`` is the descriptor that ``-`` means.
     """
@@ -395,14 +389,14 @@ def _identity(path: str, standard: int) -> Hashable:
 
 
 File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
-"""What `write_whole` takes."""
+"""Content that `write_whole` takes."""
 
 Output = tuple[str | None, Callable[[], "File | dict[str, Any] | Figure"]]
-"""Path of a file to write, if one is requested, and what makes its content: a dict is for JSON, a figure a picture."""
+"""Path of a file to write, if one is requested, and the function of its content: dict for JSON, figure, or text."""
 
 
 UNDER_WAY = "nutdamp.cli.job"
-"""Where the context of a command line keeps the JSON file and the spacecraft of the job that has begun."""
+"""Key of the JSON file and the spacecraft of the job that has begun, in the context of a command line."""
 
 
 class Job(NamedTuple):
@@ -444,7 +438,7 @@ def begin(
 ) -> Job:
     """Check the files of a command line and load its spacecraft, before any work.
 
-    ``read``: what is read besides; ``written``: by option, the files to write; ``plot`` is a picture, the ``figure``.
+    ``read``: further files to read; ``written``: by option, the files to write; ``plot`` is a picture, the ``figure``.
     Raises as `expect_outputs`, `expect_picture`, `parsed` and `expect_places` do.
     """
     silent = expect_outputs(given, *read, **written)
@@ -461,7 +455,7 @@ def begin(
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:
-    """Write the JSON file of the job that has begun, if there is one: that nothing is feasible, and why."""
+    """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
     from nutdamp.views.plan_json import infeasible_json
@@ -471,7 +465,7 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
 
 
 def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
-    """Say at once, not after the work, that a picture cannot be made; a usage error for a ``figure`` without file."""
+    """Refuse a picture that cannot be made before the work; a usage error for a ``figure`` without file."""
     if path is None:
         if figure != FIGURES[0]:
             raise click.UsageError("--figure says what --plot draws: name a file with --plot")
@@ -482,12 +476,12 @@ def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
 
 
 def remarks(quiet: bool) -> Callable[[str], None]:
-    """Prints remarks on standard error, unless ``quiet``."""
+    """Print remarks on standard error, unless ``quiet``."""
     return (lambda _: None) if quiet else say
 
 
 def expect_places(*paths: str) -> None:
-    """Say at once, not after the work, that a file cannot be written where it is to be."""
+    """Refuse at once, not after the work, a file that cannot be written at its place."""
     from nutdamp.files.tabular import check_place
 
     for path in paths:
@@ -499,11 +493,11 @@ def deliver(
 ) -> None:
     """Write the files requested, and show results on standard output.
 
-    A file that cannot be saved keeps back neither the others nor the results: it is said at the end, together with
-    those that are ``unsaved`` already. Raises CannotWrite.
+    A file that cannot be saved keeps back neither the others nor the results: it is reported at the end, together
+    with those that are ``unsaved`` already. Raises CannotWrite.
     """
     failures = list(unsaved)
-    # All is made before anything is written: what cannot be made leaves nothing behind.
+    # All content is made before any file is written, so that a failure leaves no file behind.
     contents = [(path, _file_of(make(), path)) for path, make in outputs if path is not None]
     results = [make() for make in screens]
     if contents:

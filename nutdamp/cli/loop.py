@@ -1,9 +1,4 @@
-"""``nutdamp loop`` and ``budget``.
-
-``nutdamp loop``: fire from what a sensor shows, in a closed loop.
-
-``nutdamp budget``: what it takes to hold the nutation against energy dissipation.
-"""
+"""``nutdamp loop`` and ``budget``: the closed loop of the file, and its cost against energy dissipation."""
 
 from __future__ import annotations
 
@@ -150,18 +145,18 @@ def budget_command(
     from nutdamp.views.budget_tables import budget_screen
 
     with progress("following cycles", max(len(thresholds), 1), quiet=quiet) as step:
-        made = budget(job.spacecraft, thresholds, largest=largest, seed=seed, progress=step)
-    found = made.core
+        result = budget(job.spacecraft, thresholds, largest=largest, seed=seed, progress=step)
+    core = result.core
     outputs: list[Output] = [
-        (csv, lambda: budget_csv(found)),
-        (json, made.to_dict),
-        (plot, partial(_budget_picture, found)),
+        (csv, lambda: budget_csv(core)),
+        (json, result.to_dict),
+        (plot, partial(_budget_picture, core)),
     ]
-    job.deliver(outputs, lambda: budget_screen(found))
-    leave(infeasible=not found.feasible, missed=found.meets_requirement is False)
+    job.deliver(outputs, lambda: budget_screen(core))
+    leave(infeasible=not core.feasible, missed=core.meets_requirement is False)
 
 
-def _budget_picture(found: Budget) -> Figure:
+def _budget_picture(core: Budget) -> Figure:
     from nutdamp.figures.budget import budget_figure
 
-    return budget_figure(found)
+    return budget_figure(core)

@@ -1,8 +1,6 @@
-"""The ``nutdamp`` command: its subcommands, and errors as messages and exit statuses.
+"""The ``nutdamp`` command: its subcommands, loaded when used, and errors as messages and exit statuses.
 
-The one place that turns errors into messages and exit statuses; a real bug keeps its traceback.
-
-The ``nutdamp`` command: its subcommands, loaded when they are used.
+No other module turns errors into exit statuses; a bug keeps its traceback.
 """
 
 from __future__ import annotations
@@ -49,7 +47,7 @@ def run(group: click.Group) -> None:
     except click.ClickException as wrong:
         message = io.StringIO()
         wrong.show(file=message)
-        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as what steers a terminal
+        say(message.getvalue().expandtabs(2).rstrip("\n"))  # a tab would be shown as a control character
         status = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
@@ -62,7 +60,7 @@ def run(group: click.Group) -> None:
         _silence_stdout()
         status = UNREADABLE
     except OSError as wrong:
-        # Files name themselves and become CannotRead or CannotWrite; what has no name is standard output.
+        # Files name themselves and become CannotRead or CannotWrite; an error without a name is of standard output.
         if wrong.filename is not None:
             raise
         _silence_stdout()
@@ -84,7 +82,7 @@ def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = Fals
 
 
 def interruption(number: int) -> BaseException:
-    """What ends a run after a signal."""
+    """The exception that ends a run after a signal."""
     return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
 
 
@@ -107,20 +105,20 @@ def _open_streams() -> None:
 
 
 def _silence_stdout() -> None:
-    """Let what is still buffered for standard output go nowhere, so that Python does not stumble over it at exit."""
+    """Discard text still buffered for standard output, so that Python does not stumble over it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def tell(wrong: Exception) -> None:
-    """Say on standard error what is wrong; faults of a file begin with its name, all else with that of the program."""
+    """Print an error on standard error; faults of a file begin with its name, all others with that of the program."""
     from nutdamp.errors import FaultyFile
 
     say(str(wrong) if isinstance(wrong, FaultyFile) else f"nutdamp: {wrong}")
 
 
 def _explain(wrong: Exception) -> int:
-    """Say on standard error what the user can cure, and give its exit status; a bug is raised again."""
-    from nutdamp import errors  # here, because a run without errors need not load it
+    """Print an error that the user can cure, and return its exit status; a bug is raised again."""
+    from nutdamp import errors
 
     statuses: dict[type[errors.NutdampError], int] = {
         errors.CannotRead: UNREADABLE,
@@ -154,7 +152,7 @@ COMMANDS = {
     "init": "Write a commented spacecraft file to start from.",
     "schema": "JSON Schema of the spacecraft file, for editors.",
 }
-"""The subcommands in the order of a first use, and what the help page says of each."""
+"""The subcommands in the order of a first use, with their lines on the help page."""
 
 
 SHARED = {
@@ -170,7 +168,7 @@ SHARED = {
 
 
 class CommandGroup(click.Group):
-    """Subcommands live in modules of their name, or as `SHARED` has it, and load little of others."""
+    """Group whose subcommands live in modules of their name, or as `SHARED` has it, and load little of others."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
         """Names in the order of a first use."""
@@ -184,7 +182,7 @@ class CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that a command line names; a usage error says which one a misspelt name may mean."""
+        """The command that a command line names; a usage error suggests the nearest name to a misspelt one."""
         name = args[0]
         if name not in COMMANDS and not name.startswith("-"):
             close = nearest(name, COMMANDS)
@@ -192,7 +190,7 @@ class CommandGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; where nothing that was asked for is feasible, its JSON file says so all the same."""
+        """Run the command; where nothing requested is feasible, its JSON file says so all the same."""
         try:
             return super().invoke(ctx)
         except Infeasible as reason:

@@ -1,10 +1,7 @@
-"""Options and kinds of parameters: the goal, those of schemes, files, quantities, directions.
+"""Options and kinds of parameters: the goal, the options of schemes, files, quantities, directions.
 
-Options that plan: the goal, which every command that plans takes, and those of each scheme, of `plan` alone.
-
-The latter are made from the fields of the scheme's options; the help page shows them under a heading per scheme.
-
-Kinds of parameters that several commands take: files, quantities, directions.
+Every command that plans takes the goal; `plan` alone takes the options of each scheme. Those are made from the fields
+of the scheme's options, and stand under a heading per scheme on the help page.
 """
 
 from __future__ import annotations
@@ -62,7 +59,7 @@ class SchemeName(NameType):
     """The name of a scheme; there are more of them than a line of the help page holds."""
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Shown in the help page."""
+        """Form of the value on the help page."""
         return "SCHEME"
 
 
@@ -71,7 +68,7 @@ class Bare(float):
 
 
 def is_number(word: str) -> bool:
-    """Whether a word of the command line is a number without a unit."""
+    """True where a word of the command line is a number without a unit."""
     try:
         float(word)
     except ValueError:
@@ -91,7 +88,7 @@ class FileName(ParamType[str]):
         param: click.Parameter,  # noqa: ARG002
         incomplete: str,
     ) -> list[CompletionItem]:
-        """Leaves it to the shell to complete the name."""
+        """Leave it to the shell to complete the name."""
         return [CompletionItem(incomplete, type=self.completed_as)]
 
 
@@ -103,7 +100,7 @@ class FolderName(FileName):
 
 
 SAMPLES = 20_000
-"""Cases where nothing else is said: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
+"""Default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
 
 FILE = FileName()
 FOLDER = FolderName()
@@ -128,7 +125,7 @@ class UnitType(ParamType[float]):
         return Bare(number) if isinstance(value, str) and is_number(value) else number
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Shown in the help page; click gives a context from 8.2 on."""
+        """Form of the value on the help page; click gives a context from 8.2 on."""
         return self.kind.upper()
 
 
@@ -155,7 +152,7 @@ class FinalSpin(UnitType):
 
 
 def reading_of(value: float, kind: str, meant: str) -> str:
-    """How a number without unit is read, and what to write if another unit is ``meant``."""
+    """The reading of a number without unit, and the text to write if another unit is ``meant``."""
     from nutdamp.files.plausibility import reading
 
     return reading(int(value) if value.is_integer() else float(value), kind, meant)
@@ -169,10 +166,10 @@ class Angles(NamedTuple):
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """How the numbers without unit are read that are more likely degrees: whole ones, and more than a turn."""
-        bare = [one for one in self if isinstance(one, Bare)]
-        doubtful = [one for one in bare if one and (one.is_integer() or abs(one) > 2.0 * math.pi)]
-        return tuple(reading_of(one, "angle", "deg") for one in doubtful)
+        """Readings of the numbers without unit that are more likely degrees: whole ones, and more than a turn."""
+        bare = [angle for angle in self if isinstance(angle, Bare)]
+        doubtful = [angle for angle in bare if angle and (angle.is_integer() or abs(angle) > 2.0 * math.pi)]
+        return tuple(reading_of(angle, "angle", "deg") for angle in doubtful)
 
 
 class Direction(ParamType[Angles]):
@@ -207,14 +204,14 @@ class Count(ParamType[int]):
         return int(number)
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Shown in the help page."""
+        """Form of the value on the help page."""
         return "N"
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 GOAL = "Goal and motion"
-"""Heading of the options that say what is to be reached."""
+"""Heading of the options of the goal."""
 
 FASTEST = 100.0
 """rad/s; no spacecraft spins faster, so a larger number without unit is more likely one of rpm, as a whole one is."""
@@ -240,7 +237,7 @@ class Grouped(click.Option):
 
 
 class PlanningCommand(click.Command):
-    """A command whose help page has headings, and which says where the options of the schemes are."""
+    """A command whose help page has headings, and whose errors say where the options of the schemes are."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The options under their headings, those without one first."""
@@ -255,7 +252,7 @@ class PlanningCommand(click.Command):
                     formatter.write_dl(records, col_max=WIDEST)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """As click does; an option of a scheme that this command does not take says where to give it."""
+        """Parse as click does; the error for an option of a scheme that is not taken here says where to give it."""
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as wrong:
@@ -272,7 +269,7 @@ class PlanningCommand(click.Command):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """What is to be reached: gathered into ``aim`` for `load`, and ``options`` of every scheme.
+    """The goal, gathered into ``aim`` for `load`, and ``options`` of every scheme.
 
     ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
     """
@@ -348,12 +345,12 @@ def scheme_options(command: Command) -> Command:
 
 def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
     """Each option that not all schemes have: its name, its field, and the schemes that have it."""
-    found: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
+    varying: dict[str, tuple[dataclasses.Field[Any], list[str]]] = {}
     for scheme in SCHEMES.values():
         for field in dataclasses.fields(scheme.options):
             if field.name not in SHARED:
-                found.setdefault(field.name, (field, []))[1].append(scheme.name)
-    for name, (field, schemes) in found.items():
+                varying.setdefault(field.name, (field, []))[1].append(scheme.name)
+    for name, (field, schemes) in varying.items():
         yield name, field, schemes
 
 
@@ -414,7 +411,7 @@ def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParame
 
 
 def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:
-    """Say which options none of the schemes ``names`` reads; a usage error where that is the goal itself."""
+    """Remark on options that none of the schemes ``names`` reads; a usage error where that is the goal itself."""
     planned = [SCHEMES[name] for name in names]
     for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]

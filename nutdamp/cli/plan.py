@@ -150,28 +150,28 @@ def _outputs_of_blocks(
 
     Raises BadRequest where plans have pulses, but no blocks.
     """
-    plans: list[Plan] = [one for one in (chosen, *compared) if one is not None and one.feasible]
+    plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
     if path is None or not plans:
         return []
-    found = next((one for one in plans if one.pulses.blocks), None)
-    if found is None:
+    source = next((plan for plan in plans if plan.pulses.blocks), None)
+    if source is None:
         raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
-    if found is not chosen:
-        remark(f"writing the blocks of {found.scheme}, which is not the recommended plan")
+    if source is not chosen:
+        remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
     from nutdamp.files.schedules import blocks_csv
 
-    return [(path, partial(blocks_csv, found.flight))]
+    return [(path, partial(blocks_csv, source.flight))]
 
 
 def _pictured(figure: str) -> tuple[bool, bool, bool]:
-    """Whether a picture is of one plan, of all of them, or of the certificate."""
+    """True for pictures of one plan, of all plans, and of the certificate, in this order."""
     return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
 
 
 def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
-    """Raises BadRequest, before any work, where the scheme is not to be planned of whose plans there are certificates.
+    """Raise BadRequest, before any work, where the scheme that certificates belong to is not to be planned.
 
-    So it is too where it cannot plan, as without channels.
+    Also where it cannot plan, as without channels.
     """
     from nutdamp.planning.decision import usual
     from nutdamp.schemes.catalogue import OPTIMAL
@@ -183,7 +183,7 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
 
 
 def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certificate | None, list[CannotWrite]]:
-    """The certificate of the plan of optimal; where it has none, why ``paths`` are not written.
+    """The certificate of the plan of optimal; where it has none, the errors of the ``paths`` that are not written.
 
     None where no path is named.
     """
@@ -194,35 +194,35 @@ def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certi
     from nutdamp.planning.tradeoff import SCHEME, certificate
 
     try:
-        return certificate(next(one for one in compared if one.scheme == SCHEME)), []
+        return certificate(next(plan for plan in compared if plan.scheme == SCHEME)), []
     except BadRequest as reason:
-        return None, [CannotWrite(one, f"there is no certificate: {reason}") for one in files]
+        return None, [CannotWrite(path, f"there is no certificate: {reason}") for path in files]
 
 
-def _outputs_of_proof(found: Certificate | None, path: str | None, plot: str | None) -> list[Output]:
+def _outputs_of_proof(proof: Certificate | None, path: str | None, plot: str | None) -> list[Output]:
     """The files of a certificate, if there is one."""
-    if found is None:
+    if proof is None:
         return []
     from nutdamp.views.certificate_json import certificate_json
 
     def picture() -> Figure:
         from nutdamp.figures import certificate
 
-        return certificate.certificate_figure(found)
+        return certificate.certificate_figure(proof)
 
-    return [(path, partial(certificate_json, found)), (plot, picture)]
+    return [(path, partial(certificate_json, proof)), (plot, picture)]
 
 
 def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:
     from nutdamp.page.results import comparison_data
 
-    made = comparison_data(compared, decided)
+    data = comparison_data(compared, decided)
     if dispersed is None:
-        return made
+        return data
     from nutdamp.views import robust_verdicts
     from nutdamp.views.robust_json import robust_json
 
-    return {**made, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
+    return {**data, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
 
 
 def _picture(chosen: Plan, figure: str) -> Figure:

@@ -22,14 +22,14 @@ POINTS = 6
 """Horizons tried for each front where no number follows ``--trade``."""
 
 COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
-"""Options that may come without a number, and what they then are."""
+"""Options that may come without a number, and their values then."""
 
 
 class ReportCommand(PlanningCommand):
     """``report``, in which the options of `COUNTS` may come without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put in a number where none follows: what else follows is a file or an option."""
+        """Put in a number where none follows: any other word is a file or an option."""
         given: list[str] = []
         for index, word in enumerate(args):
             given.append(word)
@@ -46,7 +46,7 @@ CONTROL = (
     ("author", "Author of the page."),
     ("date", "Date of issue, printed as given; default that of SOURCE_DATE_EPOCH."),
 )
-"""What configuration control writes on a page: options, and what they are."""
+"""Options of configuration control on a page, and their subjects."""
 
 CONTROLLED = "Configuration control"
 """Their heading."""
@@ -123,7 +123,7 @@ def command(
     from nutdamp.planning.decision import compare_plans
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
-    set_to = tuple((dotted(one.path), str(one.value)) for one in spacecraft.settings)
+    set_to = tuple((dotted(setting.path), str(setting.value)) for setting in spacecraft.settings)
     text, name = job.source
     repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
     if disperse is not None or robust:
@@ -139,10 +139,10 @@ def command(
         compared = robust_of(job, compared, options).joined
     fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0], options).fronts
     with working("writing the page", quiet=quiet):
-        made = made_of(compared, repeat, kept, fronts)
-    deliver([(output, lambda: made.content)])
-    if not made.good:
-        job.remark(made.verdict)
+        report = made_of(compared, repeat, kept, fronts)
+    deliver([(output, lambda: report.content)])
+    if not report.good:
+        job.remark(report.verdict)
     if output != "-":
         job.remark(f"wrote {printable(output)}")
-    leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=made.met is False)
+    leave(failed=show_failures(compared), infeasible=compared.recommended is None, missed=report.met is False)

@@ -1,9 +1,7 @@
-"""What reaches the terminal: results on standard output, messages on standard error, no control characters in either.
+"""Output to the terminal: results on standard output, messages on standard error, no control characters in either.
 
 Names of files, channels or units come from elsewhere; on a terminal their control characters could clear the screen,
 change its title or pass for output of this program.
-
-What is said of schemes that have a bug.
 """
 
 from __future__ import annotations
@@ -76,7 +74,7 @@ class _Visible:
 
 
 DEBUG = "nutdamp.debug"
-"""Where the context of a command line keeps that ``--debug`` is given."""
+"""Key of ``--debug`` in the context of a command line."""
 
 
 def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -89,7 +87,7 @@ debug_option = click.option(
 
 
 def show_failures(compared: Comparison) -> bool:
-    """Say on standard error which schemes have a bug, with ``--debug`` the tracebacks too; whether there are any."""
+    """Name on standard error the schemes that have a bug, with ``--debug`` their tracebacks; return True if any has."""
     for plan in compared.failed:
         if click.get_current_context().meta.get(DEBUG):
             import traceback

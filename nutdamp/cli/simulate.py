@@ -1,9 +1,4 @@
-"""``nutdamp simulate`` and ``animate``.
-
-``nutdamp simulate``: propagate a scheme or a schedule file.
-
-``nutdamp animate``: the cones rolling on each other, as a film.
-"""
+"""``nutdamp simulate`` and ``animate``: propagate a scheme or a schedule file, or film its motion."""
 
 from __future__ import annotations
 
@@ -83,15 +78,15 @@ def animate_command(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
             f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
-    made = propagation.flown(body, pulses, end)
+    flight = propagation.flown(body, pulses, end)
     with progress("filming", timed.frames, quiet=quiet) as step:
-        deliver([(output, lambda: lambda stream: animation.film(stream, made, timed, output, width, step))])
+        deliver([(output, lambda: lambda stream: animation.film(stream, flight, timed, output, width, step))])
     if output != "-":
         remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")
 
 
 PICTURED = 100_000
-"""Rows of the track of a picture at most."""
+"""Largest number of rows of the track of a picture."""
 
 
 @click.command("simulate", cls=PlanningCommand)
@@ -149,36 +144,36 @@ def command(
     from nutdamp.views.verdicts import model_warnings
 
     body, pulses = plan.spacecraft, plan.pulses
-    made = Simulation(plan, pulses.end + body.inertial_period if until is None else until, real, samples)
+    simulation = Simulation(plan, pulses.end + body.inertial_period if until is None else until, real, samples)
     if job.silent:
-        job.warn(model_warnings(made.impulses, made.flown))
+        job.warn(model_warnings(simulation.impulses, simulation.flown))
     track = None
     if plot is not None or drawn:
-        track = made.track(min(samples, PICTURED), shown_until(body, pulses) if until is None else until)
+        track = simulation.track(min(samples, PICTURED), shown_until(body, pulses) if until is None else until)
     outputs: list[Output] = [
-        (csv, lambda: partial(write_track, made.pieces(), body.inertia)),
-        (json, lambda: simulation_json(made, verdict(made.decision))),
-        (plot, partial(_picture, made, track, figure)),
+        (csv, lambda: partial(write_track, simulation.pieces(), body.inertia)),
+        (json, lambda: simulation_json(simulation, verdict(simulation.decision))),
+        (plot, partial(_picture, simulation, track, figure)),
     ]
-    job.deliver(outputs, partial(_screen, made), *[partial(_drawing, made, track)] * drawn)
-    leave(missed=made.decision.met is False and len(made.flown.schedule) == len(pulses))
+    job.deliver(outputs, partial(_screen, simulation), *[partial(_drawing, simulation, track)] * drawn)
+    leave(missed=simulation.decision.met is False and len(simulation.flown.schedule) == len(pulses))
 
 
-def _picture(made: Simulation, track: Track | None, figure: str) -> Figure:
+def _picture(simulation: Simulation, track: Track | None, figure: str) -> Figure:
     from nutdamp.figures import overview
 
     assert track is not None
-    return overview.flight_figure(figure, made.shown, track)
+    return overview.flight_figure(figure, simulation.shown, track)
 
 
-def _screen(made: Simulation) -> RenderableType:
+def _screen(simulation: Simulation) -> RenderableType:
     from nutdamp.views.simulate_tables import simulation_screen
 
-    return simulation_screen(made)
+    return simulation_screen(simulation)
 
 
-def _drawing(made: Simulation, track: Track | None) -> RenderableType:
+def _drawing(simulation: Simulation, track: Track | None) -> RenderableType:
     from nutdamp.figures.terminal import motion_drawing
 
     assert track is not None
-    return motion_drawing(made.shown, track)
+    return motion_drawing(simulation.shown, track)

@@ -1,4 +1,4 @@
-"""``nutdamp trade``: what time costs, as a front of schedules."""
+"""``nutdamp trade``: the cost of an earlier end, as a front of schedules."""
 
 from __future__ import annotations
 
@@ -99,18 +99,22 @@ def command(
     job = begin(spacecraft, aim=aim, quiet=quiet, csv=csv, json=json, plot=plot, schedules=paths)
     expect_read((OPTIMAL.name,), options, job.spacecraft, job.remark)
     traded = fronts_of(job, points, shifts, least, options)
-    found = traded.fronts
-    for index, _, point in numbered(found):
+    fronts = traded.fronts
+    for index, _, point in numbered(fronts):
         if point.plan.cut:
             job.remark(f"point {index}: {CUT}")
-    outputs: list[Output] = [(csv, lambda: trade_csv(found)), (json, traded.to_dict), (plot, partial(_picture, traded))]
-    files, unsaved = ([], []) if schedules is None else _schedules(found, schedules)
+    outputs: list[Output] = [
+        (csv, lambda: trade_csv(fronts)),
+        (json, traded.to_dict),
+        (plot, partial(_picture, traded)),
+    ]
+    files, unsaved = ([], []) if schedules is None else _schedules(fronts, schedules)
     job.deliver([*outputs, *files], partial(_screen, traded), unsaved=unsaved)
-    leave(infeasible=not any(front.points for front in found))
+    leave(infeasible=not any(front.points for front in fronts))
 
 
-def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
-    """A file of each schedule, or why the folder cannot be made."""
+def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
+    """A file of each schedule, or the error where the folder cannot be made."""
     from nutdamp.errors import CannotWrite
     from nutdamp.files.tabular import make_folder
     from nutdamp.views.trade_files import schedule_files
@@ -119,7 +123,7 @@ def _schedules(found: Sequence[Front], folder: str) -> tuple[list[Output], list[
         make_folder(folder)
     except CannotWrite as wrong:
         return [], [wrong]
-    return [(path, partial(str, text)) for path, text in schedule_files(found, folder)], []
+    return [(path, partial(str, text)) for path, text in schedule_files(fronts, folder)], []
 
 
 def _picture(traded: Trade) -> Figure:

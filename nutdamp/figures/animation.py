@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 FORMATS = ("gif", "mp4")
 
 INCHES = 8.0
-"""Width of the sheet that fills a frame: pixels only make it finer."""
+"""Width of the sheet that fills a frame, inches: more pixels only make it finer."""
 
 LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
 """Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
@@ -54,18 +54,18 @@ def film_format(path: str) -> str:
 
     Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
     """
-    found = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
-    if found not in FORMATS:
+    ending = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if ending not in FORMATS:
         raise BadRequest(f"--output {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
     style.require()
-    if found == "mp4" and shutil.which("ffmpeg") is None:
+    if ending == "mp4" and shutil.which("ffmpeg") is None:
         raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
-    return found
+    return ending
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How ``until`` s of motion become ``frames`` pictures at ``fps`` a second."""
+    """Division of ``until`` s of motion into ``frames`` pictures at ``fps`` a second."""
 
     until: float
     frames: int
@@ -79,7 +79,7 @@ class Timing:
 
     @property
     def smooth(self) -> bool:
-        """Whether the eye can follow the nutation."""
+        """True where the eye can follow the nutation."""
         return self.frames >= 0.5 * SMOOTH * self.turns
 
     @property
@@ -115,7 +115,7 @@ def film(
 
 
 def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
-    """Write a looped GIF with the palette of its first frame: what does not move keeps its colour."""
+    """Write a looped GIF with the palette of its first frame: fixed parts keep their colour."""
     from PIL import Image
 
     def frames() -> Iterator[Image.Image]:
@@ -133,7 +133,7 @@ def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int
 
 
 def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
-    """H.264 as browsers play it."""
+    """Write H.264 as browsers play it."""
     from matplotlib.animation import FFMpegWriter
 
     writer = FFMpegWriter(fps=timed.fps, codec="h264", extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"])
@@ -147,12 +147,12 @@ def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int
                     progress(number + 1)
         except subprocess.CalledProcessError as reason:
             raise CannotWrite("mp4", f"ffmpeg failed with status {reason.returncode}") from reason
-        with target.open("rb") as made:
-            shutil.copyfileobj(made, stream)
+        with target.open("rb") as encoded:
+            shutil.copyfileobj(encoded, stream)
 
 
 class Scene:
-    """The figure of the film, and what changes from frame to frame."""
+    """The figure of the film, and its parts that change from frame to frame."""
 
     def __init__(self, flight: Flight, timed: Timing, width: int) -> None:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -173,14 +173,14 @@ class Scene:
         self._lay_out()
 
     def _lay_out(self) -> None:
-        """Everything that does not move, and room for what moves."""
+        """Draw the parts that do not move, and make room for those that do."""
         figure, flight = self.figure, self.flight
         grid = figure.add_gridspec(2, 2, height_ratios=[5, 1.5])
         self.space, self.sky = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         self.strip = figure.add_subplot(grid[1, :])
         some = np.unique(np.linspace(0, self.timed.frames - 1, min(self.timed.frames, FRAMED)).round().astype(int))
         cones = (self.cones(number) for number in some.tolist())
-        rims = np.vstack([rim for one in cones for rim in (one.body, one.space, one.axis[None], one.rotation[None])])
+        rims = np.vstack([part for at in cones for part in (at.body, at.space, at.axis[None], at.rotation[None])])
         sphere.draw_ground(self.space, self.looked, self.path)
         sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
         much = self.looked.magnified
@@ -208,14 +208,14 @@ class Scene:
         """Frame ``number``, from 0."""
         for artist in self._changing:
             artist.remove()
-        now, found = float(self.timed.times[number]), self.cones(number)
+        now, cones = float(self.timed.times[number]), self.cones(number)
         kept = [set(axes.get_children()) for axes in self.figure.axes]
         done = self.path.t <= now
-        sphere.draw_cones(self.space, self.looked, found)
+        sphere.draw_cones(self.space, self.looked, cones)
         sphere.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
-        sphere.draw_circles(self.sky, self.plane, found)
+        sphere.draw_circles(self.sky, self.plane, cones)
         if self.timed.until * abs(self.flight.spacecraft.spin) < MARKED * self.timed.frames:
-            mark = geometry.body_mark(found, self.quaternions[number])[None]
+            mark = geometry.body_mark(cones, self.quaternions[number])[None]
             self.space.plot(*self.looked.seen(mark)[0].T, "D", color=MOTION, markersize=4)
             self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
         self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
@@ -229,7 +229,7 @@ class Scene:
         self.title.set_text(self.caption(now))
 
     def caption(self, now: float) -> str:
-        """What is written above the frame: name, time, and what fires or just did."""
+        """Text above the frame: name, time, and the firing, also just after it."""
         firing = [
             f"   {'firing' if now <= pulse.end else 'fired'} {number}: {pulse.channel}"
             for number, pulse in enumerate(self.flight.schedule, start=1)
@@ -242,8 +242,8 @@ class Scene:
         return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
 
     def pixels(self) -> NDArray[np.uint8]:
-        """The frame as it is, (height, width, 3): what changes is drawn over what does not move."""
+        """The frame, (height, width, 3): the changing parts drawn over the fixed ones."""
         self.canvas.restore_region(self.still)  # type: ignore[no-untyped-call]
-        for artist in sorted([*self._changing, self.title], key=lambda one: one.get_zorder()):
+        for artist in sorted([*self._changing, self.title], key=lambda drawn: drawn.get_zorder()):
             artist.draw(self.canvas.get_renderer())  # type: ignore[no-untyped-call]
         return np.array(self.canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]

@@ -19,7 +19,7 @@ _FIRST = 0x2800
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 FAINT = "dim"
-"""Style of what gives way to every curve."""
+"""Style of dots that give way to every curve."""
 
 
 FRAME = 2
@@ -75,9 +75,9 @@ class BraillePanel:
         self._layers.append((style, layer))
 
     def mark(self, point: Vector, text: str, style: str, *, at: bool = False) -> bool:
-        """Write ``text`` at a point, in the first free place to its right, left, above or below; whether there is one.
+        """Write ``text`` at a point, in the first free place right, left, above or below; True where there is one.
 
-        What is to be ``at`` the point itself only gives way to what was there before.
+        A text ``at`` the point itself gives way only to earlier marks.
         """
         row, column = self.cell(float(point[0]), float(point[1]))
         around = [(row, column + 1), (row, column - len(text)), (row - 1, column), (row + 1, column)]
@@ -141,7 +141,7 @@ def _upright(panel: BraillePanel) -> dict[int, str]:
 
 
 def framed(panel: BraillePanel, title: str, x: str, y: str) -> list[Text]:
-    """The panel with its title, its two scales and what they measure; all lines equally wide."""
+    """The panel with its title, its two scales and their quantities; all lines equally wide."""
     (left, low), (right, _) = panel.middle - panel.half, panel.middle + panel.half
     upright = _upright(panel)
     margin = max(len(text) for text in upright.values())

@@ -1,4 +1,4 @@
-"""Pictures of a dispersion study: how the cases are distributed, where H ends in them, which tolerance counts."""
+"""Pictures of a dispersion study: distribution of the cases, final directions of H, effect of each tolerance."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 BINS = 80
 
 TAIL, KNEE = 2.0, 0.999
-"""Where the largest value is more than TAIL times what KNEE of the cases stay below, the axis is logarithmic."""
+"""The axis is logarithmic where the largest value is more than TAIL times the quantile KNEE."""
 
 DECADES = 6.0
-"""Of that axis at most: its first bin holds all that is less."""
+"""Largest number of decades of that axis: its first bin holds all smaller values."""
 
 STEPS = 100
 """Cases at the end of a distribution function that have a step each."""
@@ -40,19 +40,19 @@ ALIKE = 1e-9
 """Relative difference up to which the values of all cases are one, but for rounding."""
 
 NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
-"""Degrees below which all cases together are not worth a picture, and how that is written."""
+"""Degrees below which all cases together are not worth a picture, and their text."""
 
 FAR = 4.0
 """A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
 
 FEW = 4
-"""Rows of a tornado at least: fewer bars are no thicker."""
+"""Least number of rows of a tornado: fewer bars are no thicker."""
 
 DOTS = 2_000
-"""Cases shown as dots: more would only make the picture heavy."""
+"""Largest number of cases shown as dots: more would only make the picture heavy."""
 
 DENSE = 0.8
-"""Of a dot: fainter ones are not seen (less than 3:1 on white)."""
+"""Opacity of a dot: fainter ones are not seen (less than 3:1 on white)."""
 
 
 @style.styled
@@ -70,7 +70,7 @@ def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
 
 
 def overview(results: Results) -> Figure:
-    """All of them on one sheet."""
+    """All figures on one sheet."""
     figure = style.sheet(11.0, 9.4)
     upper, lower = figure.subfigures(2, 1, height_ratios=[1.5, 1.0], squeeze=False)[:, 0]
     left, right = upper.subfigures(1, 2, width_ratios=[1.9, 1.0], squeeze=False)[0]
@@ -81,21 +81,21 @@ def overview(results: Results) -> Figure:
 
 
 def cases(results: Results) -> Figure:
-    """Histogram and distribution function of nutation and shift of H, with what is required of them."""
+    """Histogram and distribution function of nutation and shift of H, with their requirements."""
     figure = style.sheet(7.4, 5.6)
     _cases(figure, results)
     return figure
 
 
 def momentum(results: Results) -> Figure:
-    """Where H ends in each case, seen from outside, with the ellipse that holds as many as must comply."""
+    """Final direction of H in each case, seen from outside, with the ellipse that holds as many as must comply."""
     figure = style.sheet(4.1, 4.5)
     _momentum(figure, results)
     return figure
 
 
 def budget(results: Results) -> Figure:
-    """What each tolerance does to nutation and shift of H, side by side."""
+    """Effect of each tolerance on nutation and shift of H, side by side."""
     figure = style.sheet(8.0, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
     _budget(figure, results)
     return figure
@@ -105,7 +105,7 @@ DRAWN = {"overview": overview, "cases": cases, "momentum": momentum, "budget": b
 
 
 def _limit(results: Results, part: Part) -> float | None:
-    """What is required of a part, degrees."""
+    """The bound required of a part, degrees."""
     bounds = requirements.required(results.study.model.spacecraft)
     return next((math.degrees(bound.most) for bound in bounds if bound.part is part), None)
 
@@ -113,42 +113,42 @@ def _limit(results: Results, part: Part) -> float | None:
 def _cases(figure: Figure | SubFigure, results: Results) -> None:
     grid = figure.subplots(2, 2)
     for row, part in zip(grid, (Part.NUTATION, requirements.aim(results.study.model.spacecraft)), strict=True):
-        found = results.distribution(part.value)
-        if found is None:
+        distribution = results.distribution(part.value)
+        if distribution is None:
             continue
         name = "nutation left" if part is Part.NUTATION else part.label
         limit = _limit(results, part)
         required = "" if limit is None else f", required {limit:.4g}°"
         row[0].set_title(f"{name}: histogram")
         row[1].set_title(f"{name}: cases beyond")
-        alike = _alike(found)
+        alike = _alike(distribution)
         if alike is not None:
             for axes in row:
                 style.words(axes, f"all {results.done:,} cases:\n{alike}{required}")
             continue
         row[1].sharex(row[0])
-        _histogram(row[0], found, name, limit)
-        _function(row[1], found, name, results)
-        reached = math.degrees(float(found.quantiles(np.array([results.probability]))[0]))
+        _histogram(row[0], distribution, name, limit)
+        _function(row[1], distribution, name, results)
+        reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
         for axes in row:
             _mark(axes, reached, limit, results.probability)
         row[1].set_title(f"{exact_percent(results.probability)} within {reached:.4g}°{required}")
     legend(figure, list(grid.flat))
 
 
-def _alike(found: Distribution) -> str | None:
-    """What there is to say of cases of which a histogram would show nothing; None where it shows something."""
-    least, most = math.degrees(found.minimum), math.degrees(found.maximum)
+def _alike(distribution: Distribution) -> str | None:
+    """Text for cases of which a histogram would show nothing; None where it shows something."""
+    least, most = math.degrees(distribution.minimum), math.degrees(distribution.maximum)
     if most < NOTHING:
         return f"below {NEXT_TO_NOTHING}"
     return f"{most:.4g}°" if most - least <= ALIKE * most else None
 
 
-def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) -> None:
-    """From the smallest to the largest value: on a log axis where few cases lie far beyond the others."""
-    low, high = found.minimum, found.maximum
+def _histogram(axes: Axes, distribution: Distribution, name: str, limit: float | None) -> None:
+    """Histogram from the smallest to the largest value: on a log axis where few cases lie far beyond the others."""
+    low, high = distribution.minimum, distribution.maximum
     title = f"{name}: histogram"
-    if high > TAIL * float(found.quantiles(np.array([KNEE]))[0]):
+    if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter("")
@@ -157,7 +157,7 @@ def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) 
     else:
         edges = np.linspace(low, high, BINS + 1)
         axes.locator_params(axis="x", nbins=6)
-    counts = found.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
+    counts = distribution.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
     shown = np.degrees(edges)
     axes.stairs(100.0 * counts / max(counts.sum(), 1.0), shown, fill=True, color=MOTION, label="cases")
     if limit is not None and shown[-1] < limit <= FAR * shown[-1]:
@@ -165,26 +165,26 @@ def _histogram(axes: Axes, found: Distribution, name: str, limit: float | None) 
     axes.set(xlabel=f"{name}, deg", ylabel="cases in each bin, %", title=title)
 
 
-def _function(axes: Axes, found: Distribution, name: str, results: Results) -> None:
-    """How many cases lie beyond: on a scale that shows the last per mille as well as the first half."""
-    one = 1.0 / max(results.done, 10)
-    steps = one * np.arange(1, min(results.done, STEPS) + 1)
+def _function(axes: Axes, distribution: Distribution, name: str, results: Results) -> None:
+    """Share of cases beyond a value, on a scale that shows the last per mille as well as the first half."""
+    each = 1.0 / max(results.done, 10)
+    steps = each * np.arange(1, min(results.done, STEPS) + 1)
     shares = np.sort(np.append(np.geomspace(steps[-1], 1.0, 400), steps[:-1]))[::-1]
     # Beyond the last case but one lies one case, as far as the last one; beyond that none, below the edge.
-    values = np.degrees(np.append(found.quantiles(1.0 - shares), [found.maximum, found.maximum]))
-    shares = 100.0 * np.append(shares, [one, 0.1 * one])
+    values = np.degrees(np.append(distribution.quantiles(1.0 - shares), [distribution.maximum, distribution.maximum]))
+    shares = 100.0 * np.append(shares, [each, 0.1 * each])
     axes.plot(values, shares, color=MOTION, linewidth=1.6, drawstyle="steps-post", label="cases")
     allowed = 100.0 * (1.0 - results.probability)
     axes.axhline(allowed, color=GREY, linewidth=1.0, linestyle=":", label=f"{allowed:.3g} % may lie beyond")
     axes.set_yscale("log")
-    axes.set_ylim(50.0 * one, 150.0)
+    axes.set_ylim(50.0 * each, 150.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set(xlabel=f"{name}, deg", ylabel="cases beyond, %")
     axes.grid(True)
 
 
 def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -> None:
-    """Where as many cases lie as shall meet the requirement, and the requirement, degrees."""
+    """Lines at the quantile that shall meet the requirement, and at the requirement, degrees."""
     share = exact_percent(probability)
     axes.axvline(reached, color=GREY, linewidth=1.0, linestyle="--", label=f"{share} of the cases")
     if limit is not None and limit <= axes.get_xlim()[1]:
@@ -192,7 +192,7 @@ def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -
 
 
 def momentum_cases(results: Results) -> Vector:
-    """(n, 2): H at the end of the first cases as angles in degrees, from the target or from where it was.
+    """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial direction.
 
     Directions are those of `geometry.sky_plane`; the distance from zero is the error or the shift of H.
     """
@@ -269,15 +269,15 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
 
 def _budget(figure: Figure | SubFigure, results: Results) -> None:
     """Bars as long as the effects are, on each side the largest on top (a tornado), those without a name last."""
-    found = budget_rows(results.study)
+    inputs = budget_rows(results.study)
     pair = figure.subplots(1, 2)
-    places = -np.arange(len(found), dtype=float)
+    places = -np.arange(len(inputs), dtype=float)
     parts = (Part.NUTATION, requirements.aim(results.study.model.spacecraft))
     for axes, part, colour, index in zip(pair, parts, (MOTION, MOMENTUM), (0, 1), strict=True):
         name = "nutation" if part is Part.NUTATION else part.label
         axes.set_title(f"{name}: one sigma\nof each input alone")
-        order = np.lexsort(([-row.effects[index] for row in found], [not row.size for row in found]))
-        rows = [found[place] for place in order.tolist()]
+        order = np.lexsort(([-row.effects[index] for row in inputs], [not row.size for row in inputs]))
+        rows = [inputs[place] for place in order.tolist()]
         names = [f"{row.name}, {row.size}" if row.size else row.name for row in rows]
         effects = np.degrees([row.effects[index] for row in rows])
         most = float(effects.max(initial=0.0))

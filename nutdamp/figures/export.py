@@ -1,4 +1,4 @@
-"""Figures (matplotlib, the extra ``plot``) of a flight, and what becomes of them: files and inline SVG.
+"""Figures (matplotlib, the extra ``plot``) of a flight, as files and inline SVG.
 
 Every function that makes a figure raises MissingExtra without matplotlib; none needs a window. ``track`` is always a
 track of ``flight``; where its rows are too few for a smooth curve, a finer one is drawn.

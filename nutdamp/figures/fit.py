@@ -1,4 +1,4 @@
-"""The picture of ``fit``: of each signal data and fit, what is left, and whether that is white."""
+"""The picture of ``fit``: data and fit of each signal, residuals, and their autocorrelation."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ DIFFERENCES = ("axis", "sun_pulse")
 
 
 @style.styled
-def fit_figure(found: Fit) -> Figure:
+def fit_figure(fit: Fit) -> Figure:
     """A row for each signal: data and fit over the first periods, residuals, autocorrelations."""
-    model = found.model
+    model = fit.model
     count = len(model.signals)
     figure = style.sheet(7.4, 0.7 + 1.75 * count)
     grid = figure.subplots(count, 3, squeeze=False, width_ratios=[1.25, 1.25, 0.9])
     for index, (name, row) in enumerate(zip(model.signals, grid, strict=True)):
         unit, factor = in_shown(name)
-        _data(row[0], found, index, factor, f"{name}, {unit}")
-        _residuals(row[1], found, index, factor, f"residual, {unit}")
-        unseen = _no_correlation(found, index)
+        _data(row[0], fit, index, factor, f"{name}, {unit}")
+        _residuals(row[1], fit, index, factor, f"residual, {unit}")
+        unseen = _no_correlation(fit, index)
         if unseen:
             style.words(row[2], unseen)
         else:
-            _white(row[2], found, index)
+            _white(row[2], fit, index)
         for axes in row:
             axes.grid()
     for column, text in zip(grid.T, ("time, s", "time, s", "lag, samples"), strict=True):
@@ -56,40 +56,40 @@ def fit_figure(found: Fit) -> Figure:
     return figure
 
 
-def _data(axes: Axes, found: Fit, index: int, factor: float, name: str) -> None:
-    model = found.model
-    values = found.named
+def _data(axes: Axes, fit: Fit, index: int, factor: float, name: str) -> None:
+    model = fit.model
+    values = fit.named
     period = 2.0 * np.pi / max(abs((1.0 - values["C/A"]) * values.get("omega_3", model.spacecraft.spin)), 1e-12)
     end = model.start + min(PERIODS * period, model.record.length)
     rows = (model.signal == index) & (model.times <= end)
     times, measured = model.times[rows], model.measured[rows]
     axes.set_ylabel(name)
-    if model.signals[index] in DIFFERENCES and _rounding(found, index):
+    if model.signals[index] in DIFFERENCES and _rounding(fit, index):
         style.words(axes, "data and fit are the same\nbut for rounding")
         return
     if model.signals[index] in DIFFERENCES:
         axes.plot(times, factor * measured, color=INK, label="fit")
-        shown = found.residuals[rows]
+        shown = fit.residuals[rows]
     else:
         shown = measured
-        fitted = measured - found.residuals[rows]
+        fitted = measured - fit.residuals[rows]
         order = np.argsort(times)
         axes.plot(times[order], factor * fitted[order], color=INK, label="fit")
-        margin = 0.15 * float(np.ptp(fitted)) + SPREAD * float(found.noise[index])
+        margin = 0.15 * float(np.ptp(fitted)) + SPREAD * float(fit.noise[index])
         axes.set_ylim(factor * (float(fitted.min()) - margin), factor * (float(fitted.max()) + margin))
     axes.plot(times, factor * shown, color=MOTION, linestyle="", marker=".", markersize=2.5, label="data")
     axes.set_xlim(model.start, end)
 
 
-def _residuals(axes: Axes, found: Fit, index: int, factor: float, name: str) -> None:
-    model, noise = found.model, float(found.noise[index])
+def _residuals(axes: Axes, fit: Fit, index: int, factor: float, name: str) -> None:
+    model, noise = fit.model, float(fit.noise[index])
     rows = model.signal == index
-    if _rounding(found, index):
+    if _rounding(fit, index):
         style.words(axes, "residuals: only rounding")
         return
     limit = factor * SPREAD * noise
-    left = np.clip(factor * found.residuals[rows], -limit, limit)
-    kept = found.used[rows]
+    left = np.clip(factor * fit.residuals[rows], -limit, limit)
+    kept = fit.used[rows]
     axes.plot(model.times[rows][kept], left[kept], color=MOTION, linestyle="", marker=".", markersize=2.0)
     if not kept.all():
         axes.plot(model.times[rows][~kept], left[~kept], color=PULSE, linestyle="", marker="x", label="left out")
@@ -99,26 +99,26 @@ def _residuals(axes: Axes, found: Fit, index: int, factor: float, name: str) -> 
     axes.set_ylabel(name)
 
 
-def _rounding(found: Fit, index: int) -> bool:
-    """Whether data and fit are the same but for the rounding of their numbers."""
-    rows = (found.model.signal == index) & found.used
-    largest = np.abs(found.residuals[rows]).max(initial=0.0)
-    return bool(largest <= ROUNDING * float(found.noise[index]))
+def _rounding(fit: Fit, index: int) -> bool:
+    """True where data and fit are the same but for the rounding of their numbers."""
+    rows = (fit.model.signal == index) & fit.used
+    largest = np.abs(fit.residuals[rows]).max(initial=0.0)
+    return bool(largest <= ROUNDING * float(fit.noise[index]))
 
 
-def _no_correlation(found: Fit, index: int) -> str:
-    """Why there are no autocorrelations to be drawn; "" where there are."""
-    if len(found.whiteness(index)) == 0:
+def _no_correlation(fit: Fit, index: int) -> str:
+    """The reason why there are no autocorrelations to be drawn; "" where there are."""
+    if len(fit.whiteness(index)) == 0:
         return "too few samples for\nautocorrelation"
-    if _rounding(found, index):
+    if _rounding(fit, index):
         return "only rounding:\nno autocorrelation"
     return ""
 
 
-def _white(axes: Axes, found: Fit, index: int) -> None:
-    correlations = found.whiteness(index)
+def _white(axes: Axes, fit: Fit, index: int) -> None:
+    correlations = fit.whiteness(index)
     lags = np.arange(1, len(correlations) + 1)
-    count = int((found.used & (found.model.signal == index)).sum())
+    count = int((fit.used & (fit.model.signal == index)).sum())
     axes.vlines(lags, 0.0, correlations, color=MOTION, linewidth=1.2)
     for side in (-1.0, 1.0):
         axes.axhline(

@@ -1,4 +1,4 @@
-"""What pictures of a flight are made of: directions as angles, rolling cones, stretches of the track. No matplotlib."""
+"""Geometry of the pictures of a flight: directions as angles, rolling cones, stretches of the track. No matplotlib."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS_A_TURN = 60
 """Rows in a nutation period from which a polygon looks like the curve."""
 
 MOST_ROWS = 30_000
-"""Rows of a picture at most; a longer track is drawn as far as they reach."""
+"""Largest number of rows of a picture; a longer track is drawn as far as they reach."""
 
 RIM = 121
 """Points around the rim of a cone."""
@@ -33,14 +33,14 @@ CLOSE = 1.0 / 125.0
 """Part of the time shown below which firings that follow each other cannot be distinguished: 4 points on a sheet."""
 
 MANY = 3
-"""Firings that are drawn as one, at least."""
+"""Least number of firings drawn as one."""
 
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not distinguished from its axis."""
 
 
 def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:
-    """End of the time axis of pictures and films, s: what comes after the last pulse is seen, and fills no sheet.
+    """End of the time axis of pictures and films, s: the motion after the last pulse is seen, and fills no sheet.
 
     One inertial nutation period after the last pulse, but no more than a quarter of the time until then, or of a period
     as seen in the body where that is more. Without pulses, the inertial period.
@@ -114,7 +114,7 @@ class FiredBlock(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Its numbers."""
+        """Its numbers as text."""
         if self.many == 1:
             return str(self.first)
         return f"{self.first}{'–' if self.many == self.last - self.first + 1 else ' … '}{self.last}"
@@ -133,12 +133,12 @@ def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Fir
             groups[-1].append((number, pulse))
         else:
             groups.append([(number, pulse)])
-    found = []
+    fired = []
     for group in groups:
-        for part in [group] if len(group) >= MANY else [[one] for one in group]:
+        for part in [group] if len(group) >= MANY else [[firing] for firing in group]:
             ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
-            found.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
-    return found
+            fired.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+    return fired
 
 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
@@ -154,7 +154,7 @@ def sky_plane(flight: Flight, momentum: Vector) -> Vector:
 
 
 class Sky(NamedTuple):
-    """What the two angles of `on_sky` are called, and how the view lies."""
+    """Names of the two angles of `on_sky`, and the sense of the view."""
 
     x: str
     y: str
@@ -162,7 +162,7 @@ class Sky(NamedTuple):
 
 
 def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
-    """The names for a view of which ``centre`` is the middle."""
+    """The names for a view centred on ``centre``."""
     if flight.spacecraft.attitude is None:
         return Sky("towards inertial x, deg", "towards inertial y, deg", "H towards you, inertial x to the right")
     return Sky(f"east of {centre}, deg", f"north of {centre}, deg", "H towards you, east to the right")
@@ -285,14 +285,14 @@ def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     return DrawnCones(axis, direction, rotation, body, space, around(direction, space[np.argmin(space @ direction)]))
 
 
-def body_mark(found: DrawnCones, quaternion: Vector) -> Vector:
-    """The point (3,) of the body cone's rim over body axis 1: shows how the body turns. NaN without a rim."""
-    if not len(found.body):
+def body_mark(rolling: DrawnCones, quaternion: Vector) -> Vector:
+    """The point (3,) of the body cone's rim over body axis 1, which shows the turn of the body. NaN without a rim."""
+    if not len(rolling.body):
         return np.full(3, np.nan)
-    in_body = attitude.rotate(attitude.conjugate(quaternion), found.body)
+    in_body = attitude.rotate(attitude.conjugate(quaternion), rolling.body)
     azimuth = np.arctan2(in_body[:, 1], in_body[:, 0])
     order = np.argsort(azimuth)
-    return np.array([np.interp(0.0, azimuth[order], found.body[order, part]) for part in range(3)])
+    return np.array([np.interp(0.0, azimuth[order], rolling.body[order, part]) for part in range(3)])
 
 
 def around(axis: Vector, start: Vector) -> Vector:

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 
 TIME = "time, s"
-"""What time axes are called."""
+"""Label of time axes."""
 
 DECADES = 4.0
-"""Of the nutation shown on a log axis at most, unless the requirement lies lower."""
+"""Largest number of decades of the nutation on a log axis, unless the requirement lies lower."""
 
 HEADING = 9.0
 """Letters of a heading of a panel that have room in an inch of a figure."""
 
 EDGE = 0.012
-"""Room before t = 0, as a part of the time shown: what happens at once must be seen."""
+"""Room before t = 0, as a part of the time shown, so that events at t = 0 are seen."""
 
 FULL, PALE = 0.9, 0.35
 """Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
@@ -66,7 +66,7 @@ def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
 
 
 def timeline(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
-    """Which channel fires when and for how long; ``narrow``: for a phone."""
+    """Firings of each channel as bars; ``narrow``: for a phone."""
     rows = max(len(geometry.channels_fired(flight)), 1)
     figure = style.sheet(style.PHONE if narrow else 7.4, 1.85 + 0.39 * rows)
     axes = figure.subplots()
@@ -110,7 +110,7 @@ def cone_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def decay_history(axes: Axes, flight: Flight, track: Track) -> None:
-    """Nutation angle θ on a log axis; what it is at the right edge is written above if the axis does not reach it."""
+    """Nutation angle θ on a log axis; its value at the right edge is written above if the axis does not reach it."""
     angles = np.degrees(track.nutation)
     limit = required_nutation(flight)
     _required(axes, limit)

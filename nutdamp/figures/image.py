@@ -23,7 +23,7 @@ LONG = 30
 
 FONT = "'DejaVu Sans'"
 FONTS = f"{FONT}, 'Bitstream Vera Sans', Verdana, sans-serif"
-"""Of text in SVG: that of the layout, and a substitute of the same width where that is not installed."""
+"""Fonts of text in SVG: that of the layout, and a substitute of the same width where that is not installed."""
 
 # No dates in the file, so that the same flight gives the same picture.
 _METADATA: dict[str, dict[str, Any]] = {
@@ -38,11 +38,11 @@ def ending(path: str) -> str:
 
     Raises BadRequest for other endings, MissingExtra without matplotlib.
     """
-    found = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
-    if found not in FORMATS:
+    suffix = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if suffix not in FORMATS:
         raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
     style.require()
-    return found
+    return suffix
 
 
 @style.styled
@@ -63,15 +63,15 @@ def _brief(path: str) -> str:
     parts = [(part[0], part[1:].split()) for part in re.findall(r"[A-Za-z][^A-Za-z]*", path)]
     if len(parts) < LONG or {letter for letter, _ in parts} - {"M", "L"}:
         return re.sub(r"(\.\d\d)\d+", r"\1", path.replace(" \n", "").rstrip())
-    made, (x, y), before = "", (0, 0), ""
+    brief, (x, y), before = "", (0, 0), ""
     for letter, numbers in parts:
         to = round(10.0 * float(numbers[0])), round(10.0 * float(numbers[1]))
         step = to if letter == "M" else (to[0] - x, to[1] - y)
         across, along = (f"{value / 10:g}" for value in step)
         name = letter if letter == "M" else "l" if before == "M" else "" if across[0] == "-" else " "
-        made += name + across + (along if along[0] == "-" else " " + along)
+        brief += name + across + (along if along[0] == "-" else " " + along)
         (x, y), before = to, letter
-    return made
+    return brief
 
 
 def _joined(alike: re.Match[str]) -> str:
@@ -82,7 +82,7 @@ def _joined(alike: re.Match[str]) -> str:
 
 @style.styled
 def svg(figure: Figure) -> str:
-    """The figure as an inline ``<svg>`` element, as wide as what holds it, on no background.
+    """The figure as an inline ``<svg>`` element, as wide as its container, on no background.
 
     Text and frames take the colour of the text around it, so that it suits light and dark pages. Its ids begin with a
     digest of its content: several may be in one page.
@@ -91,7 +91,7 @@ def svg(figure: Figure) -> str:
     figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
     text = stream.getvalue()
     text = text[text.index("<svg") :]
-    # What matplotlib says of all elements would hold for the whole page, and its metadata are no part of the picture.
+    # The style of matplotlib for all elements would hold for the whole page; its metadata are no part of the picture.
     text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r">\s+<", "><", text)
     text = re.sub(r'\s(?:width|height)="[^"]*"', "", text, count=2)
@@ -102,7 +102,7 @@ def svg(figure: Figure) -> str:
     text = text.replace("<svg ", ours, 1).replace(INK, "currentColor").replace(PAPER, "var(--paper, #fff)")
     # Roles of labels end up as ids, several times over: only ids that something refers to stay.
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
-    text = re.sub(r'\sid="([^"]*)"', lambda found: found[0] if found[1] in used else "", text)
+    text = re.sub(r'\sid="([^"]*)"', lambda match: match[0] if match[1] in used else "", text)
     text = re.sub(r'<path d="[^"]*"([^>]*)/>(?:</g><g><path d="[^"]*"\1/>)+', _joined, text)
     mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)

@@ -1,4 +1,4 @@
-"""Labels of figures, laid where they cover neither each other nor what is drawn."""
+"""Labels of figures, placed where they cover neither each other nor curves and marks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 class Meant(NamedTuple):
-    """What a label is of, (n, 2), and what it must not be taken for, (m, 2): points in the units of its panel."""
+    """Points of a label, (n, 2), and points that it must not be taken for, (m, 2), in the units of its panel."""
 
     own: Vector
     others: Vector
 
 
 _MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()
-"""By label, until it is settled."""
+"""Points meant by each label, until it is settled."""
 
 
 def add(
@@ -44,7 +44,7 @@ def add(
 
     ``label`` goes anywhere around its point and may be left out; ``number`` stays where it is put, along the edge of a
     panel; ``vital`` is never left out; ``bar`` is above the bar of a firing, and reads ``short`` where not all of
-    them have room. What is ``meant`` is nearest to the label, or joined to it by a thin line.
+    them have room. The point ``meant`` is nearest to the label, or joined to it by a thin line.
     """
     note = axes.annotate(
         text,
@@ -63,7 +63,7 @@ def add(
 
 
 PASSES = 8
-"""Of the layout at most, until panels of equal scales move by less than a pixel."""
+"""Largest number of passes of the layout, until panels of equal scales move by less than a pixel."""
 
 BAR_GAP = 2.0
 """Points between a bar and its label."""
@@ -91,7 +91,7 @@ _COVERED = {"_vital": np.inf, "_label": 14.0, "_number": np.inf}
 
 
 def _lay_out(figure: Figure) -> None:
-    """Lay the panels out as drawing the figure would, without drawing what is in them."""
+    """Lay the panels out as drawing the figure would, without drawing their contents."""
     figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
     for axes in figure.axes:
         axes.apply_aspect()
@@ -159,10 +159,10 @@ def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annota
 def _settle(
     note: Annotation, taken: list[Bbox], inked: tuple[Vector, Vector], window: Bbox, points: float
 ) -> Bbox | None:
-    """Where one label is put, which covers few of the curves and, if it can, none of the lines from other labels.
+    """Place of one label, which covers few of the curves and, if it can, none of the lines from other labels.
 
-    ``inked``: points of curves, and of stars and lines of other labels; ``window`` is that of the panel, ``points`` how
-    many pixels a point is.
+    ``inked``: points of curves, and of stars and lines of other labels; ``window`` is that of the panel, ``points`` the
+    number of pixels in a point.
     """
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
@@ -195,12 +195,12 @@ def _settle(
 
 
 NEARER, NEAR = 0.45, 8.0
-"""What a label is of is nearer to it than this share of the distance to anything it could be taken for, and than this
+"""The point of a label is nearer to it than this share of the distance to any it could be taken for, and than this
 many points."""
 
 
 def _nearest(note: Annotation, box: Bbox, points: float) -> bool:
-    """Whether a label in a ``box`` of pixels is clearly that of what it is meant for."""
+    """True where a label in a ``box`` of pixels clearly belongs to the points it is meant for."""
     axes: Any = note.axes
     if note not in _MEANT:
         return _away(box, axes.transData.transform([note.xy])) <= FAR * points
@@ -215,7 +215,7 @@ def _away(box: Bbox, places: Vector) -> float:
 
 
 def _way(note: Annotation, box: Bbox, points: float) -> Vector:
-    """The points, 4 pixels apart, from what a label is of to its ``box``."""
+    """The points, 4 pixels apart, from the points of a label to its ``box``."""
     axes: Any = note.axes
     tip = np.asarray(axes.transData.transform(note.xy))
     inner = box.padded(-1.5 * points)
@@ -224,7 +224,7 @@ def _way(note: Annotation, box: Bbox, points: float) -> Vector:
 
 
 def _lead(note: Annotation, box: Bbox, points: float) -> Vector:
-    """The points, 4 pixels apart, of a thin line from a label to what it is of; none where that is nearest anyhow."""
+    """The points, 4 pixels apart, of a thin line from a label to its point; none where that is nearest anyhow."""
     axes: Any = note.axes
     if _nearest(note, box, points):
         return np.empty((0, 2))
@@ -254,10 +254,10 @@ def _inked(axes: Axes) -> Vector:
 def _stars(axes: Axes) -> Vector:
     """Points (n, 2), pixels, within all marks as large as a star."""
     spot = np.exp(2j * math.pi * np.arange(16) / 16)
-    found = [np.empty((0, 2))]
+    stars = [np.empty((0, 2))]
     for line in axes.lines:
         if line.get_marker() not in ("", "None", None) and line.get_markersize() >= STAR:
             round_it = 0.5 * line.get_markersize() * axes.figure.dpi / 72.0 * np.outer([0.5, 0.9], spot).ravel()
             for place in np.asarray(line.get_transform().transform(line.get_xydata())):
-                found.append(place + np.column_stack([round_it.real, round_it.imag]))
-    return np.concatenate(found)
+                stars.append(place + np.column_stack([round_it.real, round_it.imag]))
+    return np.concatenate(stars)

@@ -24,7 +24,7 @@ LONGEST_NAME = 40
 
 
 def heading(figure: Figure, spacecraft: Spacecraft, text: str) -> None:
-    """The line above a picture, and more of them where it is long: whose it is, then ``text``."""
+    """The line above a picture, and more of them where it is long: the name of the spacecraft, then ``text``."""
     titled(figure, f"{short_name(spacecraft)}: {text}")
 
 
@@ -42,18 +42,18 @@ def short_name(spacecraft: Spacecraft) -> str:
 
 def legend(figure: Figure | SubFigure, axes: Sequence[Axes], columns: int = 8) -> None:
     """One legend under all panels, each name once, where no curve can run into it, in as many columns as fit."""
-    found: dict[str, Artist] = {}
-    for one in axes:
-        for handle, name in zip(*one.get_legend_handles_labels(), strict=True):
-            found.setdefault(name, handle)
-    if found:
+    handles: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(name, handle)
+    if handles:
         room = 72.0 * figure.bbox.width / figure.dpi
-        fitting = (many for many in range(min(columns, len(found)), 1, -1) if _across(list(found), many) <= room)
-        made = figure.legend(
-            list(found.values()), list(found), loc="outside lower center", ncols=next(fitting, 1), handlelength=2.2,
+        fitting = (many for many in range(min(columns, len(handles)), 1, -1) if _across(list(handles), many) <= room)
+        drawn = figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", ncols=next(fitting, 1), handlelength=2.2,
             borderpad=0.2, columnspacing=1.4,
         )  # fmt: skip
-        for mark in made.get_lines():
+        for mark in drawn.get_lines():
             mark.set_markersize(max(mark.get_markersize(), DOT))
 
 
@@ -68,7 +68,7 @@ HANDLE = 25.0
 
 
 def _across(names: Sequence[str], columns: int) -> float:
-    """About how wide a legend is, points, which is filled column by column."""
+    """Approximate width of a legend that is filled column by column, points."""
     deep, more = divmod(len(names), columns)
     ends = np.cumsum([deep + (index < more) for index in range(columns)]).tolist()
     parts = [names[begin:end] for begin, end in zip([0, *ends[:-1]], ends, strict=True)]

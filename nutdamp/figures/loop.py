@@ -1,4 +1,4 @@
-"""The picture of ``loop``: what the sensor shows, the nutation between its thresholds, the firings."""
+"""The picture of ``loop``: signal of the sensor, nutation between its thresholds, firings."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ if TYPE_CHECKING:
 
 
 SAMPLES = 3000
-"""Samples of the sensor that are drawn, at most."""
+"""Largest number of samples of the sensor drawn."""
 
 BLOCK = 4096
-"""Samples that are worked out together."""
+"""Samples evaluated together."""
 
 ROW = 0.36
 """Inches from one row of firings to the next: a bar, its number, and room."""
 
 DECADES = 5.0
-"""Of the nutation shown on its log axis, at most."""
+"""Largest number of decades of the nutation on its log axis."""
 
 
 @style.styled
 def loop_figure(plan: LoopPlan) -> Figure:
     """Signal of the sensor, nutation with thresholds, and firings, over the whole run."""
     run = plan.flown_run
-    names = len({one.pulse.channel for one in run.fired})
+    names = len({firing.pulse.channel for firing in run.fired})
     figure = style.sheet(7.4, 5.3 + ROW * names)
     grid = figure.add_gridspec(3, 1, height_ratios=[1.8, 1.8, 0.3 + ROW * names])
     signal = figure.add_subplot(grid[0])
@@ -85,15 +85,15 @@ def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
         if len(numbers):
             times.append(np.asarray(numbers / rate, dtype=np.float64))
             values.append(signal.sampled(numbers, signal.shown(run.flight.motion(times[-1])[0])))
-    found, shown = np.concatenate(times), np.concatenate(values)
-    quiet = np.ones(len(found), dtype=bool)
-    for one in run.fired:
-        quiet &= (found < one.pulse.start) | (found > one.pulse.end)
-    return found[quiet], shown[quiet]
+    instants, shown = np.concatenate(times), np.concatenate(values)
+    quiet = np.ones(len(instants), dtype=bool)
+    for firing in run.fired:
+        quiet &= (instants < firing.pulse.start) | (instants > firing.pulse.end)
+    return instants[quiet], shown[quiet]
 
 
 def _nutation(axes: Axes, plan: LoopPlan) -> None:
-    """Nutation on a log axis, thresholds, and what was seen as each firing was decided on."""
+    """Nutation on a log axis, thresholds, and the nutation seen at each firing."""
     run = plan.flown_run
     track = run.flight.sampled(SAMPLES, run.until)
     angles = np.degrees(track.nutation)
@@ -101,8 +101,8 @@ def _nutation(axes: Axes, plan: LoopPlan) -> None:
     most = max(float(angles.max()), start)
     low = max(0.5 * min(float(angles.min()), stop or start), most * 10.0**-DECADES)
     axes.plot(track.t, np.maximum(angles, 0.1 * low), color=INK, label="nutation")
-    seen = [max(math.degrees(one.seen), low) for one in run.fired]
-    axes.plot([one.pulse.t for one in run.fired], seen, "x", color=PULSE, markersize=4, label="seen at a firing")
+    seen = [max(math.degrees(firing.seen), low) for firing in run.fired]
+    axes.plot([firing.pulse.t for firing in run.fired], seen, "x", color=PULSE, markersize=4, label="seen at a firing")
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
     if stop > 0.0:
         axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")

@@ -1,4 +1,4 @@
-"""The picture of ``disperse --loop``: when dispersed loops fall quiet, what they leave, and what they take."""
+"""The picture of ``disperse --loop``: time until dispersed loops fall quiet, their final motion, and their cost."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def loop_cases_figure(results: LoopResults) -> Figure:
 
 def _required(axes: Axes, results: LoopResults, output: str, part: Part) -> None:
     """The bound of a part of the requirement, degrees; in words where it is far from every case."""
-    limit = next((one.most for one in requirements.required(results.study.spacecraft) if one.part is part), None)
+    limit = next((bound.most for bound in requirements.required(results.study.spacecraft) if bound.part is part), None)
     most = results.distribution(output)
     if limit is None or not most:
         return

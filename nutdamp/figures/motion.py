@@ -27,16 +27,16 @@ ALIKE = math.radians(2.0)
 """Channels whose torques point within this angle share one arrow."""
 
 NUMBERED = 17
-"""Pulses of a path that are numbered, and have arrowheads, at most."""
+"""Largest number of pulses of a path that are numbered, and have arrowheads."""
 
 CROWD, NEAR = 3, 0.05
 """Pulses in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
 
 MANY = 12
-"""Pulses from which on lines and arrowheads are small."""
+"""Number of pulses from which on lines and arrowheads are small."""
 
 SPARSE = 40
-"""Pulses of which each has a dot."""
+"""Number of pulses up to which each has a dot."""
 
 
 def motion(flight: Flight, track: Track) -> Figure:
@@ -56,7 +56,7 @@ def motion(flight: Flight, track: Track) -> Figure:
 
 
 def title(flight: Flight) -> str:
-    """What every sheet is headed with: who is flown by which scheme and model, and with what result."""
+    """Heading of every sheet: spacecraft, scheme, model and result."""
     left, count = flight.residual, len(flight.schedule)
     how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
     swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
@@ -103,7 +103,7 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small: Vector) -> None:
-    """Where H goes, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
+    """Path of H, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
     stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
         others = np.delete(stations, number + 1, axis=0)
@@ -193,7 +193,7 @@ def _together(places: Sequence[Vector], width: float) -> list[list[int]]:
             groups[-1].append(number)
         else:
             groups.append([number])
-    return [part for group in groups for part in ([group] if len(group) >= CROWD else [[one] for one in group])]
+    return [part for group in groups for part in ([group] if len(group) >= CROWD else [[alone] for alone in group])]
 
 
 def _refined(rows: Vector) -> Vector:
@@ -202,7 +202,7 @@ def _refined(rows: Vector) -> Vector:
 
 
 def _halfway(rows: Vector) -> list[int]:
-    """Where on a stretch an arrowhead goes: half a turn into it at most."""
+    """Row of a stretch where an arrowhead goes: half a turn into it at most."""
     steps = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(rows, axis=0).T))])
     width = float(np.ptp(rows, axis=0).max())
     if steps[-1] <= 0.0:
@@ -211,13 +211,13 @@ def _halfway(rows: Vector) -> list[int]:
 
 
 def _directions(axes: Axes, flight: Flight, size: float) -> bool:
-    """Torque directions of the channels, as arrows outside the curve; whether there are any."""
+    """Torque directions of the channels, as arrows outside the curve; True where there are any."""
     used = {pulse.channel for pulse in flight.schedule}
-    channels = [one for one in flight.spacecraft.channels if one.damps and (one.name in used or not used)]
-    channels = channels or [one for one in flight.spacecraft.channels if one.name in used]
+    channels = [entry for entry in flight.spacecraft.channels if entry.damps and (entry.name in used or not used)]
+    channels = channels or [entry for entry in flight.spacecraft.channels if entry.name in used]
     groups: list[list[Channel]] = []
     for channel in channels:
-        group = next((one for one in groups if _apart(one[0], channel) < ALIKE), None)
+        group = next((others for others in groups if _apart(others[0], channel) < ALIKE), None)
         if group is None:
             groups.append([channel])
         else:
@@ -227,12 +227,12 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         way = np.array([torque.real, torque.imag]) * (size if size > geometry.LEAST else 0.7)
         axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
         style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
-        names = ", ".join(one.name for one in group[:3]) + (" …" if len(group) > 3 else "")
+        names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
         labels.add(axes, names, 1.2 * way, INK, role="vital")
     if groups:
         axes.plot([], [], color=INK, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
     return bool(groups)
 
 
-def _apart(one: Channel, other: Channel) -> float:
-    return abs(float(np.angle(one.transverse * other.transverse.conjugate())))
+def _apart(first: Channel, second: Channel) -> float:
+    return abs(float(np.angle(first.transverse * second.transverse.conjugate())))

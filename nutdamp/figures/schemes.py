@@ -1,4 +1,4 @@
-"""Schemes beside each other: a row each, and a dot for what it costs, when it ends and what it leaves."""
+"""Schemes beside each other: a row each, and a dot for cost, end time and final motion."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ if TYPE_CHECKING:
 
 
 DECADES = 5.0
-"""Of a log axis at most: what is less is drawn at its left edge."""
+"""Largest number of decades of a log axis: smaller values are drawn at its left edge."""
 
 SPAN = 0.1
-"""Of a linear axis at least, as a part of its largest value: what is equal but for rounding looks equal."""
+"""Least span of a linear axis, as a part of its largest value: values equal but for rounding look equal."""
 
 FAILS: dict[str, Any] = {"color": PULSE, "markersize": 7, "markeredgewidth": 1.6}
-"""Mark of what does not meet the requirement, or does not damp."""
+"""Mark of a plan that does not meet the requirement, or does not damp."""
 
 UNMET, UNDAMPED = "requirement NOT met", "does not damp"
-"""What is said of plans that fall short."""
+"""Words for plans that fall short."""
 
 ABREAST = 3
-"""Panels side by side at most."""
+"""Largest number of panels side by side."""
 
 
 class Floor(NamedTuple):
-    """What no schedule can go below that leaves as little as that of ``scheme``."""
+    """Lower bound on the cost of schedules whose final motion is as good as that of ``scheme``."""
 
     least: float
     scheme: str
 
 
 class BarQuantity(NamedTuple):
-    """A column: its name, the value of a plan (None: unknown), what is written beside the dot, and the lines.
+    """A column: its name, the value of a plan (None: unknown), the text beside the dot, and the lines.
 
     ``required``: the bound of the requirement. ``log``: an angle in degrees on a log axis. ``most``: no value is more.
     """
@@ -66,7 +66,7 @@ class BarQuantity(NamedTuple):
 
 
 class SchemeRows(NamedTuple):
-    """The plans from above, the ``chosen`` one of them, and what is said of those that fall short, by scheme."""
+    """The plans from above, the ``chosen`` one of them, and the reasons why others fall short, by scheme."""
 
     plans: Sequence[Plan]
     chosen: Plan | None
@@ -81,7 +81,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     if shares:
         columns.append(_complying(shares, next(iter(compared.shares.values())).probability))
     chosen = compared.recommended if decided is None else decided.plan
-    short = {plan.scheme: said for plan in compared.plans if (said := _short(plan, compared))}
+    short = {plan.scheme: reason for plan in compared.plans if (reason := _short(plan, compared))}
     plans = sorted(compared.plans, key=lambda plan: _place(plan, short))
     abreast = min(ABREAST, -(-len(columns) // 2))
     figure = style.sheet(7.4 if abreast < ABREAST else 9.0, 1.2 + 2 * (0.75 + 0.36 * len(plans)))
@@ -89,7 +89,7 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
     for index, (axes, column) in enumerate(zip(cells, columns, strict=False)):
         rows = SchemeRows(plans, chosen, short)
         _column(axes, column, rows)
-        # Why a scheme falls short is said at the left alone: beside every panel it would leave them no room.
+        # The reasons why schemes fall short stand at the left alone: beside every panel they would leave it no room.
         _name_rows(axes, rows, why=index % abreast == 0)
     for axes in cells[len(columns) :]:
         axes.remove()
@@ -103,14 +103,14 @@ def schemes_figure(compared: Comparison, decided: Decision | None = None) -> Fig
 
 
 def _place(plan: Plan, short: Mapping[str, str]) -> int:
-    """Schemes that reach more are higher up, those without a plan at the foot."""
+    """Key of the order: schemes that reach more are higher up, those without a plan at the foot."""
     if not plan.feasible:
         return len(Standing)
     return list(Standing).index(Standing.MISSES if plan.scheme in short else plan.standing)
 
 
 def _short(plan: Plan, compared: Comparison) -> str:
-    """What is to be said of a plan that misses what is required of it or of its cases; empty where it does not."""
+    """Text for a plan that misses the requirement on it or on its cases; empty where it does not."""
     if not plan.feasible:
         return ""
     if plan.standing is Standing.MISSES or plan.kept is False:
@@ -165,8 +165,8 @@ def _angle(value: float) -> str:
 
 def _complying(shares: Mapping[str, float], probability: float) -> BarQuantity:
     def share(plan: Plan) -> float | None:
-        found = shares.get(plan.scheme)
-        return None if found is None else 100.0 * found
+        fraction = shares.get(plan.scheme)
+        return None if fraction is None else 100.0 * fraction
 
     def text(value: float) -> str:
         return percent(value / 100.0, probability).removesuffix(" %")
@@ -196,13 +196,13 @@ def _column(axes: Axes, column: BarQuantity, rows: SchemeRows) -> None:
 
 
 def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) -> None:
-    """The mark of a plan at ``place`` (2,), and of what it says in the legend; ``less``: below the scale."""
+    """The mark of a plan at ``place`` (2,), and its line in the legend; ``less``: below the scale."""
     look: dict[str, Any] = {"color": MOTION, "markerfacecolor": MOTION if chosen else PAPER, "markersize": 6}
     mark, name = "o", "recommended" if chosen else "other schemes"
     if short:
-        # Why is written beside the row: one mark has one name.
-        said = UNDAMPED if short == UNDAMPED else UNMET
-        look, mark, name = FAILS, "X" if chosen else "x", ("recommended, " if chosen else "") + said
+        # The reason stands beside the row: each mark has a single name in the legend.
+        result = UNDAMPED if short == UNDAMPED else UNMET
+        look, mark, name = FAILS, "X" if chosen else "x", ("recommended, " if chosen else "") + result
     axes.plot(*place, "<" if less else mark, clip_on=False, zorder=3, linestyle="", **look)
     axes.plot([], [], mark, label=name, linestyle="", **look)
     if less:
@@ -210,11 +210,11 @@ def _mark(axes: Axes, place: Vector, short: str, *, chosen: bool, less: bool) ->
 
 
 def _name_rows(axes: Axes, rows: SchemeRows, *, why: bool) -> None:
-    """Schemes beside their rows; those that fall short have another colour, and say ``why``."""
+    """Schemes beside their rows; those that fall short have another colour, and their reason with ``why``."""
     names = []
     for plan in rows.plans:
-        said = rows.short.get(plan.scheme, "") * why if plan.feasible else "no plan"
-        names.append(f"{plan.scheme}\n{said}" if said else plan.scheme)
+        reason = rows.short.get(plan.scheme, "") * why if plan.feasible else "no plan"
+        names.append(f"{plan.scheme}\n{reason}" if reason else plan.scheme)
     axes.set_yticks(-np.arange(len(names)), names)
     axes.set_ylim(-len(names) + 0.45, 0.7)
     axes.tick_params(axis="y", length=0, pad=6)

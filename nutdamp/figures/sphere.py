@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 ELEVATION = math.radians(28.0)
-"""From where the sphere is seen: above the plane square to H(0)."""
+"""Direction from which the sphere is seen: above the plane square to H(0)."""
 
 ASIDE = math.radians(65.0)
 """The spin axis leans to the right at t = 0, this far round from the viewer."""
@@ -33,13 +33,13 @@ WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
 SPACE, BODY = 0.28, 0.15
-"""How dense the cones are filled: distinguished in grey print too."""
+"""Opacity of the cones: distinguished in grey print too."""
 
 RIM = 0.7
-"""Points: the width of rims and edges of cones, thinner than the path of the spin axis, which shares their colour."""
+"""Width of rims and edges of cones, points: thinner than the path of the spin axis, which shares their colour."""
 
 MARKS = "+os"
-"""Of H, ω and the spin axis in the plane picture."""
+"""Marks of H, ω and the spin axis in the plane picture."""
 
 HIDDEN = 0.04
 """Share of the space cone below which the body cone lies under the marks of spin axis and ω."""
@@ -51,7 +51,7 @@ STEPS = (1.0, 2.0, 3.0, 5.0)
 class View:
     """Orthographic view of directions: ``plane`` rows are two directions square to H(0) and its own.
 
-    ``magnified`` stretches what lies square to H(0): straight lines, tangents and coplanar lines stay what they are.
+    ``magnified`` stretches directions square to H(0): straight lines, tangents and coplanar lines remain so.
     """
 
     plane: Vector
@@ -69,7 +69,7 @@ class View:
 
 
 def view(flight: Flight, track: Track) -> View:
-    """The view in which everything that moves on ``track`` has its place."""
+    """The view that holds all that moves on ``track``."""
     plane = geometry.sky_plane(flight, track.momentum[0])
     first = geometry.cones(flight, track.rates[0], track.quaternion[0])
     local = first.axis @ plane.T
@@ -79,7 +79,7 @@ def view(flight: Flight, track: Track) -> View:
 
 
 def magnification(widest: float) -> float:
-    """How much angles from H(0) are stretched where the ``widest`` is so many rad: 1, 2, 5, 10, …"""
+    """Magnification of angles from H(0) where the ``widest`` is so many rad: 1, 2, 5, 10, …"""
     if widest >= WIDE or widest < geometry.NO_CONE:
         return 1.0
     room = math.tan(DRAWN) / math.tan(widest)
@@ -99,16 +99,16 @@ def sphere(flight: Flight, track: Track) -> Figure:
 
 def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 and the path of the spin axis, seen from outside."""
-    looked, found = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
+    looked, rolling = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_ground(axes, looked, track)
     pulses = draw_path(axes, looked, flight, track)
-    draw_cones(axes, looked, found)
+    draw_cones(axes, looked, rolling)
     target = flight.spacecraft.goal.axis
     if target is not None:
         axes.plot(*looked.seen(target)[0].T, label="target", **style.TARGET)
-    _name_tips(axes, found, lambda direction: looked.seen(direction)[0][0])
-    name_lines(axes, found, pulses=pulses)
-    frame(axes, looked, np.vstack([found.body, found.space, track.axis, track.momentum, *aimed(flight)]))
+    _name_tips(axes, rolling, lambda direction: looked.seen(direction)[0][0])
+    name_lines(axes, rolling, pulses=pulses)
+    frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
     first = flight.schedule.pulses[:1]
     before = ", before pulse 1" * any(pulse.thrust[0] <= 0.0 for pulse in first)
@@ -129,7 +129,7 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
 
 
 def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
-    """The path of the spin axis, with the firings in it; whether any of them moves it (an impulse does not)."""
+    """The path of the spin axis, with the firings in it; True where any of them moves it (an impulse does not)."""
     pulses = False
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
@@ -142,31 +142,32 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
     return pulses
 
 
-def draw_cones(axes: Axes, looked: View, found: DrawnCones) -> None:
+def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
     """Space cone, body cone, and the three directions that lie in one plane."""
-    for rim, within, colour, alpha in _rims(found):
+    for rim, within, colour, alpha in _rims(rolling):
         if len(rim):
             _cone(axes, looked, rim, within, (colour, alpha))
-    for direction, colour, _ in _directions(found):
+    for direction, colour, _ in _directions(rolling):
         tip = looked.seen(direction)[0][0]
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
 
-def name_lines(axes: Axes, found: DrawnCones, *, pulses: bool) -> None:
+def name_lines(axes: Axes, rolling: DrawnCones, *, pulses: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
-    if len(found.body):
+    if len(rolling.body):
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
-        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(found)}")
+        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(rolling)}")
     axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
     if pulses:
         axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
     axes.plot([], [], label="path of H", **style.PATH_OF_H)
 
 
-def _hidden(found: DrawnCones) -> str:
-    """What the legend adds where the body cone is so small that the marks of the axes in it hide it."""
-    body, space = (float(np.arccos(np.clip(found.rotation @ one, -1.0, 1.0))) for one in (found.axis, found.momentum))
+def _hidden(rolling: DrawnCones) -> str:
+    """Words in the legend where the body cone is so small that the marks of the axes in it hide it."""
+    about = (rolling.axis, rolling.momentum)
+    body, space = (float(np.arccos(np.clip(rolling.rotation @ axis, -1.0, 1.0))) for axis in about)
     return f" ({degrees(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
 
 
@@ -177,8 +178,8 @@ def name_directions(axes: Axes) -> None:
         axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
 
 
-def _directions(found: DrawnCones) -> tuple[tuple[Vector, str, str], ...]:
-    return (found.momentum, MOMENTUM, "H"), (found.rotation, INK, "ω"), (found.axis, MOTION, "spin axis")
+def _directions(rolling: DrawnCones) -> tuple[tuple[Vector, str, str], ...]:
+    return (rolling.momentum, MOMENTUM, "H"), (rolling.rotation, INK, "ω"), (rolling.axis, MOTION, "spin axis")
 
 
 def aimed(flight: Flight) -> Vector:
@@ -186,22 +187,22 @@ def aimed(flight: Flight) -> Vector:
     return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
 
 
-def _name_tips(axes: Axes, found: DrawnCones, place: Callable[[Vector], Vector]) -> None:
+def _name_tips(axes: Axes, rolling: DrawnCones, place: Callable[[Vector], Vector]) -> None:
     """The names of the three directions at the tips of their arrows, each in the colour of its own."""
-    named = _directions(found)
+    named = _directions(rolling)
     tips = np.array([place(direction) for direction, _, _ in named])
     for number, (_, colour, name) in enumerate(named):
         meant = labels.Meant(tips[[number]], np.delete(tips, number, axis=0))
         labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
 
 
-def _rims(found: DrawnCones) -> tuple[tuple[Vector, Vector, str, float], ...]:
+def _rims(rolling: DrawnCones) -> tuple[tuple[Vector, Vector, str, float], ...]:
     """Rim, circle about it, colour and density of the cones."""
-    return (found.space, found.swept, MOMENTUM, SPACE), (found.body, found.body, MOTION, BODY)
+    return (rolling.space, rolling.swept, MOMENTUM, SPACE), (rolling.body, rolling.body, MOTION, BODY)
 
 
 def _cone(axes: Axes, looked: View, rim: Vector, within: Vector, filled: tuple[str, float]) -> None:
-    """A cone from the centre to its rim: what it covers on paper filled and outlined, rim drawn."""
+    """A cone from the centre to its rim: its area on paper filled and outlined, rim drawn."""
     covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
     axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=RIM)
     axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=RIM)
@@ -233,25 +234,25 @@ def frame(axes: Axes, looked: View, directions: Vector) -> None:
 def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 seen along H(0), true to scale along every radius."""
     plane = geometry.sky_plane(flight, track.momentum[0])
-    found = geometry.cones(flight, track.rates[0], track.quaternion[0])
-    draw_circles(axes, plane, found)
-    _name_tips(axes, found, lambda direction: geometry.on_sky(plane, direction[None])[0])
-    shown = np.vstack([found.body, found.space, found.axis[None], found.momentum[None]])
+    rolling = geometry.cones(flight, track.rates[0], track.quaternion[0])
+    draw_circles(axes, plane, rolling)
+    _name_tips(axes, rolling, lambda direction: geometry.on_sky(plane, direction[None])[0])
+    shown = np.vstack([rolling.body, rolling.space, rolling.axis[None], rolling.momentum[None]])
     style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
     sky = geometry.sky_names(flight)
     axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H, true angles\n{sky.view}")
 
 
-def draw_circles(axes: Axes, plane: Vector, found: DrawnCones) -> None:
-    """Rims of the cones with their axes and where they touch, on the sky."""
-    for rim, within, colour, alpha in _rims(found):
+def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:
+    """Rims of the cones with their axes and line of contact, on the sky."""
+    for rim, within, colour, alpha in _rims(rolling):
         if len(rim):
             filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
             axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
             axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
-            if within is not rim:  # a rim that does not close: what it fills has an outline of its own
+            if within is not rim:  # a rim that does not close: its filled circle has its own outline
                 axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
-    places = geometry.on_sky(plane, np.array([found.momentum, found.rotation, found.axis]))
+    places = geometry.on_sky(plane, np.array([rolling.momentum, rolling.rotation, rolling.axis]))
     axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
-    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(found), strict=True):
+    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(rolling), strict=True):
         axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too, for grey print.
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
-"""Spin axis, body cone and what moves; firings; angular momentum and space cone."""
+"""Spin axis, body cone and other motion; firings; angular momentum and space cone."""
 
 FIRED = "#B34700"
 """Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 requires 4.5:1)."""
@@ -34,24 +34,24 @@ INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
 """Text and ω; marks; the circles of the sphere."""
 
 STAR = 13.0
-"""Points across of the stars of the target and of what is recommended."""
+"""Points across of the stars of the target and of the recommended plan."""
 
 TARGET: dict[str, Any] = {
     "marker": "*", "color": INK, "markersize": STAR, "markerfacecolor": "none", "linestyle": "", "zorder": 4
 }  # fmt: skip
-"""Mark of the target axis: larger than the marks of what ends there, and over them."""
+"""Mark of the target axis: larger than the marks of ends of paths there, and over them."""
 
 PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
 """Look of the path of H."""
 
 PAPER = "#fefefe"
-"""What lies under a hollow mark; in a page, its background."""
+"""Ground under a hollow mark; in a page, its background."""
 
 LINE, THIN, LEADER = 1.3, 0.7, 0.5
-"""Line widths, points; the last is that from a label to what it is of."""
+"""Line widths, points; the last is that from a label to its point."""
 
 CROSS: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
-"""Look of an x over the mark of what falls short of the requirement."""
+"""Look of an x over the mark of a plan that falls short of the requirement."""
 
 SMALL, TICK_SIZE = 7.5, 8
 """Sizes of labels inside a panel and of those of its ticks, points."""
@@ -96,7 +96,7 @@ _SETTINGS: dict[str, Any] = {
 
 
 def require() -> None:
-    """Raises MissingExtra where matplotlib is not installed."""
+    """Raise MissingExtra where matplotlib is not installed."""
     if find_spec("matplotlib") is None:
         raise MissingExtra("plot", "a picture")
 
@@ -106,7 +106,7 @@ Result = TypeVar("Result")
 
 
 def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-    """Draws in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
+    """Draw in this style, whatever the settings of the user's matplotlib; raises MissingExtra without one."""
 
     @wraps(draw)
     def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
@@ -135,7 +135,7 @@ def sheet(width: float, height: float) -> Figure:
 
 
 def heads(axes: Axes, path: Vector, places: Sequence[int], colour: str, size: float = 9.0) -> None:
-    """Arrowheads along a ``path`` (n, 2) that show where it goes, at some of its rows."""
+    """Arrowheads along a ``path`` (n, 2) that show its sense, at some of its rows."""
     look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0, "mutation_scale": size, "shrinkA": 0, "shrinkB": 0}
     for row in places:
         if 0 < row < len(path) and np.any(path[row] != path[row - 1]):
@@ -178,7 +178,7 @@ def joined(pieces: Sequence[Vector]) -> Vector:
 
 
 def thinned(count: int, most: int = 24) -> list[int]:
-    """Which of ``count`` things to number, from 0: the first, the last, and between them those of round numbers."""
+    """Indices of ``count`` things to be numbered: the first, the last, and between them those of round numbers."""
     steps = (many * 10**power for power in range(10) for many in (1, 2, 5))
     step = next(step for step in steps if count <= step * (most - 1))
     return [n - 1 for n in range(1, count + 1) if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)]

@@ -31,7 +31,7 @@ def motion_drawing(flight: Flight, track: Track) -> Drawing:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Renders itself for the width of the console."""
+    """Two panels, rendered for the width of the console."""
 
     flight: Flight
     track: Track
@@ -43,8 +43,8 @@ class Drawing:
         left, right = self.pole_curve(each), self.axis_track(each)
         yield Text()
         if beside:
-            for one, other in zip_longest(left, right, fillvalue=Text(" " * each)):
-                yield one + Text(" " * GAP) + other
+            for left_line, right_line in zip_longest(left, right, fillvalue=Text(" " * each)):
+                yield left_line + Text(" " * GAP) + right_line
         else:
             yield from (*left, Text(), *right)
         pulses = "   digits: pulse" if len(self.flight.schedule) else ""
@@ -62,7 +62,7 @@ class Drawing:
         return framed(panel, "Pole curve", f"ω1, deg/s{note}", "ω2, deg/s")
 
     def axis_track(self, width: int) -> list[Text]:
-        """The spin axis in space and where H jumps, as lines of ``width`` characters."""
+        """The spin axis in space and the jumps of H, as lines of ``width`` characters."""
         points, momentum = geometry.sky_paths(self.flight, self.track)
         target = geometry.sky_target(self.flight, self.track)
         panel = fitted(width, *geometry.room(np.vstack([points, momentum, target]), 0.1))

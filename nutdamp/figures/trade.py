@@ -39,12 +39,12 @@ FEWEST = 3
 
 
 REACH = 1.03
-"""How far beyond the horizon the axis of time goes: marks at its end are drawn whole."""
+"""End of the axis of time beyond the horizon: marks at its end are drawn whole."""
 
 
 @style.styled
 def trade_figure(
-    spacecraft: Spacecraft, found: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
+    spacecraft: Spacecraft, fronts: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
 ) -> Figure:
     """End of the last pulse against propellant (impulse where that is unknown), numbered as in the table.
 
@@ -53,11 +53,11 @@ def trade_figure(
     """
     width = style.PHONE if narrow else 7.4
     figure = style.sheet(width, 4.8)
-    names = ", ".join(schemes_of(found))
-    how = model_name(point.plan.pulses for _, _, point in numbered(found))
+    names = ", ".join(schemes_of(fronts))
+    how = model_name(point.plan.pulses for _, _, point in numbered(fronts))
     heading(figure, spacecraft, f"what time costs, by {names}, flown by {how}")
-    reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, found))
-    points = [point for _, _, point in numbered(found)]
+    reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, fronts))
+    points = [point for _, _, point in numbered(fronts)]
     if not points:
         figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
         return figure
@@ -67,7 +67,7 @@ def trade_figure(
     log = all(point.plan.pulses.end > 0.0 for point in points)
     axes.set_xscale("log" if log else "linear")
     scale = 1e3 if points[0].unit == "kg" else 1.0
-    _draw_fronts(axes, spacecraft, found, scale)
+    _draw_fronts(axes, spacecraft, fronts, scale)
     proved = [point.bounds.rigorous for point in points]
     if None not in proved:
         least = min(scale * value for value in proved if value is not None)
@@ -82,9 +82,8 @@ def trade_figure(
             "linestyle": "",
             "zorder": 4,
         }
-        other = (
-            "" if chosen.scheme in schemes_of(found) else f" (not traded{', ideal impulses' * chosen.pulses.idealised})"
-        )
+        ideal = ", ideal impulses" * chosen.pulses.idealised
+        other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
         axes.plot(*place, "*", label=f"recommended: {chosen.scheme}{other}", **look)
     axes.set_xlim(right=REACH * spacecraft.horizon)
     axes.margins(y=0.12)
@@ -109,11 +108,11 @@ def _graduate(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter("")
 
 
-def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], scale: float) -> None:
+def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float) -> None:
     """Step lines and marks; a point that another front has too is drawn around that one's mark, hollow and larger."""
     shown: list[tuple[float, float, list[int]]] = []
     covered: list[tuple[float, float]] = []
-    for front, (colour, mark, line) in zip(found, LOOKS * math.ceil(len(found) / len(LOOKS)), strict=False):
+    for front, (colour, mark, line) in zip(fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False):
         if not front.points:
             continue
         ends = [point.plan.pulses.end for point in front.points]
@@ -125,10 +124,10 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
         on_top: dict[str, Any] = {"color": colour, "clip_on": False}  # marks at the horizon lie on the frame
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         alone = []
-        for index, owner, point in numbered(found):
+        for index, owner, point in numbered(fronts):
             if owner is front:
                 end, cost = point.plan.pulses.end, scale * point.cost
-                same = next((one for one in shown if _alike((end, cost), one[:2])), None)
+                same = next((place for place in shown if _alike((end, cost), place[:2])), None)
                 if same is None:
                     alone.append((end, cost))
                     shown.append((end, cost, [index]))
@@ -138,17 +137,17 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, found: Sequence[Front], sca
                     axes.plot(end, cost, mark, markersize=10, markerfacecolor="none", zorder=3, **on_top)
         if alone:
             axes.plot(*np.transpose(alone), mark, markersize=5, zorder=3.5, **on_top)
-    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(found) if fails(point)]
+    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(fronts) if fails(point)]
     if failing:
         axes.plot(*np.transpose(failing), "x", label=FAILS, **style.CROSS)
     if covered:
         ring: dict[str, Any] = {"color": INK, "markersize": 10, "markerfacecolor": PAPER, "linestyle": ""}
         axes.plot([], [], "s", label="the same schedule, on this front too", **ring)
-    places = np.array([one[:2] for one in shown])
+    places = np.array([place[:2] for place in shown])
     for row, (_, _, numbers) in enumerate(shown):
         meant = labels.Meant(places[[row]], np.delete(places, row, axis=0))
         labels.add(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
 
 
-def _alike(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    return all(math.isclose(a, b, rel_tol=near) for a, b, near in zip(one, other, ALIKE, strict=True))
+def _alike(first: tuple[float, float], second: tuple[float, float]) -> bool:
+    return all(math.isclose(a, b, rel_tol=near) for a, b, near in zip(first, second, ALIKE, strict=True))

@@ -1,4 +1,4 @@
-"""Constraints between the dispersions of a spacecraft file, their correlations, and what they vary."""
+"""Constraints between the dispersions of a spacecraft file, their correlations, and the quantities they vary."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ EACH_PULSE = ("thrust_per_pulse", "timing")
 def correlation_findings(
     facts: Facts, entries: Iterable[ToleranceEntry], thrusters: Iterable[str]
 ) -> Iterator[Finding]:
-    """Pairs of what is not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
+    """Pairs of inputs not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
 
     ``entries`` are the tolerances of the file, ``thrusters`` the names that may have some of their own.
     """
@@ -42,7 +42,7 @@ def correlation_findings(
         size = facts.number("ratio", *path, index, 2)
         if len(node.value if isinstance(node.value, list) else ()) != 3 or None in names or size is None:
             sound = False
-            continue  # said already
+            continue  # reported already
         first, second = (name or "" for name in names)
         for place, name in enumerate((first, second)):
             problem = _unknown(name, drawn)
@@ -65,7 +65,7 @@ def correlation_findings(
 
 
 def _unknown(name: str, drawn: dict[str, bool]) -> str:
-    """Why an input cannot be correlated; empty where it can. ``drawn``: whether it varies, by name."""
+    """The reason why an input cannot be correlated; empty where it can. ``drawn``: True for inputs that vary."""
     if name in drawn:
         return "" if drawn[name] else f"{shown(name)} is a fixed offset (bias), which does not vary"
     if name.replace(" ", "_") in EACH_PULSE:
@@ -77,27 +77,27 @@ def _unknown(name: str, drawn: dict[str, bool]) -> str:
 
 def _drawn(facts: Facts, entries: Iterable[ToleranceEntry], thrusters: list[str]) -> dict[str, bool]:
     """Names of all inputs that any schedule could draw once, as `montecarlo.inputs` has them, and whether they vary."""
-    found = {}
+    varying = {}
     for entry in entries:
         key, *rest = entry.path[1:]
         node = facts.root.get(*entry.path)
         varies = node is not None and isinstance(node.value, dict) and "bias" not in node.value
         for name in _names(facts, str(key), rest, thrusters):
-            found[name] = varies
-    return found
+            varying[name] = varies
+    return varying
 
 
-def _names(facts: Facts, key: str, one: list[str | int], thrusters: list[str]) -> list[str]:
-    """Of a tolerance, which may be of ``one`` thruster or axis alone."""
+def _names(facts: Facts, key: str, chosen: list[str | int], thrusters: list[str]) -> list[str]:
+    """Names of the inputs of a tolerance, which may be that of the ``chosen`` thruster or axis alone."""
     if key in EACH_PULSE:
         return []
     if key == "omega0":
-        return [f"omega0_{int(axis) + 1}" for axis in one or range(3)]
+        return [f"omega0_{int(axis) + 1}" for axis in chosen or range(3)]
     word, letters = PARTS.get(key, (key, ""))
     if key in BY_THRUSTER:
         return [
             f"{word} {name} {letter}".rstrip()
-            for name in one or thrusters
+            for name in chosen or thrusters
             for letter in (letters if name != STEERABLE else "") or " "
         ]
     if key in ("sensor_bias", "sensor_scale") and facts.text("loop", "sensor", "kind") != ACCELEROMETER:
@@ -118,7 +118,7 @@ sign. Of an angle the nominal value is 90 deg."""
 
 
 class ToleranceEntry(NamedTuple):
-    """One tolerance: where it is, what kind of quantity it holds, the least nominal value and what that is."""
+    """One tolerance: its path, its kind of quantity, the least nominal value and the name of that."""
 
     path: KeyPath
     kind: str
@@ -127,7 +127,7 @@ class ToleranceEntry(NamedTuple):
 
 
 def dispersion_findings(root: Node) -> Iterator[Finding]:
-    """Everything wrong between the keys of the dispersions and with what else the file says."""
+    """All faults between the keys of the dispersions and with the rest of the file."""
     facts = Facts(root)
     yield from _probability(facts)
     if not facts.has("dispersions"):
@@ -158,7 +158,7 @@ def _below_zero(facts: Facts) -> Iterator[Finding]:
             continue
         floor = low if key == "tank_pressure" and low is not None else 0.0
         if size[1] > (1.0 + 1e-12) * (nominal_ - floor):
-            value, least = (f"{one:g} kg" if key == "tank_propellant" else bar(one) for one in (nominal_, floor))
+            value, least = (f"{level:g} kg" if key == "tank_propellant" else bar(level) for level in (nominal_, floor))
             below = f"less than final_pressure, {least}" if floor else "negative"
             yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {value}", below)
 
@@ -170,7 +170,7 @@ def _negative(path: KeyPath, size: tuple[str, float], of: str, below: str = "neg
 
 
 def _each(facts: Facts, key: str) -> list[KeyPath]:
-    """Where the tolerances of ``key`` are: one, or one a thruster."""
+    """Paths to the tolerances of ``key``: one, or one a thruster."""
     path: KeyPath = ("dispersions", key)
     node = facts.root.get(*path)
     if node is None or not isinstance(node.value, dict):
@@ -179,7 +179,7 @@ def _each(facts: Facts, key: str) -> list[KeyPath]:
 
 
 def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
-    """The kind of a tolerance and how far below its nominal value draws go, three sigma or all, in SI of ``kind``.
+    """The kind of a tolerance and the depth of draws below its nominal value, three sigma or all, in SI of ``kind``.
 
     One in % is that of the ``nominal`` value, where that is known.
     """
@@ -187,7 +187,7 @@ def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = Non
         size = facts.number(kind, *path, name)
         share = None if size is not None or nominal is None else facts.number("ratio", *path, name)
         if share is not None and nominal is not None:
-            out_of_range = abs(share) > (LARGEST_SIGMA if name == "normal" else LARGEST_OFFSET)  # said by `_kinds`
+            out_of_range = abs(share) > (LARGEST_SIGMA if name == "normal" else LARGEST_OFFSET)  # reported by `_kinds`
             size = None if out_of_range else share * nominal
         if size is not None:
             return name, -size if name == "bias" else 3.0 * size if name == "normal" else size
@@ -196,7 +196,7 @@ def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = Non
 
 def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
     """The time of ``key`` of the valve of each thruster that a tolerance concerns, s."""
-    found = {}
+    times = {}
     for index, _ in facts.children("thrusters"):
         path: KeyPath = ("thrusters", index)
         name = facts.text(*path, "name")
@@ -205,8 +205,8 @@ def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
             continue
         time = facts.number("time", *valve, key) if facts.has(*valve, key) else 0.0
         if time is not None:
-            found[name] = time
-    return found
+            times[name] = time
+    return times
 
 
 def _probability(facts: Facts) -> Iterator[Finding]:
@@ -241,7 +241,7 @@ def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
 
 
 def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
-    """The value that a tolerance is compared with, and what it is; None where it cannot be read, or nothing bounds."""
+    """The value that a tolerance is compared with, and its name; None where it cannot be read, or nothing bounds it."""
     if key in ("A", "C"):
         moments = moments_of(facts)
         return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
@@ -277,13 +277,13 @@ def _thruster_names(facts: Facts) -> Iterator[Finding]:
 
 
 def _kinds(facts: Facts, entry: ToleranceEntry) -> Iterator[Finding]:
-    """What is wrong with the kinds and the size of one tolerance."""
+    """Faults of the kinds and the size of one tolerance."""
     node = facts.root.get(*entry.path)
     if node is None or not isinstance(node.value, dict):
         return
     given = [key for key in node.value if key in KINDS]
-    said = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
-    if not given and not said:
+    reported = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
+    if not given and not reported:
         yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
     for key in given[1:]:
         yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
@@ -308,9 +308,9 @@ def _example(kind: str) -> str:
 
 
 def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) -> str | None:
-    """What makes the size of a tolerance impossible."""
+    """The fault that makes the size of a tolerance impossible."""
     if value is None:
-        return None  # said already
+        return None  # reported already
     try:
         size, relative = size_of(value, entry.kind)
     except ValueError as wrong:
@@ -369,10 +369,10 @@ def _of_sensor(facts: Facts) -> Iterator[Finding]:
             continue
         if not facts.has("loop"):
             yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
-        for one in KINDS if key == "sensor_bias" and kind is not None else ():
-            text = facts.text(*path, one)
-            if text is not None and facts.number(wrong, *path, one) is not None:
-                yield Finding((*path, one), f"{shown(text)} is not in the unit of the sensor: {right}")
+        for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
+            text = facts.text(*path, distribution)
+            if text is not None and facts.number(wrong, *path, distribution) is not None:
+                yield Finding((*path, distribution), f"{shown(text)} is not in the unit of the sensor: {right}")
     delay, offset = (
         facts.number("time", *path) for path in (("loop", "sensor", "delay"), ("dispersions", "sensor_delay", "bias"))
     )

@@ -1,12 +1,8 @@
-"""Values replaced in a file, comments kept; fitted file.
+"""Values replaced in the YAML text of a spacecraft file, and the file that a fit of telemetry leads to.
 
-A spacecraft file with what a fit of telemetry found: values, how well they are known, and the motion at an epoch.
-
-Only values change: comments, the order of the keys and units stay as they were.
-
-Values of a YAML text replaced in place, so that its comments and the order of its keys stay.
-
-Works on a text that `yaml.read_tree` has read, and so is neither a bomb nor of other than core values.
+Comments, the order of the keys and units stay as they were. The text must have been read by `yaml.read_tree`, and so is
+neither a bomb nor of other than core values. A fitted file holds the estimates, their standard deviations, and the
+motion at an epoch.
 """
 
 from __future__ import annotations
@@ -37,7 +33,7 @@ from nutdamp.units import parse
 
 
 class TextChange(NamedTuple):
-    """What is written over ``start`` to ``end`` of a text."""
+    """Text to be written over ``start`` to ``end`` of another."""
 
     start: int
     end: int
@@ -110,17 +106,17 @@ def _find(root: yaml.Node, path: KeyPath) -> tuple[yaml.Node | None, yaml.Node |
     key: yaml.Node | None = None
     node: yaml.Node | None = root
     for step in path:
-        found = None
+        entry = None
         if isinstance(node, yaml.MappingNode):
-            found = next(((one, other) for one, other in node.value if one.value == step), None)
+            entry = next(((name, value) for name, value in node.value if name.value == step), None)
         elif isinstance(node, yaml.SequenceNode) and isinstance(step, int) and step < len(node.value):
-            found = None, node.value[step]
-        key, node = found or (None, None)
+            entry = None, node.value[step]
+        key, node = entry or (None, None)
     return key, node
 
 
 def _end(node: yaml.Node) -> int:
-    """Where the text of a value ends: of a block, that of its last entry."""
+    """End of the text of a value; of a block, that of its last entry."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _end(last[1] if isinstance(node, yaml.MappingNode) else last)
@@ -148,12 +144,12 @@ UNWRITTEN = {
     "misalignment": ("tilt of the gyros about {}", "deg"),
     "wobble": ("tilt of the axis about {}", "deg"),
 }
-"""What is estimated of sensors but has no key in the file: the bias of a loop is one for both of its gyros."""
+"""Estimates of sensors that have no key in the file: the bias of a loop is one for both of its gyros."""
 
 Edits = Iterator[tuple[KeyPath, str]]
 
 
-def fitted_text(text: str, name: str, settings: Sequence[Setting], found: Fit, carried: Carried) -> str:
+def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, carried: Carried) -> str:
     """The text of a spacecraft file, called ``name``, with the estimates; ``settings`` become part of it.
 
     Raises BadRequest for values that an alias stands for.
@@ -164,33 +160,33 @@ def fitted_text(text: str, name: str, settings: Sequence[Setting], found: Fit, c
         value = setting.value if isinstance(setting.value, str) else _flow(setting.node()[0].plain())
         text = edited(text, {_positions(tree, setting.path): value or "null"})
     tree = read_tree(text, name)[0]
-    made = replaced(found.model.spacecraft, carried)
-    values = dict(_edits(tree, found, carried, made))
+    fitted = replaced(fit.model.spacecraft, carried)
+    values = dict(_edits(tree, fit, carried, fitted))
     rename = {"state": "omega0"} if ("state",) in values else {}
     return edited(text, values, rename)
 
 
-def notes(found: Fit, carried: Carried) -> Iterator[str]:
-    """What of the estimates the file does not say, and what in it still counts from the old t = 0; in words."""
-    body = found.model.spacecraft
-    growth = found.index("growth")
+def notes(fit: Fit, carried: Carried) -> Iterator[str]:
+    """Sentences on estimates that the file cannot hold, and on entries that still count from the old t = 0."""
+    body = fit.model.spacecraft
+    growth = fit.index("growth")
     if growth is not None:
-        value, sigma = float(found.values[growth]), float(found.sigmas[growth])
+        value, sigma = float(fit.values[growth]), float(fit.sigmas[growth])
         if abs(value) > SEEN * sigma and not _grows_so(carried, value):
             way = "grows" if value > 0.0 else "decays"
             yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
-    for name in (one.name for one in found.model.parameters if one.name.startswith("delay ")):
-        at = found.index(name)
+    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("delay ")):
+        at = fit.index(name)
         assert at is not None
-        if abs(found.values[at]) > SEEN * found.sigmas[at]:
+        if abs(fit.values[at]) > SEEN * fit.sigmas[at]:
             channel = name.removeprefix("delay ")
-            if channel not in dict(_delays(found)):
-                yield f"the delay of {channel}, {1e3 * found.values[at]:.4g} ms, is not written: see the key valve"
-    yield from _off(found)
-    for name in (one.name for one in found.model.parameters if one.name.startswith("thrust ")):
-        if found.named[name] <= LEAST_THRUST:
+            if channel not in dict(_delays(fit)):
+                yield f"the delay of {channel}, {1e3 * fit.values[at]:.4g} ms, is not written: see the key valve"
+    yield from _off(fit)
+    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("thrust ")):
+        if fit.named[name] <= LEAST_THRUST:
             channel = name.removeprefix("thrust ")
-            factor = found.named[name]
+            factor = fit.named[name]
             share = f"{channel} gave {100.0 * factor:.3g} % of its thrust"
             doubt = (
                 "did it fire?" if factor > -LEAST_THRUST else "it pushes the other way: another channel, or reversed?"
@@ -199,21 +195,21 @@ def notes(found: Fit, carried: Carried) -> Iterator[str]:
     limits = body.limits
     if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
         yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
-    if body.tank is not None and len(found.model.record.schedule):
+    if body.tank is not None and len(fit.model.record.schedule):
         yield "tank.propellant is that before the pulses of the schedule"
 
 
-def _edits(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
+def _edits(tree: Node, fit: Fit, carried: Carried, fitted: Spacecraft) -> Edits:
     yield from _inertia(tree, carried)
-    yield from _motion(tree, carried, made)
-    yield from _attitude(tree, found, carried)
-    yield from _dissipation(tree, found, carried)
-    yield from _goal(tree, found, carried, made)
+    yield from _motion(tree, carried, fitted)
+    yield from _attitude(tree, fit, carried)
+    yield from _dissipation(tree, fit, carried)
+    yield from _goal(tree, fit, carried, fitted)
     yield from _thrusts(tree, carried)
-    for channel, late in _delays(found):
+    for channel, late in _delays(fit):
         yield from _valve(tree, channel, late)
-    yield from _sensor(tree, found)
-    yield from _dispersions(found, carried)
+    yield from _sensor(tree, fit)
+    yield from _dispersions(fit, carried)
 
 
 def _inertia(tree: Node, carried: Carried) -> Edits:
@@ -230,11 +226,11 @@ def _inertia(tree: Node, carried: Carried) -> Edits:
         yield ("inertia", "tensor"), f"[{rows}]"
 
 
-def _motion(tree: Node, carried: Carried, made: Spacecraft) -> Edits:
+def _motion(tree: Node, carried: Carried, fitted: Spacecraft) -> Edits:
     rates = carried.values[2:5]
-    if tree.get("state") is not None and made.inertia.symmetric and made.inertia.aligned:
+    if tree.get("state") is not None and fitted.inertia.symmetric and fitted.inertia.aligned:
         omega = complex(rates[0], rates[1])
-        inertia = made.inertia
+        inertia = fitted.inertia
         angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(omega), float(rates[2]))
         phase = math.atan2(omega.imag, omega.real)
         for key, value, kind, unit in (
@@ -251,27 +247,27 @@ def _motion(tree: Node, carried: Carried, made: Spacecraft) -> Edits:
         yield ("omega0", index), _as_before(tree.get("omega0", index), float(rate), "rate", "rad/s")
 
 
-def _attitude(tree: Node, found: Fit, carried: Carried) -> Edits:
+def _attitude(tree: Node, fit: Fit, carried: Carried) -> Edits:
     if tree.get("attitude") is None:
         return
     yield ("attitude", "quaternion"), "[" + ", ".join(_number(part) for part in carried.quaternion) + "]"
-    given = found.model.spacecraft.attitude
+    given = fit.model.spacecraft.attitude
     if given is not None and given.epoch is not None and carried.time != 0.0:
         zone = "Z" if tree.get("attitude", "epoch") is not None else ""
         yield ("attitude", "epoch"), f"{Epoch.parse(given.epoch).plus(carried.time).text}{zone}"
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
-    """Whether dissipation lets the nutation of such a body grow (or decay) as it does."""
+    """True where dissipation lets the nutation of such a body grow (or decay) at this rate."""
     first, second, third = carried.body.moments
     return (0.5 * (first + second) - third) * growth > 0.0
 
 
-def _dissipation(tree: Node, found: Fit, carried: Carried) -> Edits:
-    index = found.index("growth")
+def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
+    index = fit.index("growth")
     if index is None:
         return
-    value, sigma = float(found.values[index]), float(found.sigmas[index])
+    value, sigma = float(fit.values[index]), float(fit.sigmas[index])
     given = tree.get("dissipation", "time_constant")
     if abs(value) > SEEN * sigma:
         yield ("dissipation", "time_constant"), _as_before(given, 1.0 / abs(value), "time", "s")
@@ -279,13 +275,13 @@ def _dissipation(tree: Node, found: Fit, carried: Carried) -> Edits:
             yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
 
 
-def _goal(tree: Node, found: Fit, carried: Carried, made: Spacecraft) -> Edits:
+def _goal(tree: Node, fit: Fit, carried: Carried, fitted: Spacecraft) -> Edits:
     """Tilt and azimuth count from the motion at t = 0, which is another one now."""
-    target = found.model.spacecraft.goal.axis
+    target = fit.model.spacecraft.goal.axis
     if target is None or tree.get("goal", "tilt") is None:
         return
     in_body = attitude.rotate(attitude.conjugate(carried.state.quaternion), target)
-    to_n = replace(made, attitude=None).initial.quaternion
+    to_n = replace(fitted, attitude=None).initial.quaternion
     x, y, z = attitude.rotate(to_n, in_body).tolist()
     tilt, azimuth = math.atan2(math.hypot(x, y), z), math.atan2(y, x)
     yield ("goal", "tilt"), _as_before(tree.get("goal", "tilt"), tilt, "angle", "deg")
@@ -313,7 +309,7 @@ def _thrusts(tree: Node, carried: Carried) -> Edits:
                 yield ("thrusters", index, "torque", axis), _as_before(part, value, "torque", "N m")
 
 
-def _dispersions(found: Fit, carried: Carried) -> Edits:
+def _dispersions(fit: Fit, carried: Carried) -> Edits:
     sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
     values = dict(zip(carried.names, carried.values.tolist(), strict=True))
     for key in ("A", "C"):
@@ -321,10 +317,10 @@ def _dispersions(found: Fit, carried: Carried) -> Edits:
             yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
     rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
     yield ("dispersions", "omega0"), f"[{rates}]"
-    factors, given = carried.factors, found.model.spacecraft.dispersions
+    factors, given = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         before = {} if given is None else given.thrust
-        parts = [f"{_quoted(name)}: {_tolerance(one)}" for name, one in before.items() if name not in factors]
+        parts = [f"{_quoted(name)}: {_tolerance(size)}" for name, size in before.items() if name not in factors]
         parts += [
             f"{_quoted(name)}: {{normal: {100.0 * sigma / factor:.6g} %}}" for name, (factor, sigma) in factors.items()
         ]
@@ -333,19 +329,19 @@ def _dispersions(found: Fit, carried: Carried) -> Edits:
         yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
     pairs = correlations(carried, given)
     if pairs:
-        rows = ", ".join(f"[{_quoted(one)}, {_quoted(other)}, {value:.{DIGITS}f}]" for one, other, value in pairs)
+        rows = ", ".join(f"[{_quoted(first)}, {_quoted(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs)
         yield ("dispersions", "correlation"), f"[{rows}]"
 
 
-def _delays(found: Fit) -> Iterator[tuple[str, float]]:
+def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
     """Channels whose thrust is later than by the file, s, as far as a valve of their own can have such delays."""
-    for channel in found.model.spacecraft.channels:
-        at, known = found.index(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
+    for channel in fit.model.spacecraft.channels:
+        at, known = fit.index(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
         if at is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
             continue
-        late = float(found.values[at])
+        late = float(fit.values[at])
         possible = abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0
-        if possible and abs(late) > SEEN * found.sigmas[at]:
+        if possible and abs(late) > SEEN * fit.sigmas[at]:
             yield channel.thrusters[0].name, late
 
 
@@ -373,19 +369,19 @@ def _valve(tree: Node, name: str, late: float) -> Edits:
             yield from ((("thrusters", index, "valve", key), values[key]) for key in ("open_delay", "close_delay"))
 
 
-def _sensor(tree: Node, found: Fit) -> Edits:
+def _sensor(tree: Node, fit: Fit) -> Edits:
     """The bias of the accelerometer of the loop."""
-    at = found.index("bias_acceleration")
-    if at is not None and abs(found.values[at]) > SEEN * found.sigmas[at]:
+    at = fit.index("bias_acceleration")
+    if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
         given = tree.get("loop", "sensor", "bias")
-        yield ("loop", "sensor", "bias"), _as_before(given, float(found.values[at]), "acceleration", "m/s^2")
+        yield ("loop", "sensor", "bias"), _as_before(given, float(fit.values[at]), "acceleration", "m/s^2")
 
 
-def _off(found: Fit) -> Iterator[str]:
-    """What sensors are off that no key of the file holds; in words."""
+def _off(fit: Fit) -> Iterator[str]:
+    """Sentence on sensor errors that no key of the file holds."""
     seen = []
-    for one, value, sigma in zip(found.model.parameters, found.values, found.sigmas, strict=True):
-        kind, _, which = one.name.partition("_")
+    for parameter, value, sigma in zip(fit.model.parameters, fit.values, fit.sigmas, strict=True):
+        kind, _, which = parameter.name.partition("_")
         if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
             what, unit = UNWRITTEN[kind]
             seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
@@ -393,8 +389,8 @@ def _off(found: Fit) -> Iterator[str]:
         yield f"not written, as the file has no key for it: {', '.join(seen)}"
 
 
-def _tolerance(one: Tolerance) -> str:
-    return f"{{{one.kind}: {100.0 * one.size:.6g} %}}"
+def _tolerance(tolerance: Tolerance) -> str:
+    return f"{{{tolerance.kind}: {100.0 * tolerance.size:.6g} %}}"
 
 
 def _quoted(name: str) -> str:
@@ -403,14 +399,14 @@ def _quoted(name: str) -> str:
 
 def _positions(tree: Node, path: KeyPath) -> KeyPath:
     """A path with the entries of lists by their positions instead of their names."""
-    made: list[str | int] = []
+    positions: list[str | int] = []
     for step in path:
-        node = tree.get(*made)
+        node = tree.get(*positions)
         if node is not None and isinstance(node.value, list) and isinstance(step, str):
             names = [entry.get("name") for entry in node.value]
             step = next(index for index, name in enumerate(names) if name is not None and name.value == step)
-        made.append(step)
-    return tuple(made)
+        positions.append(step)
+    return tuple(positions)
 
 
 def _flow(value: object) -> str:
@@ -425,8 +421,8 @@ def _as_before(node: Node | None, value: float, kind: str, unit: str) -> str:
     if before is not None and not isinstance(before, str):
         return _number(value)
     if isinstance(before, str):
-        found = re.search(r"[^\d.eE+\s-].*$", before.strip())
-        unit = found.group() if found else unit
+        suffix = re.search(r"[^\d.eE+\s-].*$", before.strip())
+        unit = suffix.group() if suffix else unit
     return f"{_number(value / parse(f'1 {unit}', kind))} {unit}"
 
 

@@ -1,10 +1,7 @@
-"""STK, Basilisk script, epochs and frames.
+"""Exchange formats: attitude file (.a) of the Systems Tool Kit, script for Basilisk, epochs and frames.
 
-A script that flies a schedule in Basilisk and prints what is left: for whoever has Basilisk and not nutdamp.
-
-When and in which axes: what exchange formats need besides the plan, and the motion in the axes of the file.
-
-Attitude file (.a) of the Systems Tool Kit: the flown motion as quaternions, scalar last, and body rates in deg/s.
+The attitude file holds the flown motion as quaternions, scalar last, and body rates in deg/s, in the axes of the
+spacecraft file. The script flies a schedule in Basilisk, without nutdamp, and prints the residual nutation.
 """
 
 from __future__ import annotations
@@ -56,7 +53,7 @@ def basilisk_script(plan: Plan) -> str:
 
 
 def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
-    """Rows of the schedule: what fires, how long, torque; an ideal impulse lasts no time and gives its impulse."""
+    """Rows of the schedule: channel, duration, torque; an ideal impulse lasts no time and gives its impulse."""
     pulses, axes = plan.pulses, body.inertia.axes
     longest = default_step(body, pulses, pulses.end)
     edges = sorted({0.0, pulses.end, *(edge for pulse in pulses for edge in pulse.edges)})
@@ -220,7 +217,7 @@ MOST_RECORDS = 1_000_000
 """More make no file that anyone reads."""
 
 NANOSECONDS = 1e9
-"""In a second; to divide by them gives the number nearest to the decimal one."""
+"""Nanoseconds in a second; to divide by them gives the number nearest to the decimal one."""
 
 
 class Reference(NamedTuple):
@@ -288,7 +285,7 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
 
 
 def _records(leg: Leg, until: float) -> int:
-    """How many records keep the turn from one to the next below `TURN`."""
+    """Number of records that keeps the turn from one to the next below `TURN`."""
     end = min(leg.end, until)
     rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
     turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
@@ -303,7 +300,7 @@ def _steady(quaternion: Vector, previous: Vector | None) -> Vector:
 
 
 AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
-"""What the format calls the frames."""
+"""Names of the frames in the format."""
 
 
 def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:

@@ -1,13 +1,8 @@
-r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once.
+r"""Sections of a file declared as classes: units, ranges, defaults; read with all faults at once, and as JSON Schema.
 
-Sections of a file, declared as classes: what may be at their keys, read and checked, and as JSON Schema.
-
-A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of what YAML and
-JSON hold, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s.
-
-What the sections of a spacecraft file are made of: quantities with units and bounds, directions.
-
-The kinds of values in a spacecraft file: quantities with their ranges, lists of them, names, dates, counts.
+A key is an annotated attribute, ``mass: Mass | None = Field("Mass, kg.", "250 kg")``. Types are those of YAML and
+JSON values, lists, tuples and mappings of them, sections, and any of them `Annotated` with `Rule`\ s. Kinds of values
+in a spacecraft file follow: quantities with units and bounds, directions, lists, names, dates, counts.
 """
 
 from __future__ import annotations
@@ -29,7 +24,7 @@ KeyPath = tuple[str | int, ...]
 """Keys and list positions that lead from the root to a value."""
 
 Problems = list[tuple[KeyPath, str]]
-"""What is wrong, and where."""
+"""Problems and the paths to their values."""
 
 REQUIRED: Any = ...
 """Default of a key that cannot be left out."""
@@ -37,7 +32,7 @@ REQUIRED: Any = ...
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of a section: the ``type`` of what it holds, what it means, and what holds where it is left out."""
+    """A key of a section: the ``type`` of its value, its description, and its default."""
 
     type: Any
     default: Any
@@ -51,10 +46,10 @@ def Field(description: str, *examples: Any, default: Any = REQUIRED) -> Any:
 
 
 class Rule:
-    """What an annotation adds to a type."""
+    """Rule that an annotation adds to a type."""
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """What the file means by ``value``, which ``inner`` reads by the type. Raises ValueError that says what is."""
+        """The meaning of ``value``, which ``inner`` reads by the type. Raises ValueError with the problem."""
         return inner(value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -63,30 +58,30 @@ class Rule:
 
 
 class Length(Rule):
-    """How many entries (characters of a text) there are, both ends included."""
+    """Number of entries (characters of a text), both ends included."""
 
     def __init__(self, least: int, most: int | None = None) -> None:
         self.least, self.most = least, most
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """As the type does; raises ValueError for another length."""
+        """The value as the type reads it; raises ValueError for another length."""
         long = isinstance(value, list) and self.most is not None and len(value) > self.most
-        found = value if long else inner(value)  # entries too many are one fault, whatever they are
-        if found is None:  # not of the type
+        entries = value if long else inner(value)  # entries too many are one fault, whatever they are
+        if entries is None:  # not of the type
             return None
-        if len(found) < self.least == 1:
+        if len(entries) < self.least == 1:
             raise ValueError("empty; expected an entry")
-        if long or len(found) < self.least:
+        if long or len(entries) < self.least:
             count = f"{self.least} to {self.most}" if self.most != self.least else f"{self.least}"
             count = f"at least {self.least}" if self.most is None else count
-            raise ValueError(f"expected {count} entries, got {len(found)}")
-        return found
+            raise ValueError(f"expected {count} entries, got {len(entries)}")
+        return entries
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """With the keywords of the type."""
-        found = inner()
-        of = {"array": "Items", "object": "Properties", "string": "Length"}[found["type"]]
-        return {**found, f"min{of}": self.least, **({} if self.most is None else {f"max{of}": self.most})}
+        """Schema with the keywords of the length."""
+        keywords = inner()
+        of = {"array": "Items", "object": "Properties", "string": "Length"}[keywords["type"]]
+        return {**keywords, f"min{of}": self.least, **({} if self.most is None else {f"max{of}": self.most})}
 
 
 class Within(Rule):
@@ -97,14 +92,14 @@ class Within(Rule):
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """The number; raises ValueError where it is out of range."""
-        found = inner(value)
-        if found is not None and not self.least <= found <= self.most:
-            expected = f"at least {self.least}" if found < self.least else f"at most {self.most}"
+        number = inner(value)
+        if number is not None and not self.least <= number <= self.most:
+            expected = f"at least {self.least}" if number < self.least else f"at most {self.most}"
             raise ValueError(_mismatch(value, expected))
-        return found
+        return number
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """With the range."""
+        """Schema with the range."""
         return {**inner(), "minimum": self.least, "maximum": self.most}
 
 
@@ -112,10 +107,10 @@ class Section:
     """A mapping of the file: no key that is not named here."""
 
     written: ClassVar[str] = "a mapping {key: value, …}"
-    """How it is written, for messages."""
+    """Form of the section, for messages."""
 
     schema_extra: ClassVar[dict[str, Any]] = {}
-    """What its JSON Schema has besides."""
+    """Further keywords of its JSON Schema."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         vars(self).update(values)
@@ -125,16 +120,16 @@ class Section:
     def fields(cls) -> dict[str, Key]:
         """Its keys, by name."""
         types = get_type_hints(cls, include_extras=True)
-        found = {}
+        keys = {}
         for name, key in vars(cls).items():
             if isinstance(key, Key):
                 optional = key.default is REQUIRED and NoneType in get_args(types[name])
-                found[name] = replace(key, type=types[name], default=None if optional else key.default)
-        return found
+                keys[name] = replace(key, type=types[name], default=None if optional else key.default)
+        return keys
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``, as YAML gives it; what is wrong is added to ``problems``.
+        """The section in ``value``, as YAML gives it; problems are added to ``problems``.
 
         Unknown keys and empty values are not looked for here.
         """
@@ -169,7 +164,7 @@ def _mismatch(value: Any, expected: str) -> str:
 
 
 def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any:
-    """What a value of this type means; what is wrong is added to ``problems``."""
+    """The meaning of a value of this type; problems are added to ``problems``."""
     if value is None or annotation is Any:
         return value
     origin, parts = get_origin(annotation), get_args(annotation)
@@ -203,7 +198,7 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
 
 
 def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
-    """What a value means by the rules about its type, the last of which is the outermost."""
+    """The meaning of a value by the rules about its type, the last of which is the outermost."""
     if not rules:
         return _read(annotation, value, problems, path)
     try:
@@ -214,13 +209,13 @@ def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Probl
 
 
 def _meant(parts: tuple[Any, ...], value: Any) -> Any:
-    """The type of a union that a value is of: a section for a mapping, else the other; None is for what is left out."""
+    """The type of a union that a value is of: a section for a mapping, else the other; None is for a key left out."""
     types = [part for part in parts if part is not NoneType]
-    return next((one for one in types if isinstance(value, dict) == (section_of(one) is one)), types[0])
+    return next((kind for kind in types if isinstance(value, dict) == (section_of(kind) is kind)), types[0])
 
 
 def _either(parts: tuple[Any, ...]) -> str:
-    """What a union of a list and a mapping expects; empty where it is another."""
+    """Words for what a union of a list and a mapping expects; empty for another union."""
     kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts if part is not NoneType]
     if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {"dict", list}:
         return f"{_WORDS[list]} or {_WORDS[dict]}"
@@ -228,7 +223,7 @@ def _either(parts: tuple[Any, ...]) -> str:
 
 
 def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
-    from nutdamp.errors import nearest  # for what is wrong only
+    from nutdamp.errors import nearest
 
     if value in choices:
         return value
@@ -239,7 +234,7 @@ def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyP
 
 
 SMALLEST = 1e-15
-"""Values that must be above zero and are smaller count as zero, in SI: what is divided by them could overflow."""
+"""Smaller values that must be above zero count as zero, in SI: a division by them could overflow."""
 
 _BOUNDS = {
     "minimum": (operator.ge, "of at least"),
@@ -257,7 +252,7 @@ class Quantity(Rule):
         self.kind, self.bounds = kind, bounds
 
     def check(self, value: object) -> float:
-        """SI value; raises ValueError, which says what would be right."""
+        """SI value; raises ValueError with the values allowed."""
         result = parse(value, self.kind)
         if not self._allows(result):
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{self._degrees(value)}")
@@ -305,7 +300,7 @@ class AxialShorthand(Rule):
     single = Quantity("torque")
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """Three components; raises ValueError, which says what would be right."""
+        """Three components; raises ValueError with the form allowed."""
         return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -314,7 +309,7 @@ class AxialShorthand(Rule):
 
 
 class ListOf(Rule):
-    """Annotation of a list of lists, each ``written`` so, that says how a single one is put into a list."""
+    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
 
     def __init__(self, written: str) -> None:
         self.written = written
@@ -322,12 +317,12 @@ class ListOf(Rule):
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """The list; raises ValueError where its first entry is none."""
         if isinstance(value, list) and value and not isinstance(value[0], list):
-            one = ", ".join(str(entry) for entry in value)
-            raise ValueError(f"expected a list of {self.written}, such as [[{one}]], got [{one}]")
+            text = ", ".join(str(entry) for entry in value)
+            raise ValueError(f"expected a list of {self.written}, such as [[{text}]], got [{text}]")
         return inner(value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """As of the list."""
+        """Schema of the list."""
         return inner()
 
 
@@ -338,7 +333,7 @@ class OrWord(Rule):
         self.word = word
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The angles or the word; raises ValueError, which says what would be right."""
+        """The angles or the word; raises ValueError with the forms allowed."""
         if value == self.word:
             return value
         if not isinstance(value, list):
@@ -354,7 +349,7 @@ class _DateAndTime(Rule):
     """Annotation of a text that is a date and a time."""
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The text as it is; raises ValueError for what is no date and time."""
+        """The text as it is; raises ValueError unless it is a date and a time."""
         text = inner(value)
         try:
             if text is not None:

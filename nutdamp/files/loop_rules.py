@@ -42,13 +42,13 @@ LARGEST_BIAS, FARTHEST = 1e3, 1e3
 """m/s² and m of an accelerometer beyond which it is none of a spacecraft: its nutation would be lost in rounding."""
 
 SCALES = (0.1, 10.0)
-"""Sizes of scales between which a sensor shows what it measures."""
+"""Sizes of scales between which a sensor still measures."""
 
 SENSOR: KeyPath = ("loop", "sensor")
 
 
 def loop_findings(root: Node) -> Iterator[Finding]:
-    """Everything wrong with ``loop``."""
+    """All faults of ``loop``."""
     facts = Facts(root)
     if not facts.has("loop"):
         return
@@ -71,7 +71,7 @@ def loop_findings(root: Node) -> Iterator[Finding]:
 class ChannelFacts(NamedTuple):
     """A channel as far as it can be read: its torque (3,) N m, file axes, None where it is not known, and on-times, s.
 
-    ``damps`` is whether the torque is more transverse to principal axis 3 than along it.
+    ``damps``: the torque is more transverse to principal axis 3 than along it.
     """
 
     name: str
@@ -89,17 +89,17 @@ def channel_facts(facts: Facts) -> list[ChannelFacts]:
     named = [
         (str(name), [entry.value for _, entry in node.children()]) for name, node in facts.children("channels")
     ] or [(name, [name]) for name in thrusters if name is not None]
-    axis, found = spin_axis(facts), []
+    axis, channels = spin_axis(facts), []
     for name, members in named:
-        paths: list[KeyPath] = [thrusters[one] for one in members if one in thrusters]
+        paths: list[KeyPath] = [thrusters[member] for member in members if member in thrusters]
         torques = [torque_of(facts, path) for path in paths]
-        total = None if None in torques else np.sum([one[0] for one in torques if one is not None], axis=0)
+        total = None if None in torques else np.sum([torque[0] for torque in torques if torque is not None], axis=0)
         along = 0.0 if total is None else abs(float(total @ axis))
         damps = total is not None and norm(total - (total @ axis) * axis) > along
         times = [on_times_of(facts, path) for path in paths]
-        least, most = max((one for one, _ in times), default=0.0), min((one for _, one in times), default=math.inf)
-        found.append(ChannelFacts(name, total, damps, least, most))
-    return found
+        least, most = max((time for time, _ in times), default=0.0), min((time for _, time in times), default=math.inf)
+        channels.append(ChannelFacts(name, total, damps, least, most))
+    return channels
 
 
 def _thresholds(facts: Facts) -> Iterator[Finding]:
@@ -148,13 +148,13 @@ def _units(facts: Facts, kind: str | None) -> Iterator[Finding]:
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
-    """Whether something can be fired, for as long as the law says, and whether it is there."""
+    """Faults of the channels of a loop: none to fire, none for as long as the law demands, or names of none."""
     known = channel_facts(facts)
     law, on_time = facts.text("loop", "law"), facts.number("time", "loop", "on_time")
     if not known:
         problem = "needs channels to fire: thrusters with a torque across axis 3"
         yield Finding(("loop",), problem, True)
-    elif all(one.torque is not None for one in known) and not any(one.damps for one in known):
+    elif all(channel.torque is not None for channel in known) and not any(channel.damps for channel in known):
         problem = "no channel has a torque more transverse than axial, so none can damp a nutation"
         yield Finding(("loop",), problem, True)
     if law == "bang" and not facts.has("loop", "on_time"):
@@ -162,11 +162,12 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     if law == "one-pulse" and facts.has("loop", "on_time"):
         yield Finding(("loop", "on_time"), "is for four-pulse and bang; one-pulse fires for as long as it takes", True)
     elif on_time is not None:
-        for one in known:
-            if not one.least <= on_time <= one.most:
-                problem = f"{on_time:g} s is outside what {one.name} allows: {span(one.least, one.most, 's')}"
+        for channel in known:
+            if not channel.least <= on_time <= channel.most:
+                allowed = span(channel.least, channel.most, "s")
+                problem = f"{on_time:g} s is outside what {channel.name} allows: {allowed}"
                 yield Finding(("loop", "on_time"), problem)
-    names, before = [one.name for one in known], set()
+    names, before = [channel.name for channel in known], set()
     for index, node in facts.children("loop", "faults", "reversed"):
         path: KeyPath = ("loop", "faults", "reversed", index)
         if node.value in before:
@@ -191,7 +192,7 @@ def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
 
 
 def _lags(facts: Facts, period: float) -> Iterator[Finding]:
-    """Times after which what the sensor shows is of no use; ``period`` s is that of the nutation in the body."""
+    """Delays after which the signal of the sensor is of no use; ``period`` s is that of the nutation in the body."""
     lags = ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle"))
     for path, most in (*((path, LATE) for path in lags), (("loop", "min_interval"), LONGEST_WAIT)):
         value = facts.number("time", *path)
@@ -202,7 +203,7 @@ def _lags(facts: Facts, period: float) -> Iterator[Finding]:
 
 def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
     """An accelerometer that shows nothing of the nutation."""
-    from nutdamp.control_loop.sensor import is_blind  # few files have one
+    from nutdamp.control_loop.sensor import is_blind
 
     position, axis = _mounting(facts, inertia)
     if facts.text(*SENSOR, "kind") != "accelerometer" or position is None or axis is None:
@@ -247,7 +248,7 @@ def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
     quantity = "rate" if kind == "gyro" else "acceleration"
     # The offset of an accelerometer is fitted, and does not matter.
     shares = {(*SENSOR, "noise"): 1.0, (*SENSOR, "quantisation"): 2.0}
-    biases: list[KeyPath] = [(*SENSOR, "bias"), *(("dispersions", "sensor_bias", one) for one in KINDS)]
+    biases: list[KeyPath] = [(*SENSOR, "bias"), *(("dispersions", "sensor_bias", kind) for kind in KINDS)]
     for path, share in (*shares.items(), *((path, 1.0 if kind == "gyro" else LARGEST_BIAS / size) for path in biases)):
         value = facts.number(quantity, *path)
         if value is None or abs(value) <= share * size or (value < 0.0 and path in shares):

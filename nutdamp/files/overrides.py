@@ -1,6 +1,6 @@
 """Keys of a spacecraft file that are set beside it, such as ``limits.horizon=300s``: an overlay on its tree.
 
-The tree is changed before anything in it is checked, so that what is set is checked exactly as the file is.
+The tree is changed before anything in it is checked, so that settings are checked exactly as the file is.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _EXAMPLE = "limits.horizon=300s or thrusters.T1.force=12N"
 
 
 class Setting(NamedTuple):
-    """A key and what to set it to; ``label`` is how messages name it.
+    """A key and its new value; ``label`` is its name in messages.
 
     Entries of a list are named by position or, where they have one, by ``name``. A text as ``value`` is YAML.
     """
@@ -45,7 +45,7 @@ class Setting(NamedTuple):
 
 
 def parse_setting(text: str) -> Setting:
-    """The setting in ``KEY=VALUE``, as command lines give it; raises ValueError, which says what is expected."""
+    """The setting in ``KEY=VALUE``, as command lines give it; raises ValueError with the form expected."""
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
         raise ValueError(f"{shown(text)} is not KEY=VALUE, such as {_EXAMPLE}")
@@ -100,26 +100,26 @@ def _labelled(call: str, path: KeyPath, value: object) -> Setting:
 
 
 def overlay(root: Node, settings: Iterable[Setting]) -> tuple[Node, list[Fault]]:
-    """The tree with the settings in it, one after the other, and what makes a setting impossible."""
+    """The tree with the settings in it, one after the other, and the faults of impossible settings."""
     faults: list[Fault] = []
     for setting in settings:
         place = Place(setting=setting.label)
         try:
             if len(setting.path) > MAX_DEPTH:
                 raise _NoPlaceError(f"nested more than {MAX_DEPTH} levels deep")
-            node, found = setting.node()
+            node, problems = setting.node()
             root = _put(root, setting.path, (), node, place)
         except FaultyFile as wrong:
-            found = wrong.faults
+            problems = wrong.faults
         except _NoPlaceError as wrong:
-            found = [place.fault("", "", str(wrong))]
+            problems = [place.fault("", "", str(wrong))]
         # Lines and columns within a setting would be taken for those of the file.
-        faults += [Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in found]
+        faults += [Fault(setting.label, 0, 0, dotted(setting.path), fault.problem) for fault in problems]
     return root, faults
 
 
 class _NoPlaceError(Exception):
-    """The tree has no place for a setting; the text says why."""
+    """The tree has no place for a setting; the text is the reason."""
 
 
 def _parse_path(text: str) -> tuple[KeyPath, int]:
@@ -202,7 +202,7 @@ def _moved(node: Node, place: Place) -> Node:
 
 
 def _of_python(value: object, place: Place, depth: int = 0) -> Node:
-    """A Python value as part of a tree; raises BadRequest for what a file could not hold."""
+    """A Python value as part of a tree; raises BadRequest for a value that a file cannot hold."""
     if depth > MAX_DEPTH:
         raise BadRequest(f"{place}: nested more than {MAX_DEPTH} levels deep")
     if value is None or isinstance(value, str | bool | int | float):

@@ -1,8 +1,6 @@
-"""Missing-unit warnings, foreign file types.
+"""Warnings of numbers that probably lack a unit, and recognition of files that are no spacecraft files.
 
-Numbers without a unit that are hardly what was meant, with the unit that was: for warnings.
-
-What a file given as a spacecraft file is instead: kinds that nutdamp writes or imports, by their first lines.
+Foreign files are of kinds that nutdamp writes or imports, known by their first lines.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ LOOKED_AT = 4000
 
 
 class Foreign(NamedTuple):
-    """A kind of file: the ``pattern`` of its first lines, what it ``is``, and what to do with it."""
+    """A kind of file: the ``pattern`` of its first lines, its description ``is_``, and its cure."""
 
     pattern: str
     is_: str
@@ -58,11 +56,11 @@ FOREIGN = (
         "a spacecraft file is in YAML; `nutdamp init` writes one to start from",
     ),
 )
-"""In this order, the first that fits."""
+"""Kinds of file; the first that fits counts."""
 
 
 def foreign(text: str) -> str | None:
-    """That a text is no spacecraft file but of another known kind, and the cure; None where nothing shows that."""
+    """Message for a text of a known kind that is no spacecraft file, with the cure; None for any other text."""
     for kind in FOREIGN:
         if re.match(kind.pattern, text[:LOOKED_AT]):
             return f"expected a spacecraft file, got {kind.is_}; {kind.cure}"
@@ -101,7 +99,7 @@ ANGLES: tuple[KeyPath, ...] = (("state", "phase"), ("goal", "azimuth"), ("goal",
 
 
 def doubts(root: Node) -> Iterator[Finding]:
-    """Numbers that are beyond what can be meant in SI."""
+    """Numbers beyond any plausible value in SI."""
     facts = Facts(root)
     for path in ANGLES:
         value = _bare(facts, path)
@@ -120,7 +118,7 @@ def doubts(root: Node) -> Iterator[Finding]:
 
 
 def reading(value: float, kind: str, meant: str) -> str:
-    """How a bare number is read, and what to write where the unit ``meant`` is more likely."""
+    """The reading of a bare number, and the text to write where the unit ``meant`` is more likely."""
     unit = KINDS[kind].si
     in_degrees = f" ({math.degrees(value):.4g} deg)" if kind == "angle" else ""
     return f"{value} is read as {value} {unit}{in_degrees}; write {value} {meant} if that is meant, else {value} {unit}"
@@ -216,11 +214,11 @@ def _thrust(facts: Facts) -> Iterator[Finding]:
         times += [(*path, "valve", key) for key in VALVE_TIMES]
         rows = facts.children(*path, "impulse_bit") if path else []
         times += [(*path, "impulse_bit", row, column) for row, _ in rows for column in (0, 2)]
-    found = [(path, "time", "ms") for path in times if (_bare(facts, path) or 0.0) > SLUGGISH]
+    bare = [(path, "time", "ms") for path in times if (_bare(facts, path) or 0.0) > SLUGGISH]
     pressures: list[KeyPath] = [("tank", "pressure"), ("tank", "final_pressure")]
     pressures += [("tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
-    found += [(path, "pressure", "bar") for path in pressures if 0.0 < (_bare(facts, path) or 0.0) < THIN]
-    for path, kind, meant in found:
+    bare += [(path, "pressure", "bar") for path in pressures if 0.0 < (_bare(facts, path) or 0.0) < THIN]
+    for path, kind, meant in bare:
         value = _bare(facts, path)
         assert value is not None
         yield _doubt(path, value, kind, meant)

@@ -1,12 +1,7 @@
-"""File -> Spacecraft, all faults at once; JSON Schema; shipped examples.
+"""Spacecraft files, YAML or JSON -> `Spacecraft`, in principal axes, SI and radians; all faults at once.
 
-Spacecraft files: YAML or JSON -> `Spacecraft`, in principal axes, SI and radians.
-
-Everything wrong in a spacecraft file at once: spelling of keys, types and ranges, and what `rules` finds.
-
-JSON Schema of the spacecraft file, from the sections that read it.
-
-Spacecraft files to start from, which ship with the package: the built-in example, and those of ``configs/``.
+Faults are those of the spelling of keys, of types and ranges, and the findings of `rules`. The JSON Schema follows from
+the same sections. Files to start from ship with the package: the built-in example, and those of ``configs/``.
 """
 
 from __future__ import annotations
@@ -66,7 +61,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 @cache
 def _places() -> dict[str, Path]:
-    """Where the file of each name lies: an installed package holds the folder ``configs``, a checkout has it beside."""
+    """Paths of the shipped files by name: an installed package holds ``configs``, a checkout has it beside."""
     folders = (_PACKAGE / "data" / "configs", _PACKAGE.parent / "configs")
     shipped = next((sorted(folder.glob("*.yaml")) for folder in folders if folder.is_dir()), [])
     return {path.stem: path for path in (_PACKAGE / "data" / f"{BUILT_IN}.yaml", *shipped)}
@@ -83,7 +78,7 @@ def example_text(name: str = BUILT_IN) -> str:
 
 
 def example_subject(name: str) -> str:
-    """What the file of that ``name`` is about: the comment it begins with, up to the line that ends a sentence."""
+    """Subject of the file of that ``name``: the comment at its beginning, up to the line that ends a sentence."""
     lines: list[str] = []
     for line in example_text(name).splitlines():
         lines.append(line.removeprefix("#").strip())
@@ -95,9 +90,9 @@ def example_subject(name: str) -> str:
 def read_contents(
     text: str, name: str, settings: Sequence[Setting] = (), warn: Callable[[Fault], None] = lambda _: None
 ) -> SpacecraftFile:
-    """The checked contents of a spacecraft file with ``settings`` in place of what it says.
+    """The checked contents of a spacecraft file, with ``settings`` replacing its values.
 
-    ``warn`` is given what is hardly meant. Raises `FaultyFile` with all faults, sorted by place.
+    ``warn`` is given each implausible number. Raises `FaultyFile` with all faults, sorted by place.
     """
     other = foreign(text.removeprefix("\ufeff"))
     if other is not None:
@@ -105,16 +100,16 @@ def read_contents(
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    found = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
+    faulty = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
-        from nutdamp.files.loop_rules import loop_findings  # few files have one
+        from nutdamp.files.loop_rules import loop_findings
 
-        found += loop_findings(root)
+        faulty += loop_findings(root)
     problems: Problems = []
     contents = SpacecraftFile.read(root.plain(), problems)
-    judged = {finding.path for finding in found if not finding.at_key}
-    found += [Finding(path, problem) for path, problem in problems if path not in judged]
-    faults += [_placed(finding, root, name) for finding in found]
+    judged = {finding.path for finding in faulty if not finding.at_key}
+    faulty += [Finding(path, problem) for path, problem in problems if path not in judged]
+    faults += [_placed(finding, root, name) for finding in faulty]
     for doubt in in_order(_placed(finding, root, name) for finding in doubts(root)):
         warn(doubt)
     if faults or contents is None:
@@ -123,7 +118,7 @@ def read_contents(
 
 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
-    """The finding with its place; what is missing is reported at the key of its parent."""
+    """The finding with its place; a missing key is reported at the key of its parent."""
     path = finding.path
     if finding.at_key:
         place = root.key_place_of(path)
@@ -137,7 +132,7 @@ def _placed(finding: Finding, root: Node, name: str) -> Fault:
 def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
     """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
 
-    A misspelt key is put right in the tree, so that one slip makes one fault and what it holds is checked too; any
+    A misspelt key is put right in the tree, so that one slip makes one fault and its value is checked too; any
     other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
     names, of entries of the ``model``.
     """
@@ -168,7 +163,7 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
 
 
 def _holds_names(annotation: Any) -> bool:
-    """Whether the type of a field is that of a mapping by names."""
+    """True where the type of a field is that of a mapping by names."""
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
@@ -178,11 +173,11 @@ Vector = NDArray[np.float64]
 Part = TypeVar("Part")
 
 Warn = Callable[[Fault], None]
-"""Is given each number that is hardly what was meant."""
+"""Receiver of each number that is hardly meant."""
 
 
 GROWS = {"grows": True, "decays": False, None: None}
-"""What ``dissipation.nutation`` says."""
+"""Values of ``dissipation.nutation``."""
 
 
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
@@ -193,7 +188,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
     """The spacecraft in the text of a file; ``name`` is that of the file in messages.
 
-    ``settings`` take the place of what the text says. Raises `FaultyFile` with everything that is wrong.
+    ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
     """
     contents = read_contents(text, name, settings, warn)
     inertia = _inertia(contents.inertia)
@@ -236,7 +231,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
 
 
 def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:
-    """What a section describes, where it is given: keys have the names of fields, but for ``others``."""
+    """The object that a section describes, where given: keys have the names of fields, but for ``others``."""
     if section is None:
         return None
     named: tuple[Any, ...] = fields(kind)  # type: ignore[arg-type]
@@ -256,7 +251,7 @@ def _inertia(section: InertiaSection) -> Inertia:
 def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/(I3|ω3|), Magnus 1970 (19).
 
-    So θ is the angle between H and the spin axis at t = 0, whatever I1 and I2 are.
+    So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
     """
     if contents.omega0 is not None:
         rates: Vector = inertia.axes.T @ np.array(contents.omega0)
@@ -312,10 +307,10 @@ def _tank(section: TankSection | None) -> Tank | None:
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
-    """What a thruster of ``thrust`` N makes of commands; None where that is full thrust from start to end."""
+    """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start to end."""
     if entry.impulse_bit is None and entry.valve is None and every is None:
         return None
-    from nutdamp.physics import thruster  # few files have any
+    from nutdamp.physics import thruster
 
     if entry.impulse_bit is not None:
         assert thrust is not None
@@ -447,9 +442,9 @@ def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, A
             properties[name]["default"] = key.default
     required = [name for name, key in section.fields().items() if key.default is REQUIRED]
     about = " ".join((section.__doc__ or "").split())
-    found: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
-    found |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
-    return {**found, "required": required} if required else found
+    schema: dict[str, Any] = {"type": "object", "title": section.__name__, "description": about}
+    schema |= {"properties": properties, "additionalProperties": False, **section.schema_extra}
+    return {**schema, "required": required} if required else schema
 
 
 def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
@@ -458,7 +453,7 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin is Annotated:
         return _ruled_schema(of[0], of[1:], parts)
     if origin in (Union, UnionType):
-        given = [_schema(one, parts) for one in of if one is not NoneType]
+        given = [_schema(part, parts) for part in of if part is not NoneType]
         return given[0] if len(given) == 1 else {"oneOf": given}
     if origin is Literal:
         return {"type": "string", **({"enum": list(of)} if len(of) > 1 else {"const": of[0]})}
@@ -470,7 +465,7 @@ def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin is list:
         return {"type": "array", "items": _schema(of[0], parts)}
     if origin is tuple:
-        entries = [_schema(one, parts) for one in of]
+        entries = [_schema(part, parts) for part in of]
         return {"type": "array", "prefixItems": entries, "minItems": len(of), "maxItems": len(of)}
     if origin is dict:
         return {"type": "object", "additionalProperties": _schema(of[1], parts)}
@@ -488,4 +483,4 @@ def _in_order(schema: Any, within: str = "") -> Any:
     if isinstance(schema, dict):
         names = schema if within in ("properties", "default") else sorted(schema)
         return {name: _in_order(schema[name], name if within != "properties" else "") for name in names}
-    return [_in_order(one, within) for one in schema] if isinstance(schema, list) else schema
+    return [_in_order(entry, within) for entry in schema] if isinstance(schema, list) else schema

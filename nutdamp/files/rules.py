@@ -1,6 +1,6 @@
 """Constraints between the keys of a spacecraft file: body, motion, goal, disturbances, limits and directions in space.
 
-The rules read the raw tree (`Facts`) and skip what cannot be read, so that they speak up whatever else is wrong.
+The rules read the raw tree (`Facts`) and skip unreadable values, so that they work beside any other fault.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Facts:
         self.root = root
 
     def has(self, *path: str | int) -> bool:
-        """Whether something is at ``path``."""
+        """True where something is at ``path``."""
         return self.root.get(*path) is not None
 
     def text(self, *path: str | int) -> str | None:
@@ -69,7 +69,7 @@ class Facts:
         return None if None in numbers else np.array(numbers, dtype=np.float64)
 
     def children(self, *path: str | int) -> list[tuple[str | int, Node]]:
-        """Keys or positions at ``path``, and what is there."""
+        """Keys or positions at ``path``, and their nodes."""
         node = self.root.get(*path)
         return [] if node is None else list(node.children())
 
@@ -81,7 +81,7 @@ NO_ATTITUDE = "needs attitude, which says where the body points at t = 0"
 
 
 def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
-    """Everything wrong with ``orbit``, ``sun``, ``keep`` and ``commands``.
+    """All faults of ``orbit``, ``sun``, ``keep`` and ``commands``.
 
     ``axis`` (3,) is the axis in the body about which it spins at ``spin`` rad/s, or None where that cannot be read.
     """
@@ -93,7 +93,7 @@ def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Fin
 
 
 def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
-    """What is wrong between sun_sensor and commands; ``axis`` (3,) is axis 3, and ``spin`` rad/s its rate."""
+    """Faults between sun_sensor and commands; ``axis`` (3,) is axis 3, and ``spin`` rad/s its rate."""
     if facts.has("commands") and not facts.has("sun_sensor"):
         yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
     if facts.has("sun_sensor") and not facts.has("sun"):
@@ -190,13 +190,13 @@ def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
 
 
 def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    """What is wrong with a direction, by two angles or by a word."""
+    """Faults of a direction, by two angles or by a word."""
     if not facts.has("attitude") and facts.has(*path):
-        yield Finding(path, NO_ATTITUDE, True)  # at the key: what is written there is judged too
+        yield Finding(path, NO_ATTITUDE, True)  # at the key, since its value is judged too
     declination = facts.number("angle", *path, 1)
     if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
-        found = f"{math.degrees(declination):g} deg"
-        yield Finding((*path, 1), f"{found} is no declination; expected an angle from -90 deg to 90 deg")
+        angle = f"{math.degrees(declination):g} deg"
+        yield Finding((*path, 1), f"{angle} is no declination; expected an angle from -90 deg to 90 deg")
 
 
 CANCELLED = 1e-12
@@ -219,7 +219,7 @@ SYMMETRIC = 1e-9
 
 
 def findings(root: Node) -> Iterator[Finding]:
-    """Everything wrong between the keys of a file."""
+    """All faults between the keys of a file."""
     facts = Facts(root)
     for rule in (
         _names,
@@ -289,7 +289,7 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
 
 
 def _of_tensor(facts: Facts) -> bool:
-    """Whether there are keys that belong into a tensor; that is a fault already."""
+    """True where there are keys that belong into a tensor; that is a fault already."""
     node = facts.root.get("inertia")
     return node is not None and any(map(MOMENT.fullmatch, node.keys))
 
@@ -303,7 +303,7 @@ def tensor_of(facts: Facts) -> Vector | None:
 
 
 def tensor_fault(tensor: Vector) -> Finding | None:
-    """What makes a 3×3 tensor impossible as an inertia tensor."""
+    """The fault that makes a 3×3 tensor impossible as an inertia tensor."""
     path: KeyPath = ("inertia", "tensor")
     skew = np.abs(tensor - tensor.T)
     if skew.max() > SYMMETRIC * np.abs(tensor).max():
@@ -340,7 +340,7 @@ def _spinning(inertia: Inertia) -> Inertia | None:
 
 
 def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
-    """What makes free spin about principal axis 3 unstable, and how fast at this ``spin``, if known."""
+    """The reason why free spin about principal axis 3 is unstable, and the growth at this ``spin``, if known."""
     moments = principal_axes(symmetric(tensor))[0]
     named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
     values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
@@ -383,7 +383,7 @@ def spin_axis(facts: Facts) -> Vector:
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
-    """The rate about principal axis 3, and where it is; what rounding leaves of a transverse rate is zero."""
+    """The rate about principal axis 3, and its path; a transverse rate that is rounding counts as zero."""
     omega0, tensor = facts.vector("rate", 3, "omega0"), tensor_of(facts)
     if omega0 is None or (tensor is not None and tensor_fault(tensor) is not None):
         return (), None
@@ -411,13 +411,13 @@ def _disturbances(facts: Facts) -> Iterator[Finding]:
             turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
             kind = disturbance_kind(facts.text(*path, "kind"), bool(turning))
             if facts.has(*path, "kind") and facts.text(*path, "kind") is None:
-                kind = ""  # what it is cannot be read
+                kind = ""  # unreadable
             yield from _turning(facts, path, kind, turning)
             yield from _disturbing_torque(facts, path, kind)
 
 
 def _turning(facts: Facts, path: KeyPath, kind: str, turning: list[str]) -> Iterator[Finding]:
-    """What is wrong with rate and fixed_in of a disturbance, of which ``turning`` are given."""
+    """Faults of rate and fixed_in of a disturbance, of which ``turning`` are given."""
     if kind in ("constant", "axial"):
         for key in turning:
             yield Finding((*path, key), f"goes with kind rotating, not {kind}; leave one of the two out", True)

@@ -26,7 +26,7 @@ SHORTEST = 12
 
 
 def cone_columns(spacecraft: Spacecraft) -> list[str]:
-    """Headings of the least and the largest angle to the direction of each cone: its name with what they are."""
+    """Headings of the least and the largest angle to the direction of each cone."""
     names = [keep.name.replace(" ", "_") for keep in spacecraft.keep]
     return [f"{name}_{angle}" for name in names for angle in ("least_deg", "largest_deg")]
 
@@ -37,9 +37,9 @@ def column(entry: Input) -> str:
 
 
 class SamplesWriter:
-    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
+    """Writer of one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
 
-    With cones the least and the largest angle from the spin axis to the direction of each one follow.
+    With cones the least and the largest angle from the spin axis to the direction of each cone follow.
     """
 
     def __init__(self, stream: IO[bytes], study: Study) -> None:
@@ -80,7 +80,7 @@ def _texts(values: Array) -> list[str]:
 
 
 def check_room(path: str, study: Study, samples: int) -> None:
-    """Raises CannotWrite at once where a disk cannot hold so many rows, rather than when it is full."""
+    """Raise CannotWrite at once where a disk cannot hold so many rows, rather than when it is full."""
     if path == STDOUT or (Path(path).exists() and not Path(path).is_file()):
         return
     needed = samples * SHORTEST * (len(study.model.inputs.drawn) + len(OUTPUTS) + 2 * len(study.model.spacecraft.keep))

@@ -1,14 +1,11 @@
 """Schedules and command blocks as CSV, written and read.
 
-Schedules from CSV files, as ``plan --csv`` writes them or as people do: three columns are enough, and rule.
+Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. The action of a channel of the
+spacecraft file follows from there; the columns of torque, impulse, propellant and date are only compared with it.
+Pulses of the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the
+schedule.
 
-Those are start_s (or t_s, the centre), on_time_s and channel. What a channel of the spacecraft file does follows from
-there; the columns of torque, impulse, propellant and date are looked at only to say where they contradict. Pulses of
-the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the schedule.
-
-Command blocks as CSV: ``plan --blocks`` writes them, ``simulate --blocks`` fires them, edited or not.
-
-Schedules as CSV, as ``plan`` writes them; `schedules` reads them.
+Command blocks are written by ``plan --blocks``; ``simulate --blocks`` fires them, edited or not.
 """
 
 from __future__ import annotations
@@ -90,7 +87,7 @@ def pulses_array(flown: Flight) -> NDArray[np.void]:
 
 
 def pulses_csv(flown: Flight) -> str:
-    """The rows of `pulses_array` as CSV; what is not known is empty."""
+    """The rows of `pulses_array` as CSV; unknown values are empty."""
     table = pulses_array(flown)
     texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
     return csv_text(table.dtype.names or PULSES_HEADER, texts)
@@ -123,7 +120,7 @@ LATEST = 100_000
 
 
 def blocks_csv(flown: Flight) -> str:
-    """The blocks of a flown schedule, one row each; what is not known is empty."""
+    """The blocks of a flown schedule, one row each; unknown values are empty."""
     body, commands = flown.spacecraft, flown.spacecraft.commands
     _, after = flown.around_pulses()
     pulses, rows = flown.schedule.pulses, []
@@ -216,7 +213,7 @@ TIMES = ("delay", "width")
 
 
 def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
-    """Whether delay or width of the blocks is given by counts alone, of the commands that the spacecraft file has."""
+    """True where delay or width of the blocks is given by counts alone, of the commands in the spacecraft file."""
     alone = f"{name}_s" not in table.header and f"{name}_counts" in table.header
     if alone and spacecraft.commands is None:
         problem = f"the spacecraft file has no commands to count the {name} in; expected the column {name}_s"
@@ -236,7 +233,8 @@ def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Blo
     if width == 0.0:
         column = "width_s" if "width_s" in cells else "width_counts"
         table.fault(line, column, "0 s fires nothing; expected a time above 0")
-    first, count = (_whole(table, line, cells, *one) for one in (("first_sun_pulse", LATEST), ("count", MOST_FIRED)))
+    first = _whole(table, line, cells, "first_sun_pulse", LATEST)
+    count = _whole(table, line, cells, "count", MOST_FIRED)
     every = _whole(table, line, cells, "every", LATEST) if cells.get("every") else 1
     if len(table.faults) > faults or None in (delay, width, first, count, every):
         return None
@@ -282,7 +280,7 @@ def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int
 
 
 def _against_commands(table: Table, line: int, cells: Cells, block: Block, spacecraft: Spacecraft) -> None:
-    """Warn of what cannot be commanded: it is flown as given."""
+    """Warn of pulses that cannot be commanded: they are flown as given."""
     commands = spacecraft.commands
     if commands is None:
         return
@@ -312,13 +310,13 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
 
 
 AGREES = 1e-6
-"""Relative difference up to which columns of a schedule say the same."""
+"""Relative difference up to which columns of a schedule agree."""
 
 STARTS = ("start_s", "t_s")
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
-    """A schedule from a CSV file, and warnings: what columns contradict and so are ignored, channels not in the file.
+    """A schedule from a CSV file, and warnings of contradicting columns, which are ignored, and of unknown channels.
 
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
@@ -334,8 +332,8 @@ def read_plan(
     ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
     """
     pulses, warnings = read_pulses(path, spacecraft)
-    made = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
-    return made, (*warnings, *broken_limits(spacecraft, pulses))
+    plan = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
+    return plan, (*warnings, *broken_limits(spacecraft, pulses))
 
 
 class _ScheduleReader:
@@ -360,9 +358,9 @@ class _ScheduleReader:
         return Schedule(tuple(self._supplied(pulses))), self.table.warned
 
     def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
-        """The pulses as strong as they are one after the other, compared with what their rows say."""
+        """The pulses at the strength of their place in the sequence, compared with their rows."""
         supply = Supply(self.spacecraft)
-        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda one: one[1].loaded[0]):
+        for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda row: row[1].loaded[0]):
             fired = supply.fire(pulse, self.channels.get(pulse.channel))
             if line in self.commanded:
                 self._expect(line, self.commanded[line], fired)
@@ -372,8 +370,8 @@ class _ScheduleReader:
 
     def _instead(self, name: str) -> str:
         """The channel that is meant by a name not in the file, or all there are."""
-        found = nearest(name, list(self.channels))
-        return f"it has {', '.join(map(shown, self.channels))}" if found is None else f"did you mean {shown(found)}?"
+        close = nearest(name, list(self.channels))
+        return f"it has {', '.join(map(shown, self.channels))}" if close is None else f"did you mean {shown(close)}?"
 
     def _on_times(self, cells: Cells) -> str:
         """The on-times that the channel of a row can have, in words."""
@@ -452,7 +450,7 @@ class _ScheduleReader:
         return thrust.centroid
 
     def _expect(self, line: int, cells: Cells, pulse: Pulse) -> None:
-        """Warn where the row of a pulse says something else than the spacecraft file, which says what it does."""
+        """Warn where the row of a pulse contradicts the spacecraft file, which rules."""
         if pulse.torque is None:
             return
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
@@ -488,7 +486,7 @@ class _ScheduleReader:
         return pulse
 
     def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
-        """What a row lacks whose torque or impulse does not follow from the spacecraft file."""
+        """Columns missing in a row whose torque or impulse does not follow from the spacecraft file."""
         impulse, torque = (f"{columns[0]} to {columns[-1]}" for columns in (IMPULSE, TORQUE))
         columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
         if channel is not None:
@@ -500,7 +498,7 @@ class _ScheduleReader:
     def _propellant(
         self, line: int, name: str, channel: Channel | None, impulse: Vector, torque: Vector | None
     ) -> float | None:
-        """Propellant of a pulse that flies as the schedule has it, kg; warns of what is not as in the file."""
+        """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
         if channel is not None:
             ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
             self.table.warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
@@ -517,8 +515,6 @@ class _ScheduleReader:
             self.table.warn(line, "steerable torque", text)
         rate = torquer.propellant_per_impulse
         return None if rate is None else rate * float(np.linalg.norm(impulse))
-
-    # --- cells -------------------------------------------------------------------------------------------------------
 
     def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
         """Three numbers; None where none is given, or one is a fault."""
@@ -538,7 +534,7 @@ class _ScheduleReader:
         meant: str,
         scale: float | None = None,
     ) -> None:
-        """Warn where ``columns`` are given and say something else than what counts."""
+        """Warn where ``columns`` are given and contradict the values in use."""
         texts = [cells.get(column, "") for column in columns]
         if not any(texts):
             return

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.equipment import Steerable, Thruster
 
 READING = "reading"
-"""The kind of what a sensor shows: an angular rate of a gyro, an acceleration of an accelerometer."""
+"""The kind of the signal of a sensor: an angular rate of a gyro, an acceleration of an accelerometer."""
 
 RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
@@ -43,9 +43,9 @@ ALL = ""
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
-    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and whether it is a fraction.
+    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and True for a fraction.
 
-    Raises ValueError, which says what would be right.
+    Raises ValueError with the sizes allowed.
     """
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
@@ -68,7 +68,7 @@ def unit_kinds(kind: str) -> list[str]:
 
 
 def by_name(value: Mapping[str, object]) -> bool:
-    """Whether a mapping holds tolerances by thruster, and is not itself one."""
+    """True where a mapping holds tolerances by thruster, and is not itself one."""
     return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
 
 
@@ -114,7 +114,7 @@ class _Tolerance(Rule):
 
 def _json_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of a tolerance of ``kind``."""
-    texts = [{"type": "string", "pattern": pattern(one)} for one in unit_kinds(kind)]
+    texts = [{"type": "string", "pattern": pattern(unit)} for unit in unit_kinds(kind)]
     spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
     return {
         "type": "object",
@@ -239,21 +239,21 @@ def dispersions(
             return tolerance
         return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
 
-    found: dict[str, Any] = {}
-    for key in (one.name for one in fields(Dispersions)):
+    entries: dict[str, Any] = {}
+    for key in (field.name for field in fields(Dispersions)):
         entry = getattr(section, key)
         if key == "correlation":
-            found[key] = tuple((one, other, size) for one, other, size in entry)
+            entries[key] = tuple((first, second, size) for first, second, size in entry)
         elif isinstance(entry, ToleranceSection):
-            found[key] = entry.tolerance(key)
+            entries[key] = entry.tolerance(key)
         elif isinstance(entry, list | tuple):  # by axis
-            found[key] = tuple(None if one is None else one.tolerance(key) for one in entry)
+            entries[key] = tuple(None if part is None else part.tolerance(key) for part in entry)
         elif entry is not None:  # by thruster
-            named = {name: one.tolerance(key) for name, one in entry.items()}
-            found[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
-    if "thrust" in found:
-        found["thrust"] = {name: fraction(name, tolerance) for name, tolerance in found["thrust"].items()}
-    return Dispersions(**found)
+            named = {name: part.tolerance(key) for name, part in entry.items()}
+            entries[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
+    if "thrust" in entries:
+        entries["thrust"] = {name: fraction(name, tolerance) for name, tolerance in entries["thrust"].items()}
+    return Dispersions(**entries)
 
 
 def thrust_behind(torque: float | None, lever_arm: float | None) -> float | None:
@@ -268,7 +268,7 @@ class Reading(Quantity):
         super().__init__("rate", **bounds)
 
     def check(self, value: object) -> float:
-        """SI value; raises ValueError, which says what would be right."""
+        """SI value; raises ValueError with the values allowed."""
         try:
             result = parse(value, "acceleration")
         except ValueError:

@@ -1,10 +1,7 @@
-"""Atomic writing, CSV reading, tracks.
+"""Whole files written or none, tables in CSV files read, and the track of a flight as a table.
 
-Writing: whole files or none, and numbers that read back as they were.
-
-Tables in CSV files that people write: rows by the names of columns, all faults at once, warnings once each.
-
-The track of a flight as a table: an array with named columns, and CSV.
+Numbers are written so that they read back as they were. Rows are read by the names of columns, with all faults at once
+and each warning once.
 """
 
 from __future__ import annotations
@@ -39,17 +36,17 @@ STDOUT = "-"
 """File name that means standard output."""
 
 PREFIX, SUFFIX = ".nutdamp-", ".part"
-"""How the names of temporary files begin and end."""
+"""Begin and end of the names of temporary files."""
 
 ATTEMPTS = 10
 """Temporary files that are made before giving up, where others remove them."""
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
-    """Write ``content`` to ``path``, or leave what was there; ``-`` is standard output. Raises CannotWrite.
+    """Write ``content`` to ``path``, or leave it as it was; ``-`` is standard output. Raises CannotWrite.
 
-    What is long writes itself: it is called with the stream. Text becomes UTF-8; what has no place there, such as a
-    byte of a file name that is not UTF-8, becomes \\udcff.
+    Long content is a function that writes to the stream. Text becomes UTF-8; a character without a place there, such as
+    a byte of a file name that is not UTF-8, becomes \\udcff.
     """
     with whole_file(path) as stream:
         if callable(content):
@@ -85,7 +82,7 @@ def whole_file(path: str) -> Iterator[IO[bytes]]:
 
 
 def check_place(path: str) -> Path:
-    """Where a file is to stand, behind links; seen before long work to be a place that can be written to.
+    """Place of a file, behind links; checked before long work to be one that can be written to.
 
     Raises CannotWrite where it cannot: also where links go round in a circle, or the name cannot be one.
     """
@@ -102,12 +99,12 @@ def check_place(path: str) -> Path:
         if not os.access(target if target.exists() else target.parent, os.W_OK):
             raise CannotWrite(path, "permission denied")
     except (OSError, RuntimeError, ValueError) as reason:  # RuntimeError: links in a circle; ValueError: a zero byte
-        raise CannotWrite(path, _said(reason)) from reason
+        raise CannotWrite(path, _reason(reason)) from reason
     return target
 
 
-def _said(reason: Exception) -> str:
-    """What the system says, without the path."""
+def _reason(reason: Exception) -> str:
+    """The reason given by the system, without the path."""
     return getattr(reason, "strerror", None) or str(reason).partition(" from ")[0]
 
 
@@ -118,7 +115,7 @@ def make_folder(path: str) -> None:
     except FileExistsError as reason:
         raise CannotWrite(path, "it is there, and no directory") from reason
     except (OSError, ValueError) as reason:
-        raise CannotWrite(path, _said(reason)) from reason
+        raise CannotWrite(path, _reason(reason)) from reason
 
 
 @contextmanager
@@ -199,7 +196,7 @@ def json_text(data: dict[str, Any]) -> str:
     """JSON with numbers that are not finite as null, characters that control a terminal escaped, newline at the end."""
     text = json.dumps(finite(data), indent=2, ensure_ascii=False, allow_nan=False)
     # Those below a blank are escaped already.
-    return re.sub("[\x7f-\x9f\u2028\u2029]", lambda found: f"\\u{ord(found[0]):04x}", text) + "\n"
+    return re.sub("[\x7f-\x9f\u2028\u2029]", lambda match: f"\\u{ord(match[0]):04x}", text) + "\n"
 
 
 HEADER = (
@@ -259,7 +256,7 @@ LARGEST = 1e15
 """Larger magnitudes are nothing of a spacecraft, and would overflow later."""
 
 MOST_BYTES = 32 << 20
-"""Of a file: many times more than its most rows take."""
+"""Size of a file, many times more than its most rows take."""
 
 MOST_ROWS = 100_000
 """Rows of a file."""
@@ -274,11 +271,11 @@ class Table:
     """The rows of one file, below its first line, which names the columns.
 
     ``header`` (the names) and ``rows``, each the number of its line and its cells. Raises CannotRead, and FaultyFile
-    for what is no table.
+    for a file that is no table.
     """
 
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
-        """``columns`` that are known; ``what`` a row is, for messages."""
+        """Table with ``columns`` that are known; ``what`` is the word for a row, for messages."""
         self.name, self.known = str(path), columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
@@ -313,7 +310,7 @@ class Table:
                 self.warn(1, column, f"the column {shown(column)} is not known: ignored")
 
     def check(self) -> None:
-        """Raises FaultyFile with the faults so far, if there are any; of many in one column with the first."""
+        """Raise FaultyFile with the faults so far, if there are any; of many in one column with the first."""
         if self.faults:
             raise FaultyFile(self._first())
 
@@ -329,8 +326,8 @@ class Table:
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""
-        found = nearest(column, [entry for entry in self.header if entry not in self.known])
-        return "" if found is None else f"; rename {shown(found)} if that is meant"
+        close = nearest(column, [entry for entry in self.header if entry not in self.known])
+        return "" if close is None else f"; rename {shown(close)} if that is meant"
 
     def cells(self, line: int, row: list[str]) -> Cells | None:
         """The cells of a row by the names of the columns; None for a fault."""
@@ -363,10 +360,10 @@ class Table:
     @property
     def warned(self) -> list[str]:
         """The warnings in words, with file and line."""
-        return [self._worded(found) for found in self.warnings.values()]
+        return [self._worded(warnings) for warnings in self.warnings.values()]
 
-    def _worded(self, found: list[tuple[int, str]]) -> str:
-        line, text = found[0]
-        others = len(found) - 1
+    def _worded(self, warnings: list[tuple[int, str]]) -> str:
+        line, text = warnings[0]
+        others = len(warnings) - 1
         more = f" (and so in {others} more row{'s' if others > 1 else ''})" if others else ""
         return f"{self.name}:{line}: {text}{more}"

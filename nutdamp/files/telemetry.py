@@ -1,4 +1,4 @@
-"""Telemetry from CSV files: times, and whatever of the motion was measured; an empty cell is a sample that is missing.
+"""Telemetry from CSV files: times, and measurements of the motion; an empty cell is a missing sample.
 
 Columns: t_s (from t = 0 of the spacecraft file) or utc; omega_1_rad_s to omega_3_rad_s (or _deg_s); axis_ra_deg and
 axis_dec_deg, or axis_x, axis_y, axis_z; acceleration_m_s2; sun_pulse, 1 from the sample on that has seen one. A track
@@ -33,7 +33,7 @@ MEASURED = (*RATES, *ANGLES, *AXIS, ACCELERATIONS, SUN_PULSE)
 """Columns of samples."""
 
 UNIT = 0.01
-"""By how much the length of a measured axis may differ from one."""
+"""Deviation from length one that a measured axis may have."""
 
 
 SAME = 0.03
@@ -103,7 +103,7 @@ def _expect_columns(table: Table) -> None:
     for group in (ANGLES, AXIS):
         missing = [name for name in group if name not in header]
         if 0 < len(missing) < len(group):
-            table.fault(1, missing[0], f"the column is missing beside {next(one for one in group if one in header)}")
+            table.fault(1, missing[0], f"the column is missing beside {next(name for name in group if name in header)}")
     if set(ANGLES) & set(header) and set(AXIS) & set(header):
         table.fault(1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them")
     table.expect()
@@ -172,7 +172,7 @@ def _column(table: Table, rows: list[tuple[int, Cells]], name: str) -> Vector:
 
 
 def _signals(table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector]) -> dict[str, Vector]:
-    """What there is of body rates, axis and acceleration, in SI."""
+    """Measured body rates, axis and acceleration, in SI."""
     signals = {RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES}
     if ACCELERATIONS in columns:
         signals[ACCELERATION] = columns[ACCELERATIONS]
@@ -200,7 +200,7 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     name = GYROS[2]
     if name not in signals:
         return
-    column = next(one for one in table.header if RATES.get(one, ("",))[0] == name)
+    column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
     turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
     of_values = (

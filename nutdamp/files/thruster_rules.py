@@ -31,7 +31,7 @@ _MOUNTING = ("position", "direction", "force")
 
 
 def thrusters(facts: Facts) -> Iterator[Finding]:
-    """What is wrong with each of the ``thrusters``."""
+    """Faults of each of the ``thrusters``."""
     for index, node in facts.children("thrusters"):
         if isinstance(node.value, dict):
             yield from _thruster_keys(facts, ("thrusters", index))
@@ -84,7 +84,7 @@ def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
 
 
 def _is_none(torque: tuple[Vector, float] | None) -> bool:
-    """Whether a torque is zero but for rounding; False where it is not known."""
+    """True where a torque is zero but for rounding; False where it is not known."""
     return torque is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1])
 
 
@@ -96,7 +96,7 @@ def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
 
 
 def channels(facts: Facts) -> Iterator[Finding]:
-    """What is wrong with the ``channels``: thrusters that fire together."""
+    """Faults of the ``channels``: thrusters that fire together."""
     indices = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
     names = [name for name in indices if name is not None]
     for channel, node in facts.children("channels"):
@@ -144,7 +144,7 @@ def moments_of(facts: Facts) -> tuple[float, float, float] | None:
 
 def thrusts(facts: Facts) -> dict[str, float | None]:
     """The thrust in N of each thruster of the file and its torquer; None where it is not known."""
-    found: dict[str, float | None] = {}
+    forces: dict[str, float | None] = {}
     for index, _ in facts.children("thrusters"):
         path: KeyPath = ("thrusters", index)
         name = facts.text(*path, "name")
@@ -152,19 +152,19 @@ def thrusts(facts: Facts) -> dict[str, float | None]:
             torque = facts.vector("torque", 3, *path, "torque")
             size = None if torque is None else float(np.linalg.norm(torque))
             lever = facts.number("length", *path, "lever_arm")
-            found[name] = facts.number("force", *path, "force") or thrust_behind(size, lever or None)
+            forces[name] = facts.number("force", *path, "force") or thrust_behind(size, lever or None)
     if facts.has("steerable") or not facts.children("thrusters"):
         torque_, lever = facts.number("torque", "steerable", "torque"), facts.number("length", "steerable", "lever_arm")
-        found[STEERABLE] = thrust_behind(torque_, lever or None)
-    return found
+        forces[STEERABLE] = thrust_behind(torque_, lever or None)
+    return forces
 
 
 THRUST_KEYS = ("valve", "cold", "tank")
-"""At the root of the file."""
+"""Keys at the root of the file."""
 
 
 def thrust_findings(root: Node) -> Iterator[Finding]:
-    """Everything wrong with thrusters, channels, ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
+    """All faults of thrusters, channels, ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
     facts = Facts(root)
     yield from thrusters(facts)
     yield from channels(facts)
@@ -172,17 +172,17 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
     for key in THRUST_KEYS:
         if facts.has(key) and not indices:
             yield Finding((key,), "applies to thrusters, and the file has none; leave it out", True)
-    named, said = thrusts(facts), set[KeyPath]()
+    named, reported = thrusts(facts), set[KeyPath]()
     for index in indices:
         path: KeyPath = ("thrusters", index)
         if facts.has(*path, "valve") and facts.has(*path, "impulse_bit"):
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
         if valve is not None:
-            for found in _opens(facts, path, valve):
-                if found.path not in said:
-                    yield found
-                said.add(found.path)
+            for finding in _opens(facts, path, valve):
+                if finding.path not in reported:
+                    yield finding
+                reported.add(finding.path)
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
     yield from _alike(facts, named)
@@ -191,7 +191,7 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
 
 
 def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
-    """Where the valve of a thruster is: its own, or that of all."""
+    """Path of the valve of a thruster: its own, or that of all."""
     if facts.has(*path, "valve"):
         return (*path, "valve")
     return ("valve",) if facts.has("valve") and not facts.has(*path, "impulse_bit") else None
@@ -211,7 +211,7 @@ def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
 
 
 def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Finding]:
-    """What is wrong with an impulse_bit; ``thrust`` N, None where it is not known."""
+    """Faults of an impulse_bit; ``thrust`` N, None where it is not known."""
     table: KeyPath = (*path, "impulse_bit")
     rows = [
         [facts.number(kind, *table, row, column) for column, kind in enumerate(("time", "impulse", "time"))]
@@ -229,7 +229,7 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
             yield Finding((*table, number, 2), problem)
     if thrust is None:
         if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
-            return  # what cannot be read is said already
+            return  # what cannot be read is reported already
         yield Finding(table, "needs the thrust; give lever_arm", True)
         return
     for number, (on_time, impulse, centroid) in enumerate(rows):
@@ -264,7 +264,7 @@ def _alike(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
 
 
 def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
-    """What is wrong with the tank; ``named`` are the thrusts of the thrusters, N."""
+    """Faults of the tank; ``named`` are the thrusts of the thrusters, N."""
     full, empty = (facts.number("pressure", "tank", key) for key in ("pressure", "final_pressure"))
     if full is not None and empty is not None and empty > full > 0.0:
         problem = f"{bar(empty)} exceeds pressure: it falls as propellant is used; expected at most {bar(full)}"
@@ -301,7 +301,7 @@ def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
     if rows is None and transverse is not None and axial is not None:
         rows = np.array([transverse, transverse, axial])
     if moments is None or rows is None or rows.min() < 0.0:
-        return  # what cannot be read, or is out of range, is said already
+        return  # what cannot be read, or is out of range, is reported already
     empty = np.asarray(moments) - propellant * rows
     values = ", ".join(f"{moment:.4g}" for moment in empty)
     least, middle, largest = np.sort(empty).tolist()
@@ -318,7 +318,7 @@ def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
 
 
 def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:
-    """What a thruster of ``thrust`` N makes of a command, to be compared."""
+    """Effect of a command on a thruster of ``thrust`` N, to be compared."""
     path: KeyPath = ("thrusters", index)
     valve = _valve_path(facts, path)
     if valve is not None:

@@ -1,11 +1,7 @@
-"""YAML with positions; bounded.
-
-YAML text -> plain values that remember where they are, by the core schema of YAML 1.2.
+"""YAML text -> plain values with their positions, by the core schema of YAML 1.2.
 
 Built on the events of PyYAML, so that no tag can build an object, nothing recurses deeply and a bomb of aliases
-is refused before it unfolds. JSON is read by the same path. Whatever is wrong becomes `FaultyFile` with its place.
-
-Reading texts that people or other tools wrote.
+is refused before it unfolds. JSON is read by the same path. Every problem becomes `FaultyFile` with its place.
 """
 
 from __future__ import annotations
@@ -33,7 +29,7 @@ STDIN = "-"
 
 
 def read_bytes(path: str, most: int = -1) -> bytes:
-    """What is in a file, at most ``most`` bytes of it; ``-`` is standard input. Raises CannotRead."""
+    """Contents of a file, at most ``most`` bytes of it; ``-`` is standard input. Raises CannotRead."""
     try:
         if path == STDIN:
             if sys.stdin is None:
@@ -49,7 +45,7 @@ def read_bytes(path: str, most: int = -1) -> bytes:
 
 
 def _is_device(path: Path) -> bool:
-    """Whether reading may go on for ever, or do something: a device that is no terminal, or a socket."""
+    """True where reading may never end, or have effects: a device that is no terminal, or a socket."""
     mode = path.stat().st_mode
     if stat.S_ISCHR(mode):
         with path.open("rb") as stream:
@@ -58,7 +54,7 @@ def _is_device(path: Path) -> bool:
 
 
 def read_limited(path: str, most: int) -> bytes:
-    """What is in a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is larger."""
+    """Contents of a file of at most ``most`` bytes; raises CannotRead, or FaultyFile where it is larger."""
     data = read_bytes(path, most + 1)
     if len(data) > most:
         raise FaultyFile([Fault(path, 1, 1, "", f"larger than {most >> 20} MiB")])
@@ -87,7 +83,7 @@ MAX_DEPTH = 32
 class Place(NamedTuple):
     """Line and column of a value, both from 1; 0 where there are none.
 
-    What does not come from the file but is set beside it says so in ``setting``, as messages name it.
+    A value set beside the file has its name in messages in ``setting``.
     """
 
     line: int = 0
@@ -126,7 +122,7 @@ class Node:
         return node
 
     def children(self) -> Iterator[tuple[str | int, Node]]:
-        """Keys or positions, and what is there; nothing for a scalar."""
+        """Keys or positions, and their nodes; nothing for a scalar."""
         if isinstance(self.value, dict):
             yield from self.value.items()
         elif isinstance(self.value, list):
@@ -141,7 +137,7 @@ class Node:
         return self.value
 
     def place_of(self, path: KeyPath) -> Place:
-        """Where the value at ``path`` is, or the innermost of its parents that exists."""
+        """Place of the value at ``path``, or of the innermost of its parents that exists."""
         for length in range(len(path), 0, -1):
             node = self.get(*path[:length])
             if node is not None:
@@ -149,7 +145,7 @@ class Node:
         return self.place
 
     def key_place_of(self, path: KeyPath) -> Place:
-        """Where the key of ``path`` is; of a list entry or the root, the value."""
+        """Place of the key of ``path``; of a list entry or the root, that of the value."""
         parent = self.get(*path[:-1]) if path else None
         if parent is not None and isinstance(path[-1], str) and path[-1] in parent.keys:
             return parent.keys[path[-1]]
@@ -263,7 +259,7 @@ class _Builder:
         return event
 
     def document(self, needed: str, single: str) -> Node:
-        """The only document of the stream; ``needed`` and ``single`` say what to do about none and about several."""
+        """The only document of the stream; ``needed`` and ``single`` are the cures for none and for several."""
         self.next()
         event = self.next()
         if isinstance(event, yaml.StreamEndEvent):
@@ -357,7 +353,7 @@ class _Builder:
         return float(value) if event.tag == f"{_CORE}float" and isinstance(value, int) else value
 
     def check_tag(self, tag: str | None, allowed: tuple[str, ...], place: Place, path: KeyPath) -> None:
-        """Raises `FaultyFile` for a tag that does not fit the value, above all one that needs an object."""
+        """Check a tag; raises `FaultyFile` where it does not fit the value, above all where it needs an object."""
         if tag not in (None, "!", *(f"{_CORE}{name}" for name in allowed)):
             name = str(tag).replace(_CORE, "!!")
             raise self.fatal(place, f"the tag {shown(name)} does not fit here; leave it out", path)
@@ -395,7 +391,7 @@ _BASES = {"dec": 10, "oct": 8, "hex": 16}
 
 
 def resolve(text: str) -> Scalar:
-    """Value of a plain scalar by the core schema of YAML 1.2 (10.3.2); what is nothing else is text."""
+    """Value of a plain scalar by the core schema of YAML 1.2 (10.3.2); any other scalar is text."""
     if text in _WORDS:
         return _WORDS[text]
     match = _NUMBER.fullmatch(text)
@@ -408,7 +404,7 @@ def resolve(text: str) -> Scalar:
     return int(match[kind], _BASES[kind]) if len(text) <= 300 else math.inf
 
 
-# What PyYAML's scanner and parser say, and what a person can do about it; True where the slip lies where the
+# Messages of PyYAML's scanner and parser, and their cures for a person; True where the slip lies where the
 # construct began and not where reading it failed.
 _SYNTAX = (
     (r"'\\t' that cannot start", "a tab indents here; use spaces", False),

@@ -1,4 +1,4 @@
-"""The contents of the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, how to repeat it."""
+"""The contents of the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, repetition."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ if TYPE_CHECKING:
 
 
 class Repeat(NamedTuple):
-    """What it takes to make the page again: the command, and the input file by name and text.
+    """Data to make the page again: the command, and the input file by name and text.
 
-    ``settings``: keys that the command sets in place of what the file says, and their values.
+    ``settings``: keys that the command sets in place of those in the file, and their values.
     """
 
     command: str
@@ -108,7 +108,7 @@ def report_page(
 
 
 def _title(body: Spacecraft) -> str:
-    """What is to be done."""
+    """Title of the page: the task."""
     turn = "" if body.goal.axis is None else f" and turning the spin axis by {degrees(body.to_turn)}"
     return f"{body.name}: damping {degrees(body.tilt)} of nutation{turn}"
 
@@ -119,15 +119,15 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     recommended = f"Recommended: {decided.plan.scheme} – {reason}."
     schedule = f"Schedule of the file {decided.plan.scheme}, as it is."
-    said = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
+    recommendation = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
     others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
-    fired = [verdicts.hint(compared, one) for one in dict.fromkeys(others) if one is not None]
+    fired = [verdicts.hint(compared, entry) for entry in dict.fromkeys(others) if entry is not None]
     notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
     notes += map(sentence, _broken(decided.plan))
     notes += filter(None, [outdone(traded, decided.plan)])
-    return " ".join((said, *notes, *verdicts.warnings(compared, beside_verdict=True)))
+    return " ".join((recommendation, *notes, *verdicts.warnings(compared, beside_verdict=True)))
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
@@ -142,7 +142,7 @@ def _decision(decided: Decision) -> Iterator[Block]:
 
 
 def _figures(decided: Decision) -> Iterator[Figure]:
-    """The numbers to read first: the verdict, where it points at the end, what it costs; all but the first nominal."""
+    """The numbers to read first: the verdict, the final pointing, the cost; all but the first nominal."""
     body, final = decided.plan.spacecraft, decided.final
     yield Figure("requirement", decisions.verdict(decided))
     nominal = "" if decided.cases is None else ", nominal"
@@ -150,20 +150,21 @@ def _figures(decided: Decision) -> Iterator[Figure]:
         yield Figure(f"{name}{nominal}", direction_text(body, end), target_text(body, end))
     goal = "" if body.goal.spin is None else f"target: {spin_text(body.goal.spin)}"
     yield Figure(f"final spin{nominal}", spin_text(final.spin), goal)
-    for one in decided.aspects:
-        yield Figure(f"axis from {one.keep.name}", f"{degrees(one.least)} to {degrees(one.largest)}", _keeping(one))
+    for aspect in decided.aspects:
+        angles = f"{degrees(aspect.least)} to {degrees(aspect.largest)}"
+        yield Figure(f"axis from {aspect.keep.name}", angles, _keeping(aspect))
     for name, value in decisions.cost(decided):
         yield Figure(name, value)
 
 
-def _keeping(one: Aspect) -> str:
-    """What the spin axis has to keep to a direction, and whether it does; empty where it is only watched."""
-    bounds = bounds_text(one.keep)
-    return f"{bounds}: {decisions.KEPT[one.kept]}" if bounds else ""
+def _keeping(aspect: Aspect) -> str:
+    """Limits of the spin axis to a direction, and the verdict on them; empty where it is only watched."""
+    bounds = bounds_text(aspect.keep)
+    return f"{bounds}: {decisions.KEPT[aspect.kept]}" if bounds else ""
 
 
 def _unplanned(body: Spacecraft) -> Iterator[Figure]:
-    """The numbers to read first where there is no plan: what was required."""
+    """The numbers to read first where there is no plan: the requirement."""
     yield Figure("requirement", "NOT met: no scheme is feasible", verdicts.required(body))
     if body.goal.axis is not None:
         way = f"{degrees(body.to_turn)} from H at t = 0"
@@ -172,7 +173,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 
 
 def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
-    """The comparison, why a scheme is infeasible, and the remarks of the others."""
+    """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*said(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
     blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
@@ -184,12 +185,12 @@ def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
 
 
 def _broken(plan: Plan) -> list[str]:
-    """The limits that the schedule of a file breaks; schemes keep them."""
+    """The limits that the schedule of a file breaks; schemes never do."""
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
 def _reading(compared: Comparison) -> Iterator[str]:
-    """What names and numbers of the comparison do not say by themselves."""
+    """Notes on names and numbers of the comparison."""
     feasible = [plan for plan in compared.plans if plan.feasible]
     if any(COUNTS.get(plan.scheme, len(plan.pulses)) != len(plan.pulses) for plan in feasible):
         yield (
@@ -209,11 +210,11 @@ COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
 
 
 def _trade(compared: Comparison, traded: Sequence[Front]) -> PageSection:
-    """What an earlier end costs, as ``trade`` has it."""
+    """The cost of an earlier end, as ``trade`` has it."""
     tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
     chosen = compared.recommended
-    notes = [] if chosen is None else [said for say in (beats, apart) if (said := say(traded, chosen))]
-    tables += [Remarks((("Note", said),)) for said in notes]
+    notes = [] if chosen is None else [note for say in (beats, apart) if (note := say(traded, chosen))]
+    tables += [Remarks((("Note", note),)) for note in notes]
     drawn = any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
     pictures = (trade_picture_of(compared, traded),) if drawn else ()
     return PageSection("trade", "Time against cost", (*tables, *pictures))
@@ -277,7 +278,7 @@ def _repeat(repeat: Repeat, dispersed: Results | None) -> PageSection:
 
 
 def _versions() -> Iterator[tuple[str, str]]:
-    """What the numbers and pictures depend on."""
+    """Versions of the packages that numbers and pictures depend on."""
     yield "nutdamp", __version__
     yield "Python", platform.python_version()
     packages = {"numpy": "numpy", "scipy": "scipy", "highspy": "highspy", "matplotlib": "matplotlib", "bsk": "Basilisk"}

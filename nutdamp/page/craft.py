@@ -1,4 +1,4 @@
-"""The spacecraft on the page: what it weighs, what it can fire, when and where it starts, where it ends."""
+"""The spacecraft on the page: mass properties, actuators, initial motion, directions before and after a plan."""
 
 from __future__ import annotations
 
@@ -91,30 +91,31 @@ def _limits(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def thruster_sheet(body: Spacecraft) -> Sheet:
-    """One row a thruster that can fire: where it sits, its force, torque, specific impulse and on-times."""
-    thrusters = {one.name: one for channel in body.channels for one in channel.thrusters}
+    """One row a thruster that can fire: its place, force, torque, specific impulse and on-times."""
+    thrusters = {thruster.name: thruster for channel in body.channels for thruster in channel.thrusters}
     names = ("position", "m"), ("force", "N"), ("torque", "N m")
     columns = [Column("thruster", number=False), *(Column(name, unit, number=False) for name, unit in names)]
     columns += [Column("isp", "s"), Column("on-time", number=False), Column("channels", number=False)]
-    rows = tuple((*_thruster(one, body), _channels(one, body)) for one in thrusters.values())
+    rows = tuple((*_thruster(thruster, body), _channels(thruster, body)) for thruster in thrusters.values())
     return Sheet("Thrusters of the channels, in the axes of the file", tuple(columns), rows)
 
 
-def _thruster(one: Thruster, body: Spacecraft) -> tuple[str, ...]:
-    at, force, torque = (_vector(part, body) for part in (one.position, one.force, one.torque))
-    if one.force is None and one.thrust is not None:
-        force = f"{one.thrust:.4g}"
-    isp = MISSING if one.isp is None else f"{one.isp:.4g}"
-    longest = "any" if math.isinf(one.max_on_time) else duration(one.max_on_time)
-    return (one.name, at, force, torque, isp, f"{duration(one.min_on_time)} to {longest}")
+def _thruster(thruster: Thruster, body: Spacecraft) -> tuple[str, ...]:
+    at, force, torque = (_vector(part, body) for part in (thruster.position, thruster.force, thruster.torque))
+    if thruster.force is None and thruster.thrust is not None:
+        force = f"{thruster.thrust:.4g}"
+    isp = MISSING if thruster.isp is None else f"{thruster.isp:.4g}"
+    longest = "any" if math.isinf(thruster.max_on_time) else duration(thruster.max_on_time)
+    return (thruster.name, at, force, torque, isp, f"{duration(thruster.min_on_time)} to {longest}")
 
 
 def _vector(principal: Vector | None, body: Spacecraft) -> str:
     return MISSING if principal is None else vector(body.inertia.in_file(principal))
 
 
-def _channels(one: Thruster, body: Spacecraft) -> str:
-    return ", ".join(channel.name for channel in body.channels if one.name in {each.name for each in channel.thrusters})
+def _channels(thruster: Thruster, body: Spacecraft) -> str:
+    fired = {channel.name: {member.name for member in channel.thrusters} for channel in body.channels}
+    return ", ".join(name for name, members in fired.items() if thruster.name in members)
 
 
 def ends_sheet(flown: Flight) -> Sheet:
@@ -128,7 +129,8 @@ def ends_sheet(flown: Flight) -> Sheet:
     rows: list[tuple[str, ...]] = []
     for what, before, after in directions:
         for which, name in enumerate(angle_names(body)):
-            cells = (MISSING if one is None else angle_texts(body, one)[which] for one in (before, after, target))
+            ways = (before, after, target)
+            cells = (MISSING if way is None else angle_texts(body, way)[which] for way in ways)
             rows.append((f"{what}: {name}", *cells))
     sizes = (f"{digits(value, 4)} N m s" for value in (size, float(np.linalg.norm(end))))
     rows.append(("|H|", *sizes, MISSING))
@@ -150,7 +152,7 @@ def ends_sheet(flown: Flight) -> Sheet:
 
 
 def ends_note(flown: Flight) -> Prose:
-    """What the directions refer to."""
+    """Note on the frame of the directions."""
     given = flown.spacecraft.attitude
     if given is None:
         return Prose(f"Directions: {FRAME_N}.")

@@ -1,4 +1,4 @@
-"""What a report says, apart from how it looks: a page of sections, made of a few kinds of blocks."""
+"""Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True)
 class FactList:
-    """Names and what they are."""
+    """Names and their values."""
 
     title: str
     rows: tuple[tuple[str, str], ...]
@@ -56,7 +56,7 @@ class Prose:
 
 @dataclass(frozen=True, slots=True)
 class Remarks:
-    """Remarks, each with the name of what it is about."""
+    """Remarks, each with the name of its subject."""
 
     rows: tuple[tuple[str, str], ...]
 
@@ -74,7 +74,7 @@ LONG = 550.0
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An ``<svg>`` element, its title, a caption, and what it shows in words for those who do not see it.
+    """An ``<svg>`` element, its title, a caption, and a description for those who do not see it.
 
     For narrow screens there is another drawing, ``narrow``, or ``views``: panels and entries of the legend as view
     boxes on the group called ``name`` in it, which are shown as wide as they are at most, in px.
@@ -90,7 +90,7 @@ class Picture:
 
     @property
     def long(self) -> bool:
-        """Whether its text is too small to read where the page is little wider than a narrow screen."""
+        """True where its text is too small to read where the page is little wider than a narrow screen."""
         return float(self.svg.split('viewBox="', 1)[1].split()[2]) > LONG
 
 
@@ -125,10 +125,10 @@ class NamedDirection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """What does not move in the view, and what moves as the JSON ``data``.
+    """Fixed parts of the moving view, and its moving parts as the JSON ``data``.
 
-    ``longitude``: what the numbers of the globe are; ``how``: the model that is flown; ``command``: what writes the
-    same rows.
+    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``command``: that which writes
+    the same rows.
     """
 
     panels: tuple[Panel, ...]
@@ -149,7 +149,7 @@ Block = Sheet | FactList | Prose | Remarks | Points | Picture | Moving | Listing
 
 
 class PageSection(NamedTuple):
-    """A heading with what comes under it; ``name`` is where links lead to."""
+    """A heading with its blocks; ``name`` is the target of links."""
 
     name: str
     title: str
@@ -157,7 +157,7 @@ class PageSection(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """One of the few numbers to read first; ``note``: what to compare it with."""
+    """One of the few numbers to read first; ``note``: the number to compare it with."""
 
     name: str
     value: str
@@ -165,7 +165,7 @@ class Figure(NamedTuple):
 
 
 class Control(NamedTuple):
-    """What configuration control writes on a document; empty where nothing was given."""
+    """Entries of configuration control on a document; empty where none is given."""
 
     title: str = ""
     document: str = ""
@@ -175,13 +175,13 @@ class Control(NamedTuple):
 
     @property
     def named(self) -> tuple[tuple[str, str], ...]:
-        """Names and values of what was given, but for the title."""
+        """Names and values of the entries given, but for the title."""
         pairs = zip(self._fields[1:], self[1:], strict=True)
         return tuple((name, value) for name, value in pairs if value)
 
 
 UNCONTROLLED = Control()
-"""Of a page on which nobody writes anything."""
+"""Configuration control of a page without any entry."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +203,7 @@ class Page:
 
     @property
     def footer(self) -> str:
-        """What is printed at the foot of each sheet of paper, beside its number."""
+        """Text at the foot of each sheet of paper, beside its number."""
         document, issue, date = self.control.document, self.control.issue, self.control.date
         return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
 
@@ -234,12 +234,12 @@ def facts_of(title: str, table: Table) -> FactList:
 
 
 def blocks_of(title: str, screen: Group) -> Iterator[Block]:
-    """What a screen shows, block by block: a line straight above a table is its title, else ``title`` is."""
+    """Blocks of a screen: a line straight above a table is its title, else ``title`` is."""
     above = ""
     for part in screen.renderables:
         if isinstance(part, Table):
-            made = sheet_of if part.show_header else facts_of
-            yield made(above or title, part)
+            maker = sheet_of if part.show_header else facts_of
+            yield maker(above or title, part)
             above = ""
             continue
         if above:

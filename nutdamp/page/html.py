@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 ENDINGS = (".html", ".htm")
-"""Of the files that a page is written to."""
+"""Endings of the files that a page is written to."""
 
 
 def expect_html(path: str) -> None:
-    """Say at once, not after the work, that a page cannot be made, or not in this form; ``-`` is standard output.
+    """Refuse a page that cannot be made, or not in this form, before the work; ``-`` is standard output.
 
     Raises BadRequest for an ending other than `ENDINGS`, MissingExtra without Jinja or matplotlib.
     """
@@ -44,7 +44,7 @@ def _require_jinja() -> None:
 
 
 def page_html(page: Page) -> str:
-    """The whole file. Whatever a spacecraft file says is escaped; the policy in its head allows no other script."""
+    """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
     moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
     style, script = (
         "\n".join(map(_part, (name, *[view] * moves)))
@@ -64,7 +64,7 @@ def _templates() -> Environment:
     _require_jinja()
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("nutdamp", "page"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -72,9 +72,9 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
-    made.filters["kind"] = lambda block: type(block).__name__
-    return made
+    environment.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
+    environment.filters["kind"] = lambda block: type(block).__name__
+    return environment
 
 
 def _part(name: str) -> str:
@@ -90,7 +90,7 @@ def _phrases(value: str) -> list[str]:
 
 
 WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
-"""What no line may break in: an option of a command, a relation with its number and unit."""
+"""Text in which no line may break: an option of a command, a relation with its number and unit."""
 
 
 def _whole(text: str) -> Markup:
@@ -104,11 +104,11 @@ def _whole(text: str) -> Markup:
 
 def _css(text: str) -> str:
     """Text within a string of a style sheet: all but letters and digits by their numbers."""
-    return "".join(one if one.isascii() and one.isalnum() else f"\\{ord(one):x} " for one in text)
+    return "".join(char if char.isascii() and char.isalnum() else f"\\{ord(char):x} " for char in text)
 
 
 def _labelled(svg: str, described: str) -> Markup:
-    """A picture with what it shows in words for those who do not see it."""
+    """A picture with its description for those who do not see it."""
     from markupsafe import Markup
 
     return Markup(svg.replace("<svg ", f'<svg aria-label="{escape(described)}" ', 1))

@@ -1,4 +1,4 @@
-"""The manoeuvre sheet: what operators load, what gyros and Sun sensor should show, and when to abort."""
+"""The manoeuvre sheet: commands to load, readings of gyros and Sun sensor to expect, and abort criteria."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 CHECKED = 12
-"""Pulses after which there are abort criteria, at most."""
+"""Largest number of pulses after which there are abort criteria."""
 
 FITTING = 5
 """Columns of short values that a phone shows side by side."""
@@ -78,7 +78,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
 
 
 def _phases(plan: Plan) -> str:
-    """What the phases of pulses and the delays of blocks are counted from."""
+    """Notes on the reference of the phases of pulses and of the delays of blocks."""
     spin = "Spin phase: the angle by which the body has turned about axis 3 since t = 0"
     spin += ", positive about +3, so that it falls with this spin" * (plan.spacecraft.spin < 0.0)
     if not _senses(plan.spacecraft):
@@ -95,7 +95,7 @@ def _senses(body: Spacecraft) -> bool:
 
 
 def _firing(flown: Flight) -> Sheet:
-    """One row a pulse: when, at what phases, how long, by what."""
+    """One row a pulse: time, phases, duration, channel."""
     body, pulses = flown.spacecraft, flown.schedule.pulses
     starts = np.array([pulse.loaded[0] for pulse in pulses])
     columns: list[tuple[Column, list[str]]] = [
@@ -116,12 +116,14 @@ def _firing(flown: Flight) -> Sheet:
 
 
 def _signature(flown: Flight) -> Sheet:
-    """One row for the coast before the first pulse or block, and one for that after each: what sensors should show."""
-    body, made = flown.spacecraft, flown.schedule
+    """One row for the coast before the first pulse or block, and one after each: expected readings of sensors."""
+    body, schedule = flown.spacecraft, flown.schedule
     before, after = flown.around_pulses()
-    counts = np.cumsum([block.count for block in made.blocks]) if made.blocks else np.arange(1, len(made) + 1)
+    counts = np.arange(1, len(schedule) + 1)
+    if schedule.blocks:
+        counts = np.cumsum([block.count for block in schedule.blocks])
     rows = counts - 1
-    fired = "block" if made.blocks else "pulse"
+    fired = "block" if schedule.blocks else "pulse"
     names = [f"before {fired} 1", *(f"after {fired} {index}" for index in range(1, len(counts) + 1))]
 
     def states(name: str) -> Vector:
@@ -131,7 +133,7 @@ def _signature(flown: Flight) -> Sheet:
     across = np.abs(spins) * np.tan(states("body_cone"))
     moments = body.inertia
     shape = moments.nutating, moments.C
-    inertial = [rigid_body.inertial_period(*shape, *one) for one in zip(across, spins, strict=True)]
+    inertial = [rigid_body.inertial_period(*shape, *rate) for rate in zip(across, spins, strict=True)]
     in_body = [rigid_body.body_period(*shape, spin) for spin in spins.tolist()]
     turns = np.isfinite(in_body) & (np.degrees(across) >= STILL)
     periods = [digits(time, 4) if there else MISSING for time, there in zip(in_body, turns, strict=True)]
@@ -150,15 +152,15 @@ def _signature(flown: Flight) -> Sheet:
 
 
 def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
-    """After some pulses: what most of the dispersed cases do not leave."""
+    """Limits after some pulses that most of the dispersed cases stay within."""
     from nutdamp.montecarlo.checkpoints import CASES, even, milestones
 
     body, probability = flown.spacecraft, dispersed.probability
     counts = even(len(flown.schedule), CHECKED)
-    found = list(milestones(dispersed.study, counts, probability))
+    criteria = list(milestones(dispersed.study, counts, probability))
     _, after = flown.around_pulses()
     rows = np.array(counts) - 1
-    limits = np.array([one.nutation for one in found])
+    limits = np.array([criterion.nutation for criterion in criteria])
     required = None if body.requirement is None else body.requirement.nutation
     stricter = required is not None and required < float(limits[-1])
     if stricter:
@@ -171,13 +173,13 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     ]
     if body.sun is not None:
         nominal = attitude.angle_between(after.momentum[rows], body.sun)
-        ranges = np.array([one.sun_angle for one in found if one.sun_angle is not None])
+        ranges = np.array([criterion.sun_angle for criterion in criteria if criterion.sun_angle is not None])
         columns.append((Column("Sun angle, nominal", "deg"), _plain(nominal)))
         columns += [
             (Column(f"Sun angle: abort {side}", "deg"), _plain(ranges[:, index]))
             for index, side in enumerate(("below", "above"))
         ]
-    spins = np.array([one.spin for one in found])
+    spins = np.array([criterion.spin for criterion in criteria])
     columns.append((Column("spin, nominal", "rpm"), _rpm(after.rates[rows, 2])))
     columns += [
         (Column(f"spin: abort {side}", "rpm"), _rpm(spins[:, index])) for index, side in enumerate(("below", "above"))
@@ -215,7 +217,7 @@ def _when(body: Spacecraft, times: Vector) -> list[tuple[Column, list[str]]]:
 
 
 def _angles(phases: Vector) -> list[str]:
-    """From 0 to below 360."""
+    """Angles from 0 to below 360 deg."""
     return [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]
 
 

@@ -1,4 +1,4 @@
-"""How the numbers of the page come about: method, equations, references, assumptions and limits."""
+"""The method behind the numbers of the page: equations, references, assumptions and limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nutdamp.views.plan_tables import beyond_floors
 from nutdamp.views.text import MISSING, degrees, quantity
 
 EQUATIONS = ("1", "17", "18", "19")
-"""Those of Magnus that every plan and flight rest on, as the guide numbers them."""
+"""Equations of Magnus that every plan and flight rest on, as the guide numbers them."""
 
 
 def method_blocks(compared: Comparison) -> Iterator[Block]:
@@ -48,7 +48,7 @@ def method_blocks(compared: Comparison) -> Iterator[Block]:
 
 
 def _formulas(topic: Topic) -> list[Formula]:
-    """The formulas of a topic; the last one of a numbered equation is what is used."""
+    """The formulas of a topic; the last one of a numbered equation is the one in use."""
     return [block for part in topic.parts for block in part.blocks if isinstance(block, Formula)]
 
 
@@ -74,7 +74,7 @@ def _symbols(topics: list[Topic], chosen: Plan | None, listed: str) -> Iterator[
 
 
 def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
-    """What the impulses of plans are compared with."""
+    """The bounds that the impulses of plans are compared with."""
     beyond = beyond_floors(body)
     holds = f"no floor here, with {beyond}" if beyond else "no schedule that does so takes less"
     yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
@@ -88,25 +88,25 @@ def assumption_blocks() -> Iterator[Block]:
     yield Points(tuple(re.sub(r"`", "", limit) for limit in guide.limits()))
 
 
-def checks_sheet(plan: Plan, found: Verification) -> Sheet:
-    """What a verification must show to pass, what it shows, and whether it does."""
+def checks_sheet(plan: Plan, verification: Verification) -> Sheet:
+    """Criteria of a verification, its results, and their verdicts."""
     body = plan.spacecraft
     rows = []
-    for method in found.methods:
+    for method in verification.methods:
         if method.outside and method.missing:
             rows.append((method.name, *MOTION_WITHIN, "not flown", MISSING))
         elif method.outside:
             passed = method.difference <= AGREE
             rows.append((method.name, *MOTION_WITHIN, _size(method.difference), PASSED[passed]))
-    for course in (found.momentum, found.energy):
+    for course in (verification.momentum, verification.energy):
         verdict = (
             f"not judged: changed by {' and '.join(course.changed)}" if course.kept is None else PASSED[course.kept]
         )
         rows.append((f"{course.name} on coasts", "keeps to", f"{AGREE:g} of itself", _size(course.drift), verdict))
     required = {bound.part for bound in requirements.required(body)}
-    one, other = (left_by(flown) for flown in (propagation.by_impulses(body, plan.pulses), plan.flight))
+    impulsive, real = (left_by(flown) for flown in (propagation.by_impulses(body, plan.pulses), plan.flight))
     for part, most in tolerated(body).items():
-        first, second = (end.spin if part is Part.SPIN else left_of(part, end, body) for end in (one, other))
+        first, second = (end.spin if part is Part.SPIN else left_of(part, end, body) for end in (impulsive, real))
         shown, allowed = (
             quantity(value, "rad/s") if part is Part.SPIN else degrees(value) for value in (abs(first - second), most)
         )

@@ -26,7 +26,7 @@ from nutdamp.views.plan_tables import channel_text
 from nutdamp.views.text import MISSING, most
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
-"""Even rows in the quickest nutation turn, where there are not less or more than so many altogether."""
+"""Even rows in the quickest nutation turn; least and largest number of them altogether."""
 
 COARSE = 12
 """Rows in a turn below which a line from row to row is no picture of the path, and dots are drawn."""
@@ -41,7 +41,7 @@ ANGLE_DIGITS = 4
 """Decimals of degrees; more where the largest nutation has not so many figures."""
 
 FAR = 4.0
-"""How far a target may lie from H(0) to be in the panel of the axis track, as a multiple of the track."""
+"""Largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track."""
 
 NONE = -(10**8)
 """Entry of a row for an angle that does not exist."""
@@ -59,20 +59,20 @@ def moving_of(plan: Plan) -> Moving:
 
 
 def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
-    """What the globe shows besides the track: the target, the Sun, the cones that the spin axis keeps."""
-    found = []
+    """Directions of the globe besides the track: the target, the Sun, the cones that the spin axis keeps."""
+    directions = []
     if body.goal.axis is not None:
         shift = None if body.requirement is None else body.requirement.momentum_shift
         circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
-        found.append(NamedDirection("target", body.goal.axis, "target", circles))
+        directions.append(NamedDirection("target", body.goal.axis, "target", circles))
     for keep in body.watched:
         bounds = []
         if keep.least > 0.0:
             bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))
         if keep.most < math.pi:
             bounds.append(Circle(f"axis at most {most(keep.most)} from {keep.name}", keep.most, "keep-in"))
-        found.append(NamedDirection(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
-    return tuple(found)
+        directions.append(NamedDirection(keep.name, keep.direction, "watched", tuple(bounds), watched=True))
+    return tuple(directions)
 
 
 def samples_for(flown: Flight, until: float) -> int:
@@ -99,8 +99,8 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         **_named_columns("angle", _pointing(body, track.axis)),
         "firing": firing,
     }
-    for number, one in enumerate((one for one in named if one.watched), start=1):
-        columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, one.axis)), ANGLE_DIGITS)
+    for number, watched in enumerate((direction for direction in named if direction.watched), start=1):
+        columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, watched.axis)), ANGLE_DIGITS)
     utc = _dates(body, track, clock)
     turns = until / geometry.quickest(flown)
     data: dict[str, Any] = {
@@ -113,7 +113,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "firings": texts,
         "utc": utc,
         "target": target,
-        "named": [_mark(one) for one in named],
+        "named": [_mark(direction) for direction in named],
         "look": _look(track, named),
         "dots": turns * COARSE > samples,
     }
@@ -157,21 +157,21 @@ def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[in
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
 
 
-def _mark(one: NamedDirection) -> dict[str, Any]:
+def _mark(direction: NamedDirection) -> dict[str, Any]:
     """A direction as the script takes it."""
     return {
-        "name": one.name,
-        "kind": one.kind,
-        "axis": [round(part, 6) for part in one.axis.tolist()],
-        "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in one.circles],
+        "name": direction.name,
+        "kind": direction.kind,
+        "axis": [round(part, 6) for part in direction.axis.tolist()],
+        "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in direction.circles],
     }
 
 
 def _target(flown: Flight, track: Track, named: Sequence[NamedDirection], paths: Vector) -> Vector:
     """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
-    found = geometry.sky_target(flown, track)
+    target = geometry.sky_target(flown, track)
     reach = FAR * float(np.hypot(*paths.T).max())
-    return found if named and len(found) and float(np.hypot(*found[0])) <= reach else np.empty((0, 2))
+    return target if named and len(target) and float(np.hypot(*target[0])) <= reach else np.empty((0, 2))
 
 
 def _angle_digits(track: Track) -> int:
@@ -186,7 +186,7 @@ def _whole(values: Vector, digits: int) -> list[int]:
 
 
 def _steps(values: Sequence[int]) -> list[int]:
-    """The first number and how each differs from the one before: short where little changes."""
+    """The first number and the difference of each from the one before: short where little changes."""
     return [now - before for before, now in zip([0, *values], values, strict=False)]
 
 
@@ -199,26 +199,26 @@ def _unit(vectors: Vector) -> list[list[int]]:
 def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
     """Two columns: the angles of directions (n, 3), as every table shows them, in units of their last decimal."""
     texts = [angle_texts(body, axis) for axis in axes]
-    found = [
+    numbers = [
         [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in row]
         for row in texts
     ]
-    return [list(column) for column in zip(*found, strict=True)]
+    return [list(column) for column in zip(*numbers, strict=True)]
 
 
 def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
-    """UTC of each row: what all have in common, and the rest of each; None without an epoch."""
+    """UTC of each row: their common beginning, and the rest of each; None without an epoch."""
     dates = [date for time in track.t.tolist() if (date := body.utc(time, digits)) is not None]
     if len(dates) < len(track.t):
         return None
-    # They are in order: what the first and the last have in common, all have.
+    # Dates are in order, so that the common beginning of the first and the last is that of all.
     pairs = enumerate(zip(dates[0], dates[-1], strict=False))
-    common = next((place for place, (one, other) in pairs if one != other), len(dates[0]))
+    common = next((place for place, (first, last) in pairs if first != last), len(dates[0]))
     return {"head": dates[0][:common], "tails": [date[common:] for date in dates]}
 
 
 def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
-    """For each row which of the texts says what fires; the first says that nothing does."""
+    """For each row the number of the text that names the firings; the first text is that of none."""
     texts, column = ["none"], []
     pulses = list(zip(flown.schedule, flown.spans, strict=True))
     for time in track.t.tolist():
@@ -237,9 +237,9 @@ def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
 def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
     """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
-    for one in named[:1]:
-        if float(middle @ one.axis) > -0.9:
-            middle = middle + one.axis
+    for direction in named[:1]:
+        if float(middle @ direction.axis) > -0.9:
+            middle = middle + direction.axis
     longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
     turned = math.degrees(longitude or 0.0) - 20.0
     shown = math.degrees(latitude)
@@ -250,6 +250,6 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     """Seconds of motion in a second of playing, as number and words; and the one to begin with."""
     decades = range(math.floor(math.log10(until / SLOW)) - 1, math.ceil(math.log10(until / QUICK)) + 1)
     every = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
-    found = sorted({1.0, *(round(one, 12) for one in every if QUICK <= until / one <= SLOW)})
-    first = min(found, key=lambda one: abs(math.log(until / one / UNHURRIED)))
-    return tuple((one, "real time" if one == 1.0 else f"× {one:g}") for one in found), first
+    speeds = sorted({1.0, *(round(pace, 12) for pace in every if QUICK <= until / pace <= SLOW)})
+    first = min(speeds, key=lambda pace: abs(math.log(until / pace / UNHURRIED)))
+    return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first

@@ -26,7 +26,7 @@ HANDLE = 25.0
 """Units from the left edge of an entry of a legend to its text."""
 
 ENLARGED = 1.35
-"""Pixels of a narrow screen for a unit, at most: no panel needs more, and text of 7.5 units is 10 pixels high."""
+"""Largest number of pixels of a narrow screen for a unit: text of 7.5 units is then 10 pixels high."""
 
 
 def picture(figure: Figure, caption: str, described: str, narrow: Figure | None = None) -> Picture:
@@ -72,7 +72,7 @@ def _views(figure: Figure) -> tuple[tuple[str, int], ...]:
     figure.draw_without_rendering()  # entries of legends are where they were drawn last, in the units of an SVG
     renderer = _renderer(figure)
     columns: list[Bbox] = []
-    for axes in sorted(figure.axes, key=lambda one: float(one.get_position().x0)):
+    for axes in sorted(figure.axes, key=lambda panel: float(panel.get_position().x0)):
         box = axes.get_tightbbox(renderer)
         if box is None:
             continue

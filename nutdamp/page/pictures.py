@@ -1,4 +1,4 @@
-"""The pictures of a page: what the recommended schedule does, drawn from its flight through the real widths."""
+"""The pictures of a page: the recommended schedule, drawn from its flight through the real widths."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 UNEQUAL = " With I1 ≠ I2 the space cone is what ω traces about H in free motion: not circular, nor closed."
-"""Of cones that are no circular ones."""
+"""Note on cones that are not circular."""
 
 
 def pictures_of(plan: Plan) -> tuple[Picture, ...]:
@@ -55,12 +55,12 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
     if len(plan.pulses):
         through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
         how, unit = ("by which impulse", "impulse") if plan.pulses.idealised else ("for how long", "on-time")
-        said = f"Which channel fires, when and {how}: “pulse: {unit}” beside the bars where there is room, and in the "
-        said += "schedule."
-        said += through * plan.pulses.through_valves
+        caption = f"Which channel fires, when and {how}: “pulse: {unit}” beside the bars where there is room, and in "
+        caption += "the schedule."
+        caption += through * plan.pulses.through_valves
         if any(pulse.channel == STEERABLE for pulse in plan.pulses):
-            said += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
-        drawn.append(("timeline", said, "Timeline of the firings"))
+            caption += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
+        drawn.append(("timeline", caption, "Timeline of the firings"))
     return tuple(
         picture(
             overview.flight_figure(name, flown, track),
@@ -73,7 +73,7 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
 
 
 def _wanders(plan: Plan, track: Track) -> str:
-    """How far H goes between the pulses, where the end of it is bounded by less; empty elsewhere."""
+    """Note on the distance that H goes between the pulses, where its end is bounded by less; empty elsewhere."""
     body = plan.spacecraft
     most_of = {bound.part: bound.most for bound in requirements.required(body)}
     if requirements.aim(body) is not Part.SHIFT or Part.SHIFT not in most_of:
@@ -94,10 +94,10 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
     )
 
 
-def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
-    """What time costs, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
+def trade_picture_of(compared: Comparison, fronts: Sequence[Front]) -> Picture:
+    """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
     wide, narrow = (
-        trade.trade_figure(compared.spacecraft, found, compared.recommended, narrow=narrow) for narrow in (False, True)
+        trade.trade_figure(compared.spacecraft, fronts, compared.recommended, narrow=narrow) for narrow in (False, True)
     )
     return picture(
         wide,
@@ -109,7 +109,7 @@ def trade_picture_of(compared: Comparison, found: Sequence[Front]) -> Picture:
 
 
 def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
-    """How the cases of a study are distributed, where H ends, which tolerance counts; raises MissingExtra."""
+    """Distribution of the cases of a study, final H, effect of each tolerance; raises MissingExtra."""
     body = dispersed.study.model.spacecraft
     bounded = any(bound.part is requirements.aim(body) for bound in requirements.required(body))
     limited = bool(requirements.required(body))

@@ -1,4 +1,4 @@
-"""How the results show and write themselves: what `nutdamp.common.results` declares, for each of the public types."""
+"""Display and output of the results: the functions of `nutdamp.common.results`, for each of the public types."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ def _(compared: Comparison) -> dict[str, Any]:
 
 
 def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    """What ``plan --json`` gives: the plans, the decision on one of them, and the words of both."""
-    made = comparison_json(compared, verdicts.spoken(compared))
-    return {**made, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
+    """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
+    data = comparison_json(compared, verdicts.spoken(compared))
+    return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 
 @results.table.register
@@ -141,7 +141,7 @@ def _(flight: Flight) -> str:
 def _(compared: Comparison) -> str:
     chosen = compared.recommended
     verdict = compared.reason if chosen is None else f"recommended {chosen.scheme}, {compared.reason}"
-    return f"<Comparison of {', '.join(one.scheme for one in compared)}: {verdict}>"
+    return f"<Comparison of {', '.join(plan.scheme for plan in compared)}: {verdict}>"
 
 
 @results.html.register
@@ -205,7 +205,7 @@ def _summary(flight: Flight) -> str:
 
 
 def feasible(plan: Plan) -> Plan:
-    """A plan with a schedule; raises BadRequest for what is no `Plan`, Infeasible for one without."""
+    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
     units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")

@@ -1,4 +1,4 @@
-"""What does not move around the moving view: square panels and the strip over time, with their scales."""
+"""Fixed parts around the moving view: square panels and the strip over time, with their scales."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EDGE = 0.03
 """Part of a scale at either end without a number: it would touch those of the other scale."""
 
 LEAD = 0.012
-"""Part of the axis of time that lies before t = 0: what happens then is seen beside the cursor."""
+"""Part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor."""
 
 PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
 """Prefixes of units with their factors, and the largest number of a scale that needs another one."""
@@ -61,9 +61,9 @@ class Bar(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """What is drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
+    """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale. ``closed``: left and width of what must not fire.
+    ``outside``: a required nutation that lies beyond the scale. ``closed``: left and width of times without firing.
     """
 
     times: Scale

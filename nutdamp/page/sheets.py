@@ -90,7 +90,7 @@ def _angle(left: Residual | None, name: str) -> str:
 
 
 def pulse_sheet(plan: Plan) -> Sheet:
-    """One row a pulse: when, at what spin phase, how long, which channel, and the cones before and after."""
+    """One row a pulse: time, spin phase, duration, channel, and the cones before and after."""
     flown, pulses, body = plan.flight, plan.pulses.pulses, plan.spacecraft
     tracks = flown.around_pulses()
     phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses]))
@@ -115,21 +115,21 @@ def pulse_sheet(plan: Plan) -> Sheet:
 
 
 def on_times(pulses: Schedule) -> tuple[Column, list[str]]:
-    """The column of on-times as they are loaded, which says so where valves make others of them."""
+    """The column of on-times to be loaded; its name tells where valves change them."""
     name = "on-time, commanded" if pulses.through_valves else "on-time"
-    return Column(name, "s"), ["ideal" if one.loaded[1] == 0.0 else f"{one.loaded[1]:.4f}" for one in pulses]
+    return Column(name, "s"), ["ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}" for pulse in pulses]
 
 
 def aspects_sheet(decided: Decision) -> Sheet:
-    """One row a direction that is watched: how near the spin axis comes to it, how far from it, and what it has to."""
+    """One row a direction that is watched: least and largest angle of the spin axis from it, and the limits of both."""
     rows = tuple(
         (
-            one.keep.name,
-            *(cell for angle, at in (one[1:3], one[3:5]) for cell in (in_degrees(angle), f"{at:.3f}")),
-            bounds_text(one.keep) or "none",
-            KEPT[one.kept] if one.keep in decided.plan.spacecraft.keep else MISSING,
+            aspect.keep.name,
+            *(cell for angle, at in (aspect[1:3], aspect[3:5]) for cell in (in_degrees(angle), f"{at:.3f}")),
+            bounds_text(aspect.keep) or "none",
+            KEPT[aspect.kept] if aspect.keep in decided.plan.spacecraft.keep else MISSING,
         )
-        for one in decided.aspects
+        for aspect in decided.aspects
     )
     names = ("direction", ""), ("least angle", "deg"), ("at", "s"), ("largest angle", "deg"), ("at", "s")
     heads = [Column(name, unit, bool(unit)) for name, unit in (*names, ("limit", ""), ("verdict", ""))]
@@ -138,7 +138,7 @@ def aspects_sheet(decided: Decision) -> Sheet:
 
 
 def residual_sheet(title: str, left: Residual) -> Sheet:
-    """What a flight leaves."""
+    """Residual motion at the end of a flight."""
     names = {
         "nutation": "nutation",
         "body cone": "body_cone",

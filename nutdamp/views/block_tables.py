@@ -1,4 +1,4 @@
-"""Command blocks as an operator loads them, and what they do to Sun angle, spin and nutation."""
+"""Command blocks to load, and their effect on Sun angle, spin and nutation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nutdamp.views.text import degrees, mass, moment, quantity
 
 
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
-    """The blocks of a flown schedule, and its figures before and after; ``velocity`` (3,) m/s is what it adds."""
+    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
     return Group(Text("Command blocks", style="bold"), blocks_table(flown), Text(), _effects(flown, velocity))
 
 
@@ -52,25 +52,25 @@ def blocks_table(flown: Flight, *, named: bool = False) -> Table:
 
 
 TOLD = 8
-"""Pulses of a block that a screen shows, at most: the first, the last, and every so many between."""
+"""Largest number of pulses of a block on a screen: the first, the last, and evenly some between."""
 
 
-def shown_pulses(made: Schedule) -> list[int]:
-    """Which pulses (from 0) a screen shows: all, but of long blocks only some."""
-    if not made.blocks:
-        return list(range(len(made)))
+def shown_pulses(schedule: Schedule) -> list[int]:
+    """Pulses (from 0) that a screen shows: all, but of long blocks only some."""
+    if not schedule.blocks:
+        return list(range(len(schedule)))
     shown: list[int] = []
-    for last, block in zip(accumulate(block.count for block in made.blocks), made.blocks, strict=True):
+    for last, block in zip(accumulate(block.count for block in schedule.blocks), schedule.blocks, strict=True):
         step = max(math.ceil((block.count - 1) / (TOLD - 1)), 1)
         shown += sorted({*range(last - block.count, last, step), last - 1})
-    return [index for index in shown if index < len(made)]  # a track may end before the last one
+    return [index for index in shown if index < len(schedule)]  # a track may end before the last one
 
 
 def _effects(flown: Flight, velocity: Vector | None) -> Table:
-    body, made, final = flown.spacecraft, flown.schedule, flown.final
+    body, schedule, final = flown.spacecraft, flown.schedule, flown.final
     before, after = flown.around_pulses()
     table = facts()
-    for name, pulse in (("first pulse", made.pulses[0]), ("last pulse", made.pulses[-1])):
+    for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
         start = pulse.loaded[0]
         dated = body.utc(start, 3)
         table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
@@ -82,7 +82,7 @@ def _effects(flown: Flight, velocity: Vector | None) -> Table:
     table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
     largest = float(max(before.nutation.max(), after.nutation.max()))
     table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
-    used = made.propellant
+    used = schedule.propellant
     tank = body.tank
     left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
     weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"

@@ -1,4 +1,4 @@
-"""What ``budget`` writes: a row for each two thresholds, and the same as JSON."""
+"""Results of ``budget`` as CSV and JSON: a row for each pair of thresholds."""
 
 from __future__ import annotations
 
@@ -32,43 +32,43 @@ HEADER = (
 def _numbers(held: Held) -> tuple[float | None, ...]:
     """The numbers of a row."""
     cycle, band = held.cycle, held.band
-    made: tuple[float | None, ...] = (None,) * 9
+    numbers: tuple[float | None, ...] = (None,) * 9
     if cycle is not None:
         yearly = None if cycle.propellant is None else cycle.propellant * YEAR
         rates = (cycle.pulses * DAY, cycle.cycles * DAY, cycle.impulse * YEAR, yearly, cycle.doubt)
-        made = (*rates, cycle.spin_rate * DAY, *map(math.degrees, (cycle.low, cycle.high, cycle.largest)))
+        numbers = (*rates, cycle.spin_rate * DAY, *map(math.degrees, (cycle.low, cycle.high, cycle.largest)))
     bounds = (None, None) if band is None else (math.degrees(band.noise), math.degrees(band.step))
     lasts = None if held.lasts is None else held.lasts / DAY
-    return (*map(math.degrees, held.thresholds), held.begins, *made, *bounds, lasts)
+    return (*map(math.degrees, held.thresholds), held.begins, *numbers, *bounds, lasts)
 
 
 def _other(held: Held) -> dict[str, float | None] | None:
     """The second limit cycle, where there is one."""
     if held.other is None:
         return None
-    made = dict(zip(HEADER, _numbers(replace(held, cycle=held.other)), strict=True))
-    return {name: made[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
+    numbers = dict(zip(HEADER, _numbers(replace(held, cycle=held.other)), strict=True))
+    return {name: numbers[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
 
 
-def budget_csv(found: Budget) -> str:
-    """One row for each two thresholds; what is not known stays empty."""
-    rows = ([*(number(value) for value in _numbers(one)), truth(one.meets_requirement), one.why] for one in found.held)
+def budget_csv(budget: Budget) -> str:
+    """One row for each pair of thresholds; unknown values stay empty."""
+    rows = ([*(number(value) for value in _numbers(row)), truth(row.meets_requirement), row.why] for row in budget.held)
     return csv_text((*HEADER, "meets_requirement", "why"), rows)
 
 
-def budget_json(found: Budget) -> dict[str, Any]:
-    """How the nutation grows, and every row."""
-    body = found.spacecraft
+def budget_json(budget: Budget) -> dict[str, Any]:
+    """Growth of the nutation, and every row."""
+    body = budget.spacecraft
     return {
         **heading(body),
         "growth_1_s": body.growth,
-        "largest_deg": None if found.largest is None else math.degrees(found.largest),
-        "until_largest_s": found.until_largest,
+        "largest_deg": None if budget.largest is None else math.degrees(budget.largest),
+        "until_largest_s": budget.until_largest,
         "law": None if body.loop is None else body.loop.law,
-        "meets_requirement": found.meets_requirement,
+        "meets_requirement": budget.meets_requirement,
         "thresholds": [
-            dict(zip(HEADER, _numbers(one), strict=True))
-            | {"meets_requirement": one.meets_requirement, "why": one.why or None, "other": _other(one)}
-            for one in found.held
+            dict(zip(HEADER, _numbers(row), strict=True))
+            | {"meets_requirement": row.meets_requirement, "why": row.why or None, "other": _other(row)}
+            for row in budget.held
         ],
     }

@@ -1,4 +1,4 @@
-"""The file of ``plan --certificate``: all that it takes to check a least cost by hand, in SI.
+"""The file of ``plan --certificate``: all data to check a least cost by hand, in SI.
 
 It is about the transverse impulse of a symmetric body of small angles. With E1 = e^{i α t} min(1, e^{-κ (t - t_last)})
 and E2 = e^{i ω t}, where α is ``nutation_rad_s``, ω is ``spin_rad_s`` and κ is ``growth_per_s``, a second of a channel
@@ -33,11 +33,11 @@ NOT_COUNTED = (
 )
 
 
-def certificate_json(found: Certificate) -> dict[str, Any]:
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """The certificate as data."""
-    body, program, proof = found.spacecraft, found.program, found.proof
-    equations = zip(found.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
-    names = [one.name for one in program.channels]
+    body, program, proof = certificate.spacecraft, certificate.program, certificate.proof
+    equations = zip(certificate.rows, program.influence.goal.tolist(), proof.prices.tolist(), strict=True)
+    names, pulses = [channel.name for channel in program.channels], certificate.plan.pulses
     return {
         "nutdamp": __version__,
         "certificate": 1,
@@ -49,9 +49,9 @@ def certificate_json(found: Certificate) -> dict[str, Any]:
         "spin_rad_s": body.spin,
         "nutation_rad_s": body.inertia.a * body.spin,
         "growth_per_s": body.growth,
-        "last_s": found.last,
-        "windows_s": [list(span) for span in found.windows],
-        "unit": found.problem.unit,
+        "last_s": certificate.last,
+        "windows_s": [list(span) for span in certificate.windows],
+        "unit": certificate.problem.unit,
         "equations": [{"name": name, "goal_Nms": goal + 0.0, "price": price + 0.0} for name, goal, price in equations],
         "off_Nms": program.off,
         "channels": [
@@ -65,20 +65,20 @@ def certificate_json(found: Certificate) -> dict[str, Any]:
         ],
         "gained": proof.gained,
         "bound": proof.bound,
-        "burns": [_burn(found, burn) for burn in found.burns],
-        "burns_cost": found.cost,
+        "burns": [_burn(certificate, burn) for burn in certificate.burns],
+        "burns_cost": certificate.cost,
         "plan": {
-            "cost": found.plan.pulses.cost_in(found.problem.unit),
-            "pulses": [{"channel": one.channel, "t_s": one.t, "on_time_s": one.on_time} for one in found.plan.pulses],
+            "cost": pulses.cost_in(certificate.problem.unit),
+            "pulses": [{"channel": pulse.channel, "t_s": pulse.t, "on_time_s": pulse.on_time} for pulse in pulses],
         },
         "primer": [
-            {"t_s": times.tolist(), "q": dict(zip(names, found.primer(times).T.tolist(), strict=True))}
-            for times in found.moments()
+            {"t_s": times.tolist(), "q": dict(zip(names, certificate.primer(times).T.tolist(), strict=True))}
+            for times in certificate.moments()
         ],
     }
 
 
-def _burn(found: Certificate, burn: Burn) -> dict[str, Any]:
-    at = found.program.channels.index(burn.channel)
-    q = found.primer(np.array([burn.t]))[0, at]
+def _burn(certificate: Certificate, burn: Burn) -> dict[str, Any]:
+    at = certificate.program.channels.index(burn.channel)
+    q = certificate.primer(np.array([burn.t]))[0, at]
     return {"channel": burn.channel.name, "t_s": burn.t, "on_time_s": burn.on_time, "q": float(q)}

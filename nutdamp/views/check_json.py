@@ -1,4 +1,4 @@
-"""What ``check --json`` gives: faults, or derived quantities, of each file."""
+"""Result of ``check --json``: faults, or derived quantities, of each file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
-    """A file that could not be read or says something that cannot be; ``doubts`` are warnings."""
+    """A file that could not be read or is faulty; ``doubts`` are warnings."""
     faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
     return {
         "file": name,
@@ -36,7 +36,7 @@ def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterab
 
 
 def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
-    """Each with its ``place`` as messages have it; line and column are null where that is no place in a file."""
+    """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
     return [
         {
             "place": fault.place,
@@ -77,15 +77,15 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
         "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": [
             {
-                "name": found.disturbance.name or None,
-                "precession_rad_s": found.precession,
-                "forced_tilt_deg": None if found.tilt is None else math.degrees(found.tilt),
-                "beat_deg": None if found.beat is None else math.degrees(found.beat),
-                "beat_period_s": found.beat_period,
-                "reaches": [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in found.resonant],
-                "spin_rate_rad_s2": found.spin_rate,
+                "name": consequence.disturbance.name or None,
+                "precession_rad_s": consequence.precession,
+                "forced_tilt_deg": None if consequence.tilt is None else math.degrees(consequence.tilt),
+                "beat_deg": None if consequence.beat is None else math.degrees(consequence.beat),
+                "beat_period_s": consequence.beat_period,
+                "reaches": [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in consequence.resonant],
+                "spin_rate_rad_s2": consequence.spin_rate,
             }
-            for found in survey.consequences(spacecraft)
+            for consequence in survey.consequences(spacecraft)
         ],
         **_loop_json(spacecraft),
         "dispersions": _dispersions_json(spacecraft),
@@ -98,19 +98,19 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
 
 
 def _valve_json(channel: Channel, spacecraft: Spacecraft) -> dict[str, Any]:
-    """What the shortest and the longest command of a channel give; nothing without a valve."""
+    """Pulses of the shortest and the longest command of a channel; nothing without a valve."""
     if channel.valve is None:
         return {}
     return {
         "commands": [
             {
-                "on_time_s": one.on_time,
-                "effective_on_time_s": one.effective,
-                "impulse_Nms": one.impulse,
-                "centroid_s": one.centroid,
+                "on_time_s": pulse.on_time,
+                "effective_on_time_s": pulse.effective,
+                "impulse_Nms": pulse.impulse,
+                "centroid_s": pulse.centroid,
             }
-            for one in survey.acting(spacecraft)
-            if one.channel is channel
+            for pulse in survey.acting(spacecraft)
+            if pulse.channel is channel
         ]
     }
 
@@ -132,21 +132,21 @@ def _tank_json(tank: Tank | None) -> dict[str, Any]:
 
 
 def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    found = survey.spin_axis(spacecraft)
+    axis = survey.spin_axis(spacecraft)
     return {
-        "class": found.kind,
-        "squared_exponent_1_s2": found.exponent,
-        "growth_time_s": found.growth_time,
-        "tilt_deg": math.degrees(found.tilt),
-        "nutation_rate_body_rad_s": found.rates.body,
-        "nutation_rate_despun_rad_s": found.rates.despun,
-        "nutation_rate_inertial_rad_s": found.rates.inertial,
+        "class": axis.kind,
+        "squared_exponent_1_s2": axis.exponent,
+        "growth_time_s": axis.growth_time,
+        "tilt_deg": math.degrees(axis.tilt),
+        "nutation_rate_body_rad_s": axis.rates.body,
+        "nutation_rate_despun_rad_s": axis.rates.despun,
+        "nutation_rate_inertial_rad_s": axis.rates.inertial,
         "dissipation_growth_1_s": spacecraft.growth,
     }
 
 
 def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """When Sun pulses come, and what command blocks can do by them; None without Sun or sensor in the file."""
+    """Times of the Sun pulses, and capability of command blocks; None without Sun or sensor in the file."""
     clock, commands = survey.sun_clock(spacecraft), spacecraft.commands
     if clock is None:
         return None
@@ -159,32 +159,32 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
         "delay_max_deg": None if commands is None else spin * commands.delay_max,
         "channels": [
             {
-                "name": one.channel.name,
-                "smallest_turn_deg": math.degrees(one.smallest),
-                "smallest_turn_width_s": one.smallest_width,
-                "largest_turn_deg": math.degrees(one.largest),
-                "largest_turn_width_s": one.largest_width,
+                "name": turn.channel.name,
+                "smallest_turn_deg": math.degrees(turn.smallest),
+                "smallest_turn_width_s": turn.smallest_width,
+                "largest_turn_deg": math.degrees(turn.largest),
+                "largest_turn_width_s": turn.largest_width,
             }
-            for one in survey.turns(spacecraft)
+            for turn in survey.turns(spacecraft)
         ],
     }
 
 
 def _loop_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    """How far the channels of a loop are from feeding the nutation; nothing for a file without one."""
+    """Margins of the channels of a loop before they feed the nutation; nothing for a file without one."""
     if spacecraft.loop is None:
         return {}
     from nutdamp.control_loop.stability import margins
-    from nutdamp.views.loop_json import margins_json  # few files have one
+    from nutdamp.views.loop_json import margins_json
 
     return {"loop": margins_json(margins(spacecraft, spacecraft.loop))}
 
 
 def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """What a study could draw, sizes in SI or as factors, and what touches nothing that can fire."""
+    """Inputs that a study could draw, sizes in SI or as factors, and those without effect on any actuator."""
     if spacecraft.dispersions is None:
         return None
-    from nutdamp.montecarlo.inputs import reachable  # few files have dispersions
+    from nutdamp.montecarlo.inputs import reachable
 
     inputs, unused = reachable(spacecraft)
     from nutdamp.views.dispersion_json import correlation_json

@@ -1,4 +1,4 @@
-"""The screen of ``check``: derived quantities, what each channel can do, and the mounting angle for two pulses."""
+"""The screen of ``check``: derived quantities, capability of each channel, and the mounting angle for two pulses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from nutdamp.views.text import degrees, duration, in_degrees, moment, quantity, 
 
 
 def check_screen(spacecraft: Spacecraft) -> RenderableType:
-    """Everything that ``check`` shows of one valid file."""
+    """All tables of ``check`` for one valid file."""
     more = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft))
     parts: list[RenderableType] = [header(spacecraft, more)]
     if spacecraft.channels:
@@ -31,8 +31,8 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
         parts += [Text(), turns_table(turns)]
     if survey.acting(spacecraft):
         parts += [Text(), valve_table(spacecraft)]
-    for said in thrust_changes(spacecraft):
-        parts += [Text(), Text(said)]
+    for change in thrust_changes(spacecraft):
+        parts += [Text(), Text(change)]
     if spacecraft.disturbances:
         parts += [Text(), disturbance_table(spacecraft)]
     parts += [Text(), _mounting(spacecraft)]
@@ -44,20 +44,20 @@ def check_screen(spacecraft: Spacecraft) -> RenderableType:
 
 
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    found = survey.spin_axis(spacecraft)
-    stable = f"stable, p² = {found.exponent:.4g} / s²" if found.exponent < 0.0 else "a sphere, no axis is special"
-    warning = " (not under dissipation)" if found.kind == "minimum" else ""
-    yield "spin axis", f"{found.kind} moment of inertia; {stable}{warning}"
-    body, despun, inertial = found.rates
+    spin = survey.spin_axis(spacecraft)
+    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
+    warning = " (not under dissipation)" if spin.kind == "minimum" else ""
+    yield "spin axis", f"{spin.kind} moment of inertia; {stable}{warning}"
+    body, despun, inertial = spin.rates
     yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
     if not spacecraft.inertia.aligned:
-        yield "wobble", f"principal axis 3 is {degrees(found.tilt)} off the third axis of the file"
+        yield "wobble", f"principal axis 3 is {degrees(spin.tilt)} off the third axis of the file"
         for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
             yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
 
 
 def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
-    """When Sun pulses come, and how finely blocks are timed by them."""
+    """Times of the Sun pulses, and resolution of the timing of blocks by them."""
     clock, sensor, commands = survey.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
     if clock is None or sensor is None:
         return
@@ -76,55 +76,55 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
             yield "width", listed(widths, "or")
         else:
             yield "width", f"in steps of {duration(step_of_widths)}, {widths[0]} to {widths[-1]}"
-        every = listed([str(one) for one in commands.every], "or")
+        every = listed([str(count) for count in commands.every], "or")
         yield "block", f"up to {commands.max_count} pulses, one every {'spin' if every == '1' else f'{every} spins'}"
 
 
 def _view(sensor: SunSensor) -> str:
-    """From which angle to the spin axis to which it sees the Sun."""
+    """Range of angles from the spin axis in which the sensor sees the Sun."""
     low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
     return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
 
 
-def turns_table(found: Iterable[survey.Turns]) -> Table:
-    """By how much one pulse of a command block turns H."""
+def turns_table(turns: Iterable[survey.Turns]) -> Table:
+    """Turn of H by one pulse of a command block."""
     table = columns(
         "command blocks\n", "least turn of H\ndeg", "by a pulse of\n", "largest turn\ndeg", "by a pulse of\n"
     )
-    for one in found:
-        ends = ((one.smallest, one.smallest_width), (one.largest, one.largest_width))
+    for step in turns:
+        ends = ((step.smallest, step.smallest_width), (step.largest, step.largest_width))
         cells = [text for turn, width in ends for text in (in_degrees(turn), duration(width))]
-        table.add_row(one.channel.name, *cells)
+        table.add_row(step.channel.name, *cells)
     return table
 
 
 def disturbance_table(spacecraft: Spacecraft) -> Table:
     """The forced tilt, the beat, or the times to reach a cone at resonance."""
     table = columns("disturbance", "does", text=("does",))
-    for number, found in enumerate(survey.consequences(spacecraft), start=1):
-        name = found.disturbance.name or f"number {number}"
-        table.add_row(name, "; ".join(_consequences(found)))
+    for number, consequence in enumerate(survey.consequences(spacecraft), start=1):
+        name = consequence.disturbance.name or f"number {number}"
+        table.add_row(name, "; ".join(_consequences(consequence)))
     return table
 
 
-def _consequences(found: survey.Consequence) -> list[str]:
+def _consequences(consequence: survey.Consequence) -> list[str]:
     texts = []
-    if found.resonant or found.tilt is None:
-        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in found.resonant)
+    if consequence.resonant or consequence.tilt is None:
+        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in consequence.resonant)
         texts.append(f"resonant with the nutation: drives it to {reached}")
-    elif found.disturbance.transverse != 0.0:
+    elif consequence.disturbance.transverse != 0.0:
         texts.append(
-            f"forces a tilt of {degrees(found.tilt)}, precession at {quantity(found.precession, 'rad/s')}; "
-            f"from rest the nutation beats up to {degrees(found.beat)} "
-            f"every {duration(found.beat_period)}"
+            f"forces a tilt of {degrees(consequence.tilt)}, precession at {quantity(consequence.precession, 'rad/s')}; "
+            f"from rest the nutation beats up to {degrees(consequence.beat)} "
+            f"every {duration(consequence.beat_period)}"
         )
-    if found.spin_rate != 0.0:
-        texts.append(f"changes the spin by {found.spin_rate:.4g} rad/s²")
+    if consequence.spin_rate != 0.0:
+        texts.append(f"changes the spin by {consequence.spin_rate:.4g} rad/s²")
     return texts
 
 
 def channel_table(spacecraft: Spacecraft) -> Table:
-    """What each channel can do."""
+    """Torque, impulse and steps of each channel."""
     torque = "torque, file axes\nN m"
     table = columns("channel\n", torque, "on-time\n", "smallest step\ndeg", "largest step\ndeg", text=(torque,))
     for steps in survey.channel_steps(spacecraft):
@@ -140,20 +140,20 @@ def channel_table(spacecraft: Spacecraft) -> Table:
 
 
 def valve_table(spacecraft: Spacecraft) -> Table:
-    """What the shortest and the longest command of each channel give."""
+    """Pulses of the shortest and the longest command of each channel."""
     names = ("channel\n", "on-time\ncommanded", "effective\non-time", "impulse\nN m s", "centroid after\nthe start")
     table = columns(*names)
     alike: dict[tuple[str, ...], list[str]] = {}
-    for one in survey.acting(spacecraft):
-        times = (duration(time) for time in (one.on_time, one.effective))
-        alike.setdefault((*times, f"{one.impulse:.4g}", duration(one.centroid)), []).append(one.channel.name)
+    for pulse in survey.acting(spacecraft):
+        times = (duration(time) for time in (pulse.on_time, pulse.effective))
+        alike.setdefault((*times, f"{pulse.impulse:.4g}", duration(pulse.centroid)), []).append(pulse.channel.name)
     for cells, channels in alike.items():
         table.add_row(", ".join(channels), *cells)
     return table
 
 
 def thrust_changes(spacecraft: Spacecraft) -> Iterator[str]:
-    """What cold nozzles and a tank in blowdown do to the thrust, a sentence or two each."""
+    """Effect of cold nozzles and of a tank in blowdown on the thrust, a sentence or two each."""
     if spacecraft.cold is not None:
         yield _cold(spacecraft.cold)
     if spacecraft.tank is not None:
@@ -183,7 +183,7 @@ def _on_times(channel: Channel) -> str:
 
 
 def _mounting(spacecraft: Spacecraft) -> RenderableType:
-    """Magnus' two fixed actuators, and which channels come nearest to them."""
+    """Magnus' two fixed actuators, and the channels that come nearest to them."""
     angle = survey.mounting_angle(spacecraft)
     lines = [
         f"Two fixed actuators, each pushing both ways, give both half pulses if mounted {math.degrees(angle):.2f} deg "
@@ -203,8 +203,8 @@ def _mounting(spacecraft: Spacecraft) -> RenderableType:
 
 
 def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
-    """What the loop is, how far its channels are from feeding the nutation, and what feeds it already."""
-    from nutdamp.control_loop.stability import margins  # few files have a loop
+    """The loop, the margins of its channels before they feed the nutation, and the warnings of those that do."""
+    from nutdamp.control_loop.stability import margins
     from nutdamp.views.loop_tables import described, margin_table, warnings
 
     assert spacecraft.loop is not None
@@ -215,8 +215,8 @@ def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
 
 
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
-    """How far the true values may differ from the file's, and which tolerances touch nothing that can fire."""
-    from nutdamp.montecarlo.inputs import reachable  # few files have dispersions
+    """Differences allowed between true values and the file's, and tolerances without effect on any actuator."""
+    from nutdamp.montecarlo.inputs import reachable
     from nutdamp.views.dispersion_tables import unused_table
     from nutdamp.views.tolerance_tables import in_words, size_text
 
@@ -233,7 +233,7 @@ def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
         table.add_row(tolerance, kind, size, ", ".join(names))
     yield table
     given = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
-    pairs = [f"{in_words(one)} and {in_words(other)} {size:g}" for one, other, size in given]
+    pairs = [f"{in_words(first)} and {in_words(second)} {size:g}" for first, second, size in given]
     if pairs:
         yield Text(f"Correlated: {', '.join(pairs)}.")
     if unused:

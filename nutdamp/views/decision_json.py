@@ -1,4 +1,4 @@
-"""What is to be decided of a plan, as a JSON-ready dictionary: angles in degrees, the spin error in rad/s."""
+"""Decision on a plan as a JSON-ready dictionary: angles in degrees, the spin error in rad/s."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nutdamp.views.plan_json import aspects_json, final_json
 
 
 def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
-    """The plan, whether it ``met`` what is required and the ``verdict`` in words, part by part with margins, its end.
+    """The plan, whether it ``met`` the requirement and the ``verdict`` in words, part by part with margins, its end.
 
     ``cases`` is null where none were flown.
     """
@@ -39,7 +39,7 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
 
 
 def _line(line: Line) -> dict[str, Any]:
-    """A part: its limit, what is left with nominal values and in the share of cases required, and the margin."""
+    """A part: its limit, its residual with nominal values and in the share of cases required, and the margin."""
     unit, scale = ("rad_s", 1.0) if line.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
     return {
         "part": line.bound.part.value,

@@ -1,4 +1,4 @@
-"""The words of a decision: one place for what screens, pages and files say is met, by what margin, and how it ends."""
+"""Words of a decision, for all screens, pages and files: requirement met or not, margins, and final motion."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from nutdamp.views.layout import columns
 from nutdamp.views.text import MISSING, degrees, lasting, mass, moment, most, quantity
 
 KEPT = {True: "kept", False: "NOT kept"}
-"""What is said of a cone about a direction that the spin axis has to keep."""
+"""Words for a cone about a direction that the spin axis has to keep."""
 
 COUNT = "cases that comply"
-"""What the row of the decision and the column of the comparison are called that count dispersed cases."""
+"""Name of the row of the decision and of the column of the comparison that count dispersed cases."""
 
 
 def verdict(decision: Decision) -> str:
-    """Whether the requirement is met, in words that leave no doubt for what."""
+    """Verdict on the requirement, in words that leave no doubt about its subject."""
     broken, cases = " and ".join(map(strays, decision.strays)), decision.cases
     if not broken:
         return _at_end(decision)
-    # Cases that break a cone do not comply: what is said of them is not of the end alone.
+    # Cases that break a cone do not comply, so that a verdict on cases covers more than the end.
     if cases is not None and cases.complying is not None:
         return f"NOT met: {broken}; {verdicts.cases_share(cases.complying, cases.probability)}"
     return f"NOT met: {broken}; otherwise {_at_end(decision)}"
@@ -44,7 +44,7 @@ def statement(decision: Decision) -> Text:
 
 
 def _at_end(decision: Decision) -> str:
-    """What is said of the end, whatever the spin axis keeps on the way."""
+    """Verdict on the end, regardless of cones on the way."""
     cases, nominal = decision.cases, decision.nominal
     if nominal is None:
         what = "nutation is damped" if decision.plan.spacecraft.goal.axis is None else "target is reached"
@@ -56,12 +56,12 @@ def _at_end(decision: Decision) -> str:
         if nominal:
             return verdicts.cases_verdict(cases.complying, cases.probability)
         return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
-    said = f"{'met' if nominal else 'NOT met'} with nominal values"
-    return f"{said}; dispersed cases were not flown" if decision.undispersed else said
+    result = f"{'met' if nominal else 'NOT met'} with nominal values"
+    return f"{result}; dispersed cases were not flown" if decision.undispersed else result
 
 
 def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
-    """What must be known beside the verdict: what was idealised, what grows.
+    """Notes beside the verdict: idealisations, and growth of the nutation.
 
     ``looped``: it is the flight of a closed loop, which goes on firing.
     """
@@ -79,22 +79,22 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
 
 
 def _turned(decision: Decision) -> list[str]:
-    """What a plan does to axis and spin that nothing asks of it, where that is more than is not worth a word."""
-    body, final, found = decision.plan.spacecraft, decision.flight.residual, []
+    """Unrequested change of axis and spin by a plan, where it is large enough to be mentioned."""
+    body, final, changes = decision.plan.spacecraft, decision.flight.residual, []
     if body.goal.axis is None and final.momentum_shift > TURNED:
-        found.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
+        changes.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
     change = decision.final.spin - body.spin
     if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
-        found.append(f"changes the spin by {quantity(change, 'rad/s')}")
-    return found
+        changes.append(f"changes the spin by {quantity(change, 'rad/s')}")
+    return changes
 
 
 TURNED = math.radians(0.1)
-"""rad by which H turns, for that to be said."""
+"""Turn of H, rad, from which it is mentioned."""
 
 
 def _growing(decision: Decision) -> Iterator[str]:
-    """How long nutation that grows keeps the requirement, or from when that which decays does."""
+    """Time for which growing nutation keeps the requirement, or from which decaying nutation does."""
     body = decision.plan.spacecraft
     now, idle = body.nutation, requirements.outgrown(body, body.nutation)
     most_of = {bound.part: most(bound.most) for bound in requirements.required(body)}
@@ -120,7 +120,7 @@ def _growing(decision: Decision) -> Iterator[str]:
 
 
 def decision_table(decision: Decision, values: str = "nominal") -> Table:
-    """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads what is left."""
+    """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads the residuals."""
     cases = decision.cases
     heads = ["requirement", "limit", values]
     if cases is not None:
@@ -130,36 +130,36 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
         dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
         cells = (limit(line.bound), size(line.bound, line.nominal), *dispersed, size(line.bound, line.margin))
         table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
-    for one in decision.aspects:
-        for bound, angle, left in cone_margins(one):
+    for aspect in decision.aspects:
+        for bound, angle, left in cone_margins(aspect):
             kept, none = left >= -SLACK, [""] * (cases is not None)
-            said = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
-            table.add_row(f"axis from {one.keep.name}", bound, degrees(angle), *none, degrees(left), said)
+            words = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
+            table.add_row(f"axis from {aspect.keep.name}", bound, degrees(angle), *none, degrees(left), words)
     if cases is not None and cases.complying is not None:
         least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        said = coloured(verdicts.VERDICT[cases.met], cases.met)
-        table.add_row(COUNT, f"≥ {least}", "", share, margin, said)
+        words = coloured(verdicts.VERDICT[cases.met], cases.met)
+        table.add_row(COUNT, f"≥ {least}", "", share, margin, words)
     return table
 
 
 def coloured(text: str, met: bool | None) -> Text:
-    """A verdict in the colour of it."""
+    """A verdict in its colour."""
     return Text(text, "" if met is None else "green" if met else "bold red")
 
 
 def limit(bound: Bound) -> str:
-    """The most that may be left of a part."""
+    """The bound of a part."""
     return f"≤ {quantity(bound.most, 'rad/s') if bound.part is Part.SPIN else most(bound.most)}"
 
 
 def size(bound: Bound, value: float | None) -> str:
-    """What is left of a part, in rad/s or degrees."""
+    """The residual of a part, in rad/s or degrees."""
     return quantity(value, "rad/s") if bound.part is Part.SPIN else degrees(value)
 
 
 def _met(line: Line) -> str:
-    """What is said of a part: met or not; for one that is not required, whether that counts as damped or reached."""
+    """Verdict on a part: met or not; for one that is not required, whether that counts as damped or reached."""
     if line.bound.required:
         return verdicts.VERDICT[line.met]
     done = "reached" if line.bound.part is Part.DISTANCE else "damped"
@@ -167,7 +167,7 @@ def _met(line: Line) -> str:
 
 
 def cost(decision: Decision) -> Iterator[tuple[str, str]]:
-    """What the plan takes, and when it ends: names and values."""
+    """Cost and end of the plan: names and values."""
     pulses = decision.flight.schedule
     count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
     if pulses.propellant is None:
@@ -178,7 +178,7 @@ def cost(decision: Decision) -> Iterator[tuple[str, str]]:
 
 
 def end_facts(decision: Decision) -> Table:
-    """Where the spin axis and H end, the spin, what it costs and when it ends."""
+    """Final spin axis, H and spin, cost, and end time."""
     table = end_table(decision.flight, decision.aspects)
     for name, value in cost(decision):
         table.add_row(name, value)
@@ -186,7 +186,7 @@ def end_facts(decision: Decision) -> Table:
 
 
 def decision_screen(compared: Comparison, decision: Decision, reason: str) -> list[RenderableType]:
-    """The decision as the top of a screen: which plan and why, the verdict, its margins, and how it ends."""
+    """The decision as the top of a screen: plan and reason, verdict, margins, and final motion."""
     plan, missed = decision.plan, verdicts.warnings(compared, beside_verdict=True)
     return [
         Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
@@ -198,12 +198,12 @@ def decision_screen(compared: Comparison, decision: Decision, reason: str) -> li
 
 
 def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
-    """The verdict as a line of a screen, and what must be known beside it; ``looped`` as in `notes`."""
+    """The verdict as a line of a screen, and its notes; ``looped`` as in `notes`."""
     yield statement(decision)
     for note in notes(decision, looped=looped):
         yield Text.assemble(("Note: ", "bold"), note)
 
 
 def figures(decision: Decision) -> list[RenderableType]:
-    """The numbers of a decision on a screen: margins, then how it ends."""
+    """The numbers of a decision on a screen: margins, then the final motion."""
     return [Text(), decision_table(decision), Text(), end_facts(decision)]

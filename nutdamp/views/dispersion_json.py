@@ -1,4 +1,4 @@
-"""What ``disperse --json`` gives."""
+"""Result of ``disperse --json``."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
     """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
 
-    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is what one
-    sigma of an input alone (or all of a bias) does to the nutation. Of inputs in ``correlation`` each share is what it
-    adds to those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
+    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is that on
+    the nutation of one sigma of an input alone (or all of a bias). Of inputs in ``correlation`` each share is the
+    increment over those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
     """
     study = results.study
     return {
@@ -56,17 +56,18 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
 
 
 def _percentiles(results: Results, output: str, column: str) -> dict[str, float | None]:
-    found = results.distribution(output)
-    nominal = None if found is None else float(results.study.outputs_of({})[OUTPUTS.index(output)])
-    return percentiles_json(column, nominal, found)
+    distribution = results.distribution(output)
+    nominal = None if distribution is None else float(results.study.outputs_of({})[OUTPUTS.index(output)])
+    return percentiles_json(column, nominal, distribution)
 
 
-def percentiles_json(column: str, nominal: float | None, found: Distribution | None) -> dict[str, float | None]:
-    """The ``nominal`` value of an output, and how it is distributed; nulls for what is not known."""
+def percentiles_json(column: str, nominal: float | None, distribution: Distribution | None) -> dict[str, float | None]:
+    """The ``nominal`` value of an output, and its distribution; nulls for unknown values."""
     names = ("nominal", "min", *(f"{percent:g}" for percent in PERCENTS), "max")
     spread: list[float | None] = [None] * (len(names) - 1)
-    if found is not None:
-        spread = [found.minimum, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
+    if distribution is not None:
+        shares = np.array(PERCENTS) / 100.0
+        spread = [distribution.minimum, *distribution.quantiles(shares).tolist(), distribution.maximum]
     values = zip(names, (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
 
@@ -98,7 +99,7 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def cones_json(results: Results | LoopResults) -> dict[str, Any]:
-    """How many cases break each cone, and the least and largest angle from it to the axis; nothing without cones."""
+    """Number of cases that break each cone, and least and largest angle from it to the axis; nothing without cones."""
     body, entries = results.study.model.spacecraft, []
     nominal = np.degrees(results.study.nominal_aspects).tolist() if body.keep else ()
     for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
@@ -156,13 +157,13 @@ def case_json(study: Study, case: int, draws: dict[str, float]) -> dict[str, Any
 
 def _angles_of(study: Study, draws: dict[str, float]) -> dict[str, Any]:
     """Least and largest angle from the axis to the direction of each cone in one case; nothing without cones."""
-    found = study.aspects_of(draws)
-    return {} if found is None else angles_json(study.model.spacecraft, found)
+    angles = study.aspects_of(draws)
+    return {} if angles is None else angles_json(study.model.spacecraft, angles)
 
 
-def angles_json(spacecraft: Spacecraft, found: Array) -> dict[str, Any]:
-    """The same by those angles (m, 2) rad."""
+def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
+    """Least and largest angle to the direction of each cone, of angles (m, 2) rad."""
     if not spacecraft.keep:
         return {}
-    named = zip(spacecraft.keep, np.degrees(found).tolist(), strict=True)
+    named = zip(spacecraft.keep, np.degrees(angles).tolist(), strict=True)
     return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}

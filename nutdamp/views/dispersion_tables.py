@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 NAMES = ("nutation, deg", "shift of H, deg", "error of H, deg", "spin change, mrad/s", "propellant, g")
 NOTHING = 1e-9
-"""In these units, what is less is rounding."""
+"""Values, in these units, below which a number is rounding."""
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
-"""Of a case whose tank runs empty."""
+"""Note on a case whose tank runs empty."""
 
 
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
-    """Everything that ``disperse`` shows; ``nominal``: the nominal case, where its end is to be shown too."""
+    """All tables of ``disperse``; ``nominal``: the nominal case, where its end is to be shown too."""
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results)]
     parts.append(angles_note(results.study.model.spacecraft))
     if not results.exact:
@@ -70,14 +70,14 @@ def _percentiles(results: Results) -> Table:
     shares = np.array(PERCENTS) / 100.0
     nominal = results.study.outputs_of({})
     for output, name, scale, plan in zip(OUTPUTS, NAMES, SCALES, nominal, strict=True):
-        found = results.distribution(output)
-        if found is None:
+        distribution = results.distribution(output)
+        if distribution is None:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
-        largest = scale * max(abs(found.minimum), abs(found.maximum))
+        largest = scale * max(abs(distribution.minimum), abs(distribution.maximum))
         # The nominal value has digits of its own: other places show it alone.
         own = "0" if abs(scale * plan) < NOTHING else digits(scale * plan, 4)
-        for sign, reached in _tails(found, shares):
+        for sign, reached in _tails(distribution, shares):
             values = (beside(scale * value, largest) for value in reached)
             table.add_row(Text(name.replace(",", f"{sign},"), style="dim"), own, *values)
     for column in table.columns[1:]:
@@ -85,20 +85,20 @@ def _percentiles(results: Results) -> Table:
     return table
 
 
-def _tails(found: Distribution, shares: Array) -> Iterator[tuple[str, list[float]]]:
-    """What these shares of the cases, and all, do not exceed; where values are negative, what they stay above too."""
-    upward, downward = found.maximum > 0.0, found.minimum < 0.0
+def _tails(distribution: Distribution, shares: Array) -> Iterator[tuple[str, list[float]]]:
+    """Quantiles of outputs by shares of the cases, and maxima; where values are negative, lower quantiles too."""
+    upward, downward = distribution.maximum > 0.0, distribution.minimum < 0.0
     if upward or not downward:
-        yield " ≤" * downward, [*found.quantiles(shares).tolist(), found.maximum]
+        yield " ≤" * downward, [*distribution.quantiles(shares).tolist(), distribution.maximum]
     if downward:
-        yield " ≥", [*found.quantiles(1.0 - shares).tolist(), found.minimum]
+        yield " ≥", [*distribution.quantiles(1.0 - shares).tolist(), distribution.minimum]
 
 
 def angles_note(body: Spacecraft) -> Text:
-    """From where the angles of H are counted in dispersed cases."""
+    """Note on the reference of the angles of H in dispersed cases."""
     aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
-    said = f"Shift of H: from H at t = 0 of the same case; error of H: from {aim}."
-    return Text(f"{said} The spin axis swings about H by the nutation.", style="dim")
+    note = f"Shift of H: from H at t = 0 of the same case; error of H: from {aim}."
+    return Text(f"{note} The spin axis swings about H by the nutation.", style="dim")
 
 
 def beside(value: float, largest: float) -> str:
@@ -112,7 +112,7 @@ def beside(value: float, largest: float) -> str:
 
 
 def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
-    """What is required, and whether as many cases comply as must."""
+    """The requirement, and the verdict on the number of cases that comply."""
     share, probability = results.met_fraction, results.probability
     if share is None:
         return [Text("The file has no requirement to meet.")]
@@ -132,13 +132,13 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
 
 
 def cone_lines(results: Results | LoopResults) -> Iterator[RenderableType]:
-    """How many cases break each cone, and how near the spin axis comes to its direction and how far from it."""
+    """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
     study = results.study
     nominal = study.nominal_aspects.tolist() if results.done and study.model.spacecraft.keep else ()
-    for index, (keep, one) in enumerate(zip(study.model.spacecraft.keep, nominal, strict=False)):
+    for index, (keep, flown) in enumerate(zip(study.model.spacecraft.keep, nominal, strict=False)):
         broken = int(results.broken[index])
         share = verdicts.percent(broken / results.done, 1.0 - results.probability)
-        seen, alone = (" to ".join(map(degrees, angles)) for angles in (results.aspects[index].tolist(), one))
+        seen, alone = (" to ".join(map(degrees, angles)) for angles in (results.aspects[index].tolist(), flown))
         yield Text.assemble(
             (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
             (f"broken in {share} of cases", "red" if broken else "green"),
@@ -147,7 +147,7 @@ def cone_lines(results: Results | LoopResults) -> Iterator[RenderableType]:
 
 
 def _emptied(results: Results) -> Iterator[RenderableType]:
-    """In how many cases the tank runs empty, where any does."""
+    """Number of cases in which the tank runs empty, where any does."""
     if results.emptied:
         share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
         yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
@@ -174,8 +174,8 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
         order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3]
         names = [in_words(entry.name) for entry in study.model.inputs.drawn]
         drawn = ", ".join(f"{names[row]} {sigmas[row]:+.1f}" for row in order if sigmas[row])
-        found = study.aspects_of(draws)
-        seen = () if found is None else bounded(study.model.spacecraft.keep, np.degrees(found).tolist())
+        aspects = study.aspects_of(draws)
+        seen = () if aspects is None else bounded(study.model.spacecraft.keep, np.degrees(aspects).tolist())
         angles = [f"{angle:.4g}" for angle in seen]
         table.add_row(str(case + 1), *(f"{value:.4g}" for value in outputs), *angles, drawn)
     again = (
@@ -186,27 +186,27 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
 
 
 def _bounded(keep: Keep) -> list[str]:
-    """Which of the angles to the direction of a cone are bounded: the least, the largest."""
+    """Bounded ones of the angles to the direction of a cone: the least, the largest."""
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
 
 
 def bounded_heads(keep: Sequence[Keep]) -> list[str]:
     """Heads of the columns of the angles that are `bounded`."""
-    return [f"{which} from\n{one.name}, deg" for one in keep for which in _bounded(one)]
+    return [f"{which} from\n{cone.name}, deg" for cone in keep for which in _bounded(cone)]
 
 
 def bounded(keep: Sequence[Keep], angles: Iterable[Iterable[float]]) -> list[float]:
     """Of the least and largest ``angles`` to the direction of each cone those that it bounds, cone after cone."""
     return [
         angle
-        for one, seen in zip(keep, angles, strict=True)
+        for cone, seen in zip(keep, angles, strict=True)
         for which, angle in zip(("least", "largest"), seen, strict=True)
-        if which in _bounded(one)
+        if which in _bounded(cone)
     ]
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:
-    """Names that share a reason are listed together."""
+    """Inputs without effect; names that share a reason are listed together."""
     table = facts()
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
@@ -217,7 +217,7 @@ def unused_table(unused: Iterable[Unused]) -> Table:
 
 
 def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
-    """Every input of one case: nominal, drawn, and by how much it is off."""
+    """Every input of one case: nominal, drawn, and the deviation."""
     inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
     for entry in drawn:
         unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
@@ -230,7 +230,7 @@ def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
 
 
 def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
-    """One case (from 0): every input, and how it and the nominal one end."""
+    """One case (from 0): every input, and the ends of it and of the nominal case."""
     inputs = inputs_table(study.model.inputs.drawn, draws)
     outcome = columns("", "nominal", "this case")
     cases: tuple[dict[str, float], ...] = {}, draws
@@ -238,8 +238,8 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
         largest = scale * float(np.max(np.abs(values)))
         cells = (MISSING if math.isnan(value) else beside(scale * value, largest) for value in values)
         outcome.add_row(Text(name, style="dim"), *cells)
-    found = [angles for angles in map(study.aspects_of, cases) if angles is not None]
-    add_angles(outcome, study.model.spacecraft.keep, found)
+    flights = [angles for angles in map(study.aspects_of, cases) if angles is not None]
+    add_angles(outcome, study.model.spacecraft.keep, flights)
     empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
     return Group(title, Text(), inputs, Text(), outcome, *empty)
@@ -247,7 +247,7 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
 
 def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:
     """Two rows for each cone: the least and the largest angle from its direction in each of ``flights``, (m, 2) rad."""
-    for index, one in enumerate(keep):
+    for index, cone in enumerate(keep):
         for row, which in enumerate(("least", "largest")):
-            cells = (f"{math.degrees(found[index, row]):.4g}" for found in flights)
-            table.add_row(Text(f"{which} from {one.name}, deg", style="dim"), *cells)
+            cells = (f"{math.degrees(angles[index, row]):.4g}" for angles in flights)
+            table.add_row(Text(f"{which} from {cone.name}, deg", style="dim"), *cells)

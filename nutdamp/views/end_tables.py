@@ -1,4 +1,4 @@
-"""Where it points: directions in words, and how a flight leaves the body."""
+"""Directions in words, and the motion at the end of a flight."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from nutdamp.views.layout import facts
 from nutdamp.views.text import RPM, degrees, longitude, moment, most, pointing, quantity
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
-"""What the two angles of a direction are without an attitude in the file."""
+"""Frame of the two angles of a direction without an attitude in the file."""
 
 
 def angle_names(body: Spacecraft) -> tuple[str, str]:
-    """What the two angles of a direction are called: along and above the equator, or from H(0) and about it."""
+    """Names of the two angles of a direction: along and above the equator, or from H(0) and about it."""
     return ("tilt", "azimuth") if body.attitude is None else ("right ascension", "declination")
 
 
@@ -36,7 +36,7 @@ def direction_text(body: Spacecraft, direction: Vector) -> str:
 
 
 def target_text(body: Spacecraft, direction: Vector) -> str:
-    """The target axis beside an inertial direction (3,) that was to come there, and the angle between them."""
+    """The target axis beside the inertial direction (3,) that was to reach it, and the angle between them."""
     if body.goal.axis is None:
         return ""
     off = float(attitude.angle_between(direction, body.goal.axis))
@@ -49,9 +49,9 @@ def spin_text(spin: float) -> str:
 
 
 def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
-    """Spin axis and angular momentum after the last pulse, beside the target, and what the body does from then on.
+    """Spin axis and angular momentum after the last pulse, beside the target, and the motion from then on.
 
-    ``watched``: how near the axis came to directions in space.
+    ``watched``: least distances of the axis from directions in space.
     """
     body, final = flown.spacecraft, flown.final
     table = facts()
@@ -72,7 +72,7 @@ def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
 
 
 def lasting(flown: Flight) -> str:
-    """Of when the end is told where it does not last, and what changes it further; empty where nothing does."""
+    """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
     body = flown.spacecraft
     causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
     end = "as the last pulse ends, at " + moment(flown.schedule.end)
@@ -80,27 +80,28 @@ def lasting(flown: Flight) -> str:
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 
-def add_aspects(table: Table, found: Iterable[Aspect]) -> None:
-    """How near the spin axis comes to each direction that is watched, and what it is to keep; ✗ where it does not."""
-    for one in found:
-        keep = one.keep
-        mark, bounds = "" if one.kept else "✗ ", bounds_text(keep)
-        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (one[1:3], one[3:5]))
-        seen = f"{near} to {far}" if one.largest_at > 0.0 or one.least_at > 0.0 else f"{degrees(one.least)} at t = 0"
+def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
+    """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it is broken."""
+    for aspect in aspects:
+        keep = aspect.keep
+        mark, bounds = "" if aspect.kept else "✗ ", bounds_text(keep)
+        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
+        moves = aspect.largest_at > 0.0 or aspect.least_at > 0.0
+        seen = f"{near} to {far}" if moves else f"{degrees(aspect.least)} at t = 0"
         table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
 
 
 def bounds_text(keep: Keep) -> str:
-    """What the spin axis has to keep to a direction; empty where it is only watched."""
+    """Limits of the spin axis to a direction; empty where it is only watched."""
     least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
     largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
     return " and ".join(filter(None, (least, largest)))
 
 
-def cone_margins(one: Aspect) -> Iterator[tuple[str, float, float]]:
-    """Each bound of a cone, the angle that comes nearest to it, and by how much it keeps it, rad."""
-    keep = one.keep
+def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:
+    """Each bound of a cone, the angle that comes nearest to it, and its margin, rad."""
+    keep = aspect.keep
     if keep.least > 0.0:
-        yield f"≥ {most(keep.least)}", one.least, one.least - keep.least
+        yield f"≥ {most(keep.least)}", aspect.least, aspect.least - keep.least
     if keep.most < math.pi:
-        yield f"≤ {most(keep.most)}", one.largest, keep.most - one.largest
+        yield f"≤ {most(keep.most)}", aspect.largest, keep.most - aspect.largest

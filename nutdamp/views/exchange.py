@@ -1,4 +1,4 @@
-"""Plans as other tools read them: a row of `FORMATS` for each format that `nutdamp export` writes."""
+"""Exchange formats of plans: a row of `FORMATS` for each format that `nutdamp export` writes."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     """The text of a plan in the format ``form``; messages in XML or else in keyword = value notation.
 
     ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises BadRequest where the
-    format needs what the spacecraft file does not give, or cannot hold what the plan has.
+    format needs data that the spacecraft file lacks, or cannot hold those of the plan.
     """
     expect_possible(form, xml=xml, until=until)
     row, request = FORMATS[form], Request(plan, xml, until)
@@ -172,7 +172,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
 
 
 def lacking(plan: Plan, form: str) -> str | None:
-    """What the format ``form`` needs to be complete and the spacecraft file does not give; None where it is."""
+    """Data that the format ``form`` needs to be complete and the spacecraft file lacks; None where it is complete."""
     if not FORMATS[form].needs_orbit or plan.spacecraft.orbit is not None:
         return None
     return "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, and no whole message"

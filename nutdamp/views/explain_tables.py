@@ -13,10 +13,10 @@ from nutdamp.views.guide import SOURCES, SUMMARIES, Block, CommandHelp, Formula,
 from nutdamp.views.layout import facts
 
 WIDEST = 100
-"""Columns of a text, at most: longer lines are hard to read."""
+"""Largest width of a text in columns: longer lines are hard to read."""
 
 NARROW = 60
-"""Columns below which names are above what they are, and not beside it."""
+"""Columns below which names are above their texts, and not beside them."""
 
 
 def topics_screen() -> RenderableType:
@@ -28,7 +28,7 @@ def topics_screen() -> RenderableType:
 
 
 def examples_screen(rows: tuple[tuple[str, str], ...]) -> RenderableType:
-    """The spacecraft to start from, each with what it is."""
+    """The spacecraft to start from, each with its subject."""
     title = Text("Spacecraft to start from: nutdamp init --from NAME [FILE]")
     return Constrain(Group(title, Text(), _Pairs(rows)), WIDEST)
 
@@ -46,10 +46,10 @@ def topic_screen(topic: Topic) -> RenderableType:
 
 
 def equations_screen() -> RenderableType:
-    """Every numbered equation: its subject, where it is in the code, what differs from the print."""
+    """Every numbered equation: its subject, its place in the code, its differences from the print."""
     from nutdamp.views.guide import EQUATIONS
 
-    rows = [(one.number, "\n".join([f"{one.subject}: {one.place}", *one.remarks])) for one in EQUATIONS]
+    rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in EQUATIONS]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
     return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 
@@ -65,7 +65,7 @@ def _block(block: Block) -> RenderableType:
 
 
 class _Pairs:
-    """Names to the left and what they are to the right, or above and below each other where there is little room."""
+    """Names to the left and their texts to the right, or above and below each other where there is little room."""
 
     def __init__(self, rows: tuple[tuple[str, str], ...]) -> None:
         self.rows = rows
@@ -95,7 +95,7 @@ class _Typed:
 
 
 def _broken(parts: tuple[str, ...], width: int) -> Iterator[str]:
-    """The ``parts`` of a command in lines of up to ``width`` characters, but for parts that are longer."""
+    """The ``parts`` of a command in lines of up to ``width`` characters; longer parts have a line each."""
     line = ""
     for part in parts:
         if line and len(line) + len(part) + 3 > width:

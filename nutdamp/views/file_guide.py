@@ -15,9 +15,9 @@ from nutdamp.views.guide import FILE, Topic, TopicPart, TopicRows, meant
 
 
 class KeyGuide(NamedTuple):
-    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and what holds it.
+    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its declaration.
 
-    ``section`` is the model of what it holds, where that is a mapping or a list of mappings.
+    ``section`` is the model of its value, where that is a mapping or a list of mappings.
     """
 
     path: str
@@ -26,7 +26,7 @@ class KeyGuide(NamedTuple):
 
     @property
     def parent(self) -> str:
-        """Path of what it is in; empty at the root."""
+        """Path of the mapping it is in; empty at the root."""
         return self.path.rpartition(".")[0]
 
     @property
@@ -68,7 +68,7 @@ def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[Ke
 def file_topic(below: str = "") -> Topic:
     """The keys of the file, or the one called ``below``, such as ``thrusters.force``, and those in it.
 
-    Raises BadRequest, which names what is near, where there is none.
+    Raises BadRequest, which names a near one, where there is none.
     """
     every = list(keys())
     if not below:
@@ -100,14 +100,14 @@ def _sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
         return
     listed = get_origin(_plain(key.field.type)) is list
     title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
-    children = [one for one in every if one.parent == key.path]
+    children = [entry for entry in every if entry.parent == key.path]
     about = " ".join((key.section.__doc__ or "").split())
     yield TopicPart(title, (about, TopicRows(tuple(child.row for child in children))))
     below = [child for child in children if child.section is not None]
     if below and all(child.section is ToleranceSection for child in below):
-        alike = [one for one in every if one.parent == below[0].path]
+        alike = [entry for entry in every if entry.parent == below[0].path]
         names = ", ".join(child.name for child in below)
-        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(one.row for one in alike)),))
+        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(entry.row for entry in alike)),))
         return
     for child in below:
         yield from _sections(child, every)
@@ -128,7 +128,7 @@ def _near(below: str, every: list[KeyGuide]) -> str:
 
 
 def _what(field: fields.Key) -> str:
-    """The units of a quantity, the words of a choice, or what else is to be written."""
+    """The units of a quantity, the words of a choice, or the form of another value."""
     quantity = _first(Quantity, (field.type,))
     if quantity is not None:
         factors = KINDS[quantity.kind].factors
@@ -143,9 +143,9 @@ def _what(field: fields.Key) -> str:
 def _first(kind: type[Quantity], parts: tuple[Any, ...]) -> Quantity | None:
     """The first ``kind`` within types and their annotations."""
     for part in parts:
-        found = part if isinstance(part, kind) else _first(kind, get_args(part))
-        if found is not None:
-            return found
+        match = part if isinstance(part, kind) else _first(kind, get_args(part))
+        if match is not None:
+            return match
     return None
 
 
@@ -159,7 +159,7 @@ def _plain(annotation: Any) -> Any:
     """A type without None and without annotations."""
     if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
         return annotation
-    return next((_plain(one) for one in get_args(annotation) if one is not type(None)), None)
+    return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
 
 
 def _either(names: Any) -> str:

@@ -1,4 +1,4 @@
-"""What ``fit --json`` says."""
+"""Result of ``fit --json``."""
 
 from __future__ import annotations
 
@@ -14,14 +14,12 @@ from nutdamp.files.editing import notes
 from nutdamp.views.plan_json import heading
 
 
-def fit_json(
-    found: Fit, carried: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()
-) -> dict[str, Any]:
-    """Estimates with sigmas, what the file says, the signals, the covariance of what dispersions draw; prospects.
+def fit_json(fit: Fit, carried: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()) -> dict[str, Any]:
+    """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions; prospects.
 
-    ``warnings`` of reading the record go into the notes, before all that makes the estimates doubtful.
+    ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
     """
-    model = found.model
+    model = fit.model
     return {
         **heading(model.spacecraft),
         "record": {
@@ -32,27 +30,27 @@ def fit_json(
                 {
                     "signal": name,
                     "samples": int((model.signal == index).sum()),
-                    "outliers": int(((model.signal == index) & ~found.used).sum()),
-                    "noise_SI": float(found.noise[index]),
-                    "white": found.white(index),
+                    "outliers": int(((model.signal == index) & ~fit.used).sum()),
+                    "noise_SI": float(fit.noise[index]),
+                    "white": fit.white(index),
                 }
                 for index, name in enumerate(model.signals)
             ],
         },
         "time_s": carried.time,
-        "estimates": [_estimate(one) for one in estimates(found, carried.time)],
-        "kept": list(found.kept),
-        "information": found.information.tolist(),
-        "parameters": [one.name for one in model.parameters],
-        "values_SI": found.values.tolist(),
-        "covariance_SI": found.covariance.tolist(),
+        "estimates": [_estimate(estimate) for estimate in estimates(fit, carried.time)],
+        "kept": list(fit.kept),
+        "information": fit.information.tolist(),
+        "parameters": [parameter.name for parameter in model.parameters],
+        "values_SI": fit.values.tolist(),
+        "covariance_SI": fit.covariance.tolist(),
         "dispersed": {
             "inputs": list(carried.names),
             "values_SI": carried.values.tolist(),
             "sigmas_SI": carried.sigmas.tolist(),
             "correlation": carried.correlation.tolist(),
         },
-        "notes": [*warnings, *doubts(found), *untold(model.record), *notes(found, carried)],
+        "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, carried)],
         "next": None if ahead is None else _outlook(ahead),
     }
 
@@ -67,30 +65,30 @@ def _outlook(ahead: Outlook) -> dict[str, Any]:
         "probe": None if probe is None else probe.probe,
         "prospects": [
             {
-                "coast_s": one.length,
-                "probe": one.probe or None,
-                "on_time_s": one.on_time,
-                "sigma_C_over_A": one.ratio,
-                "sigma_thrust": one.thrust,
-                "nutation_deg": math.degrees(one.nutation),
-                "met_fraction": one.met,
-                "propellant_kg": one.propellant,
+                "coast_s": prospect.length,
+                "probe": prospect.probe or None,
+                "on_time_s": prospect.on_time,
+                "sigma_C_over_A": prospect.ratio,
+                "sigma_thrust": prospect.thrust,
+                "nutation_deg": math.degrees(prospect.nutation),
+                "met_fraction": prospect.met,
+                "propellant_kg": prospect.propellant,
             }
-            for one in (*ahead.coasts, *ahead.probes)
+            for prospect in (*ahead.coasts, *ahead.probes)
         ],
     }
 
 
-def _estimate(one: Estimate) -> dict[str, Any]:
-    file = None if one.file is None else one.file * one.factor
-    prior = None if one.prior is None or math.isinf(one.prior) else one.prior * one.factor
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    file = None if estimate.file is None else estimate.file * estimate.factor
+    prior = None if estimate.prior is None or math.isinf(estimate.prior) else estimate.prior * estimate.factor
     return {
-        "quantity": one.key,
-        "unit": one.unit,
-        "value": one.value * one.factor,
-        "sigma": one.sigma * one.factor,
+        "quantity": estimate.key,
+        "unit": estimate.unit,
+        "value": estimate.value * estimate.factor,
+        "sigma": estimate.sigma * estimate.factor,
         "file": file,
         "file_sigma": prior,
-        "change_sigmas": one.change,
-        "from": one.source,
+        "change_sigmas": estimate.change,
+        "from": estimate.source,
     }

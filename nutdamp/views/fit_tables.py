@@ -1,4 +1,4 @@
-"""The screen of ``fit``: what the telemetry tells, how well, and what it does not."""
+"""The screen of ``fit``: estimates, their accuracy, and limits of the telemetry."""
 
 from __future__ import annotations
 
@@ -31,37 +31,37 @@ NOTHING = 1e-3
 """Sigmas below which a value, or a change, is zero."""
 
 MOST_PAIRS = 6
-"""Correlations that are named."""
+"""Largest number of correlations named."""
 
 SOURCES = {TOLD: "data", SHARED: "both", "file": "file"}
 
 
-def fit_screen(found: Fit, time: float, ahead: Outlook | None = None) -> RenderableType:
-    """Everything that ``fit`` shows; the motion is that at ``time`` s, ``ahead`` what more telemetry would give."""
-    rows = estimates(found, time)
-    parts: list[RenderableType] = [Text(found.model.spacecraft.name, style="bold"), Text(), _record(found), Text()]
+def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None) -> RenderableType:
+    """All tables of ``fit``; the motion is that at ``time`` s, ``ahead`` the forecast with more telemetry."""
+    rows = estimates(fit, time)
+    parts: list[RenderableType] = [Text(fit.model.spacecraft.name, style="bold"), Text(), _record(fit), Text()]
     parts += [Text(f"Estimates; the motion is that at t = {time:g} s", style="bold"), _table(rows), Text()]
-    parts += [Text(sentence(line)) for line in told(found, rows)]
+    parts += [Text(sentence(line)) for line in told(fit, rows)]
     if ahead is not None:
         parts += [Text(), _prospects(ahead), Text(), *(Text(sentence(line)) for line in advice(ahead))]
     return Group(*parts)
 
 
 def _prospects(ahead: Outlook) -> Table:
-    """A row for each coast and probe pulse that was looked at."""
+    """A row for each coast and probe pulse of the forecast."""
     nutation = f"nutation\n{exact_percent(ahead.probability)}, deg"
     table = columns("coast\ns", "probe pulse\n", "sigma\nof C/A", "sigma of\nthrust", nutation, "comply\n%")
-    for one in (*ahead.coasts, *ahead.probes):
-        probe = f"{one.probe}, {one.on_time:.3g} s" if one.probe else MISSING
-        thrust = f"{100.0 * one.thrust:.2g} %" if one.probe else MISSING
-        met = MISSING if one.met is None else f"{100.0 * one.met:.4g}"
-        length = f"{one.length:.4g}" + " (now)" * (one is ahead.now)
-        table.add_row(length, probe, f"{one.ratio:.2g}", thrust, f"{math.degrees(one.nutation):.3g}", met)
+    for prospect in (*ahead.coasts, *ahead.probes):
+        probe = f"{prospect.probe}, {prospect.on_time:.3g} s" if prospect.probe else MISSING
+        thrust = f"{100.0 * prospect.thrust:.2g} %" if prospect.probe else MISSING
+        met = MISSING if prospect.met is None else f"{100.0 * prospect.met:.4g}"
+        length = f"{prospect.length:.4g}" + " (now)" * (prospect is ahead.now)
+        table.add_row(length, probe, f"{prospect.ratio:.2g}", thrust, f"{math.degrees(prospect.nutation):.3g}", met)
     return table
 
 
 def advice(ahead: Outlook) -> Iterator[str]:
-    """Whether more telemetry would pay: clauses."""
+    """Clauses on the value of more telemetry."""
     now, longer, probe = ahead.now, ahead.longer, ahead.probe
     level = exact_percent(ahead.probability)
     today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
@@ -89,10 +89,10 @@ def in_shown(signal: str) -> tuple[str, float]:
     return SHOWN.get(signal, ("deg/s", 180.0 / math.pi))
 
 
-def _record(found: Fit) -> Table:
-    model = found.model
+def _record(fit: Fit) -> Table:
+    model = fit.model
     record, table = model.record, facts()
-    period = 2.0 * math.pi / abs(_rate(found)) if _rate(found) else math.inf
+    period = 2.0 * math.pi / abs(_rate(fit)) if _rate(fit) else math.inf
     turns = f", {record.length / period:.3g} nutation periods" if math.isfinite(period) else ""
     table.add_row("record", f"{record.start:g} s to {record.end:g} s{turns}")
     if len(record.schedule):
@@ -101,33 +101,35 @@ def _record(found: Fit) -> Table:
     for index, name in enumerate(model.signals):
         rows = model.signal == index
         unit, factor = in_shown(name)
-        count, out = int(rows.sum()), int((rows & ~found.used).sum())
+        count, out = int(rows.sum()), int((rows & ~fit.used).sum())
         left = f", {out} outliers left out" if out else ""
-        white = ", residuals white" if found.white(index) else ", residuals NOT white: the sigmas are too small"
-        if not found.resolved[index]:
+        white = ", residuals white" if fit.white(index) else ", residuals NOT white: the sigmas are too small"
+        if not fit.resolved[index]:
             white = ", the least that its digits or steps allow"
-        table.add_row(name, f"{count} samples{left}; noise {found.noise[index] * factor:.3g} {unit}{white}")
+        table.add_row(name, f"{count} samples{left}; noise {fit.noise[index] * factor:.3g} {unit}{white}")
     return table
 
 
-def _rate(found: Fit) -> float:
+def _rate(fit: Fit) -> float:
     """Rate of the nutation in the body, rad/s, for small angles."""
-    values = found.named
-    return (1.0 - values["C/A"]) * values.get("omega_3", found.model.spacecraft.spin)
+    values = fit.named
+    return (1.0 - values["C/A"]) * values.get("omega_3", fit.model.spacecraft.spin)
 
 
 def _table(rows: tuple[Estimate, ...]) -> Table:
     table = columns("quantity", "value", "sigma", "unit", "file", "change\nsigmas", "from", text=("unit", "from"))
-    for one in rows:
-        digits = _digits(one)
-        file = MISSING if one.file is None else f"{one.file * one.factor:.{max(digits - 2, 4)}g}"
-        change = MISSING if one.change is None else _changed(one.change) if abs(one.change) > NOTHING else "0"
-        shown = one.value if math.isinf(one.sigma) or abs(one.value) > NOTHING * one.sigma else 0.0
-        value, sigma = (
-            f"{shown * one.factor:.{digits}g}",
-            f"{one.sigma * one.factor:.2g}" if math.isfinite(one.sigma) else MISSING,
+    for estimate in rows:
+        digits = _digits(estimate)
+        file = MISSING if estimate.file is None else f"{estimate.file * estimate.factor:.{max(digits - 2, 4)}g}"
+        change = (
+            MISSING if estimate.change is None else _changed(estimate.change) if abs(estimate.change) > NOTHING else "0"
         )
-        table.add_row(one.label, value, sigma, one.unit, file, change, SOURCES[one.source])
+        shown = estimate.value if math.isinf(estimate.sigma) or abs(estimate.value) > NOTHING * estimate.sigma else 0.0
+        value, sigma = (
+            f"{shown * estimate.factor:.{digits}g}",
+            f"{estimate.sigma * estimate.factor:.2g}" if math.isfinite(estimate.sigma) else MISSING,
+        )
+        table.add_row(estimate.label, value, sigma, estimate.unit, file, change, SOURCES[estimate.source])
     return table
 
 
@@ -136,35 +138,36 @@ def _changed(change: float) -> str:
     return f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
 
 
-def _digits(one: Estimate) -> int:
+def _digits(estimate: Estimate) -> int:
     """Significant digits of a value that its sigma leaves, and one more."""
-    if one.value == 0.0 or one.sigma <= 0.0 or math.isinf(one.sigma):
+    if estimate.value == 0.0 or estimate.sigma <= 0.0 or math.isinf(estimate.sigma):
         return 4
-    return min(max(2 + math.ceil(math.log10(max(abs(one.value) / one.sigma, 1.0))), 2), 9)
+    return min(max(2 + math.ceil(math.log10(max(abs(estimate.value) / estimate.sigma, 1.0))), 2), 9)
 
 
-def told(found: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
-    """What the data do not tell, what is known together only, and what the file does not expect: clauses."""
-    yield from doubts(found)
-    yield from untold(found.model.record)
-    kept = [one.label for one in rows if one.source == "file"]
+def told(fit: Fit, rows: tuple[Estimate, ...]) -> Iterator[str]:
+    """Clauses on parameters that the data do not determine, or only together, and on unexpected estimates."""
+    yield from doubts(fit)
+    yield from untold(fit.model.record)
+    kept = [estimate.label for estimate in rows if estimate.source == "file"]
     if kept:
         yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
-    tied = [f"{one} and {other} {value:+.4f}" for one, other, value in _moments(found)]
-    tied += [f"{one} and {other} {value:+.3f}" for one, other, value in correlated(found)[:MOST_PAIRS]]
+    tied = [f"{first} and {second} {value:+.4f}" for first, second, value in _moments(fit)]
+    tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
         yield f"correlated: {', '.join(tied)}"
-    far = [f"{one.label} ({_changed(one.change)})" for one in rows if one.change is not None and abs(one.change) > FAR]
+    changes = [(row.label, row.change) for row in rows if row.change is not None]
+    far = [f"{label} ({_changed(change)})" for label, change in changes if abs(change) > FAR]
     if far:
         yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
-    if found.model.unequal and found.model.spacecraft.inertia.symmetric:
+    if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
         yield "I1 and I2 differ: the file has one A for both"
 
 
-def _moments(found: Fit) -> Iterator[tuple[str, str, float]]:
+def _moments(fit: Fit) -> Iterator[tuple[str, str, float]]:
     """The correlation of A and C, where both are estimated."""
     from nutdamp.estimation.results import carried
 
-    known = carried(found, found.model.start)
+    known = carried(fit, fit.model.start)
     if known.sigmas[0] > 0.0:
         yield "A", "C", float(known.correlation[0, 1])

@@ -1,15 +1,10 @@
-"""The guide that ``nutdamp explain`` shows: topics by name. Texts alone, from the Markdown files here.
+"""The guide that ``nutdamp explain`` shows: topics by name, read from Markdown files; `explain_tables` lays them out.
 
-The numbered equations of the sources: `equations.md`, and the symbols that they share: `symbols.md`.
-
-The units of files and options, from the table that reads them.
-
-Reads the topics of the guide from the Markdown files beside this module.
+The numbered equations of the sources are in `equations.md`, their symbols in `symbols.md`; the units of files and
+options come from the table that reads them.
 
 ``# name :: summary`` begins a topic and ``## title`` a part of it. Blank lines separate blocks: lines indented by four
 are a formula, ``- name :: text`` a row, ``$`` a command line (two blanks where it may be broken), all else a paragraph.
-
-What a topic of the guide is made of. Texts alone; `nutdamp.views.explain_tables` lays them out.
 """
 
 from __future__ import annotations
@@ -29,7 +24,7 @@ class Formula(NamedTuple):
 
 
 class TopicRows(NamedTuple):
-    """Names and what they are."""
+    """Names and their texts."""
 
     rows: tuple[tuple[str, str], ...]
 
@@ -71,7 +66,7 @@ def topics(file: str) -> tuple[Topic, ...]:
 
 
 def _sections(text: str, mark: str) -> list[str]:
-    """What comes before the first line that begins with ``mark``, and behind each of them."""
+    """Text before the first line that begins with ``mark``, and behind each of them."""
     return f"\n{text}".split(f"\n{mark}")
 
 
@@ -101,7 +96,7 @@ def _block(text: str) -> Block:
 
 
 def _line(kind: Kind) -> str:
-    """The SI unit first, then the others and what they are in it."""
+    """The SI unit first, then the others and their values in it."""
     if not kind.factors:
         return "no unit"
     named = ((unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}") for unit, factor in kind.factors.items())
@@ -110,7 +105,7 @@ def _line(kind: Kind) -> str:
 
 
 def units_topic() -> Topic:
-    """Every unit that is taken."""
+    """Every unit that is accepted."""
     rows = tuple((kind.noun.partition(" ")[2], _line(kind)) for kind in KINDS.values())
     return Topic(
         "units",
@@ -182,7 +177,7 @@ _FIGURE = re.compile(r"(abb|fig)[a-z]*\.?-?[0-9]*")
 def found(requested: str) -> Topic:
     """The topic by its name or by the number of an equation, but for `FILE` and `OVERVIEW`.
 
-    Raises BadRequest, which names what is near, where there is none.
+    Raises BadRequest, which names a near one, where there is none.
     """
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
     known = {topic.name: topic for topic in (*SCHEMES, *MOTION, *CODE)}
@@ -204,9 +199,9 @@ def _equation(source: str, number: str) -> Topic:
 
     section = "." in number
     name = number if section else f"{source.upper() if source == 'k' else 'M'}({number})"
-    for one in EQUATIONS:
-        if one.number == name:
-            return one.topic
+    for equation in EQUATIONS:
+        if equation.number == name:
+            return equation.topic
     raise BadRequest(f"there is no equation {name}; there are M(1) to M(27), K(5) to K(15) and 24.4")
 
 
@@ -224,9 +219,9 @@ def limits() -> tuple[str, ...]:
 
 
 class Equation(NamedTuple):
-    """A numbered equation as printed, and what nutdamp makes of it.
+    """A numbered equation as printed, and its use in nutdamp.
 
-    ``symbols`` are names of `SYMBOLS`; ``changed`` says what differs from the print, with the formula used instead
+    ``symbols`` are names of `SYMBOLS`; ``changed`` tells the differences from the print, with the formula used instead
     where there is one; ``place`` is the dotted name of the code that holds it.
     """
 
@@ -239,7 +234,7 @@ class Equation(NamedTuple):
 
     @classmethod
     def of(cls, topic: Topic) -> Equation:
-        """The equation of a topic of `equations.md`: its formula, symbols and place, and what is changed."""
+        """The equation of a topic of `equations.md`: its formula, symbols and place, and its changes."""
         ((_, (formula, rows, *changed)),) = topic.parts
         facts = dict(cast("TopicRows", rows).rows)
         symbols = tuple(facts["symbols"].split())
@@ -247,7 +242,7 @@ class Equation(NamedTuple):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What differs from the print, in words."""
+        """Differences from the print, in words."""
         return tuple(block for block in self.changed if isinstance(block, str))
 
     @property
@@ -267,4 +262,4 @@ SYMBOLS = dict(cast("TopicRows", _symbols.parts[0].blocks[0]).rows)
 """Symbols of the sources with their units."""
 
 EQUATIONS = tuple(map(Equation.of, topics("equations.md")))
-"""Those of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""
+"""Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""

@@ -1,4 +1,4 @@
-"""The two forms that every screen is made of."""
+"""The two forms of all screens: lists of facts and tables of numbers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ GAP = 2
 """Characters between two columns."""
 
 WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")
-"""What a column keeps on one line."""
+"""Pattern of the words that a column keeps on one line."""
 
 
 def facts() -> Table:
-    """Names to the left, what they are to the right."""
+    """Names to the left, their values to the right."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim", overflow="fold")
     table.add_column(overflow="fold")

@@ -1,4 +1,4 @@
-"""What ``disperse --loop`` writes: JSON of all cases together or of one, and CSV case by case."""
+"""Files of ``disperse --loop``: JSON of all cases together or of one, and CSV case by case."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ COLUMNS = (
     "propellant_kg",
     "firings",
 )
-"""Of `OUTPUTS`, in their order."""
+"""Columns of `OUTPUTS`, in their order."""
 
 
 def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
@@ -98,7 +98,7 @@ def _inputs(study: LoopStudy, case: int) -> dict[str, Any]:
 
 
 def outputs_json(values: Array) -> dict[str, float]:
-    """The outputs (8,) of a case by their columns; what is not known is not a number."""
+    """The outputs (8,) of a case by their columns; unknown ones are not a number."""
     return {name: shown(name, value) for name, value in zip(COLUMNS, values.tolist(), strict=True)}
 
 
@@ -108,9 +108,9 @@ def _share(results: LoopResults, count: int, of: int) -> dict[str, float | None]
 
 
 class LoopCasesWriter:
-    """Writes one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
+    """Writer of one row a case: its number (from 1), the true value of each input, the outputs; angles in degrees.
 
-    With cones the least and the largest angle from the spin axis to the direction of each one follow.
+    With cones the least and the largest angle from the spin axis to the direction of each cone follow.
     """
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
@@ -121,7 +121,7 @@ class LoopCasesWriter:
         stream.flush()
 
     def write(self, first: int, values: Array, stops: list[Stop], angles: Array) -> None:
-        """The cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
+        """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
         entries = self._study.model.inputs.drawn
         drawn = self._study.draws_from(first, len(stops))
         rows = []

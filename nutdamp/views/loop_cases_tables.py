@@ -1,4 +1,4 @@
-"""The screens of ``disperse --loop``: what dispersed loops leave and take, how many settle; and one case alone."""
+"""The screens of ``disperse --loop``: final motion and cost of dispersed loops, share that settles; one case alone."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ NAMES = {
     "propellant": ("propellant, g", 1e3),
     "firings": ("firings", 1.0),
 }
-"""What people call the outputs, in few letters, and the factors to their units."""
+"""Short names of the outputs for people, and the factors to their units."""
 
 SHARED = ("settled", "nutation", "propellant")
-"""Outputs of which it is shown what they depend on."""
+"""Outputs whose dependence on the inputs is shown."""
 
 
 def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
-    """Everything that ``disperse --loop`` shows."""
+    """All tables of ``disperse --loop``."""
     study = results.study
     drawn = f"{results.done:,} case{'s' * (results.done > 1)}, seed {study.seed}"
     if results.redrawn:
@@ -59,7 +59,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     parts += [angles_note(study.spacecraft), Text()]
     parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
     parts += list(_shares(results))
-    anew = ", ".join(f"{in_words(one.name)} {size_text(one)}" for one in study.model.of_firings)
+    anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
     if anew:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
     if worst:
@@ -73,14 +73,14 @@ def _percentiles(results: LoopResults) -> Table:
     table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "max")
     for output, plan in zip(OUTPUTS, results.study.nominal.tolist(), strict=True):
         name, scale = NAMES[output]
-        found = results.distribution(output)
-        if found is not None and output == "spin_change":  # up or down, the largest change is the worst
-            found, plan = Exact(np.abs(results.of(output))), abs(plan)
-        if found is None:
+        distribution = results.distribution(output)
+        if distribution is not None and output == "spin_change":  # up or down, the largest change is the worst
+            distribution, plan = Exact(np.abs(results.of(output))), abs(plan)
+        if distribution is None:
             table.add_row(Text(name, style="dim"), *[MISSING] * (len(PERCENTS) + 2))
             continue
-        values = [plan, *found.quantiles(np.array(PERCENTS) / 100.0).tolist(), found.maximum]
-        largest = scale * max(abs(found.minimum), abs(found.maximum))
+        values = [plan, *distribution.quantiles(np.array(PERCENTS) / 100.0).tolist(), distribution.maximum]
+        largest = scale * max(abs(distribution.minimum), abs(distribution.maximum))
         table.add_row(Text(name, style="dim"), *(_number(output, scale * value, largest) for value in values))
     for column in table.columns[1:]:
         column.no_wrap = True
@@ -97,7 +97,7 @@ def _share(results: LoopResults, count: int, of: int) -> str:
     if not of:
         return "no case"
     low, high = results.interval_about(count, of)
-    share, least, most = (verdicts.percent(one, 0.99) for one in (count / of, low, high))
+    share, least, most = (verdicts.percent(fraction, 0.99) for fraction in (count / of, low, high))
     return f"{share} of cases (95 % interval {least} to {most})"
 
 
@@ -105,12 +105,12 @@ def _settled(results: LoopResults) -> Iterator[RenderableType]:
     stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Stop.END]
     lasting = "and is not stopped, " if stopped else ""
     yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results, results.settled, results.done)}.")
-    said = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
+    parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
     never = results.done - results.settled - sum(count for _, count in stopped)
     if never:
-        said.append(f"not down to the stop threshold in {never:,}")
-    if said:
-        yield Text(f"Of the others: {'; '.join(said)}.")
+        parts.append(f"not down to the stop threshold in {never:,}")
+    if parts:
+        yield Text(f"Of the others: {'; '.join(parts)}.")
     if results.idle:
         yield Text(f"In {results.idle:,} cases the sensor never shows the start threshold, and nothing fires.")
 
@@ -122,16 +122,16 @@ def _dead_band(results: LoopResults) -> Text:
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:
-    """Which inputs what varies depends on."""
+    """Shares of the inputs in the variance of the outputs."""
     shares = {output: results.shares(output) for output in SHARED}
     inputs = [entry for entry in results.study.model.inputs.drawn if entry.sigma]
     if not inputs or not any(shares.values()):
         return
-    most = {entry.name: max(found.get(entry.name, 0.0) for found in shares.values()) for entry in inputs}
+    most = {entry.name: max(share.get(entry.name, 0.0) for share in shares.values()) for entry in inputs}
     heads = (f"{NAMES[output][0].partition(',')[0]}\n%" for output in SHARED)
     table = columns("input\n", "one sigma\n", *heads)
-    for entry in sorted(inputs, key=lambda one: -most[one.name])[:MOST_ROWS]:
-        cells = (f"{100.0 * found[entry.name]:.1f}" if found else MISSING for found in shares.values())
+    for entry in sorted(inputs, key=lambda drawn: -most[drawn.name])[:MOST_ROWS]:
+        cells = (f"{100.0 * share[entry.name]:.1f}" if share else MISSING for share in shares.values())
         table.add_row(Text(in_words(entry.name), style="dim"), size_text(entry), *cells)
     yield Text()
     yield Text("What it depends on", style="bold")
@@ -158,8 +158,10 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
     for case in cases:
         values = dict(zip(OUTPUTS, results.values[:, case].tolist(), strict=True))
         draws = study.draws_of(case)
-        sigmas = [(in_words(one.name), draws[one.name] / one.sigma) for one in study.model.inputs.drawn if one.sigma]
-        largest = sorted(sigmas, key=lambda one: -abs(one[1]))[:3]
+        sigmas = [
+            (in_words(entry.name), draws[entry.name] / entry.sigma) for entry in study.model.inputs.drawn if entry.sigma
+        ]
+        largest = sorted(sigmas, key=lambda pair: -abs(pair[1]))[:3]
         cells = (
             MISSING if math.isnan(values[name]) else f"{values[name] * NAMES[name][1]:.4g}"
             for name in ("settled", "nutation", "propellant", "firings")
@@ -168,18 +170,18 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
         table.add_row(str(case + 1), *cells, *angles, ", ".join(f"{name} {sigma:+.1f}" for name, sigma in largest))
     yield Text("Worst cases", style="bold")
     yield table
-    one = f"--seed {study.seed} --case {cases[0] + 1}"
-    yield Text(f"Each can be looked at alone: {one}; `nutdamp loop` flies it with {one} again", "dim")
+    options = f"--seed {study.seed} --case {cases[0] + 1}"
+    yield Text(f"Each can be looked at alone: {options}; `nutdamp loop` flies it with {options} again", "dim")
 
 
 def loop_case_screen(study: LoopStudy, case: int, flown: Flown) -> Group:
-    """One case (from 0), ``flown`` alone: every input, and how it ends beside the nominal one."""
+    """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
     table = columns("", "nominal", "this case")
     for output, *pair in zip(OUTPUTS, study.nominal.tolist(), values.tolist(), strict=True):
         name, scale = NAMES[output]
-        largest = scale * max((abs(one) for one in pair if not math.isnan(one)), default=0.0)
-        table.add_row(Text(name, style="dim"), *(_number(output, scale * one, largest) for one in pair))
+        largest = scale * max((abs(value) for value in pair if not math.isnan(value)), default=0.0)
+        table.add_row(Text(name, style="dim"), *(_number(output, scale * value, largest) for value in pair))
     add_angles(table, study.spacecraft.keep, [study.nominal_aspects, flown.aspects[:, :, 0]])
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, study.draws_of(case)), Text()]

@@ -1,4 +1,4 @@
-"""What ``loop --json`` and ``verify --loop --json`` give."""
+"""Results of ``loop --json`` and ``verify --loop --json``."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from nutdamp.views.plan_json import final_json, heading, pulses_json, requiremen
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
-    """Firings with what was seen, how it ends, the dead band, and how far each channel is from feeding."""
+    """Firings with the nutation seen, final motion, dead band, and margin of each channel before it feeds."""
     run, body = plan.flown_run, plan.spacecraft
-    seen = [{"decided_s": one.decided, "seen_deg": math.degrees(one.seen)} for one in run.fired]
+    seen = [{"decided_s": firing.decided, "seen_deg": math.degrees(firing.seen)} for firing in run.fired]
     return {
         **heading(body),
         "law": run.loop.law,
@@ -38,42 +38,42 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     }
 
 
-def verified_json(found: LoopVerification) -> dict[str, Any]:
-    """What ``verify --loop --json`` gives: of each firing how far DOP853 differs."""
-    run = found.run
+def verified_json(verification: LoopVerification) -> dict[str, Any]:
+    """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
+    run = verification.run
     return {
         **heading(run.spacecraft),
         "scheme": "loop",
-        "agree": None if found.missing else found.agree,
-        "missing": found.missing or None,
-        "evaluations": found.evaluations,
+        "agree": None if verification.missing else verification.agree,
+        "missing": verification.missing or None,
+        "evaluations": verification.evaluations,
         "until_s": run.until,
         "firings": [
             {
-                "channel": one.pulse.channel,
-                "start_s": one.pulse.loaded[0],
-                "on_time_s": one.pulse.loaded[1],
+                "channel": firing.pulse.channel,
+                "start_s": firing.pulse.loaded[0],
+                "on_time_s": firing.pulse.loaded[1],
                 "start_difference_s": start,
                 "on_time_difference_s": lasts,
                 "nutation_difference_deg": math.degrees(nutation),
             }
-            for one, (start, lasts, nutation) in zip(run.fired, found.pairs, strict=False)
+            for firing, (start, lasts, nutation) in zip(run.fired, verification.pairs, strict=False)
         ],
     }
 
 
-def margins_json(found: tuple[Margin, ...]) -> list[dict[str, Any]]:
-    """How far each channel is from feeding the nutation, at the start threshold."""
+def margins_json(margins: tuple[Margin, ...]) -> list[dict[str, Any]]:
+    """Margin of each channel before it feeds the nutation, at the start threshold."""
     return [
         {
-            "channel": one.channel,
-            "late_deg": math.degrees(one.late),
-            "latest_deg": math.degrees(one.latest) if math.isfinite(one.latest) else None,
-            "gain": one.gain,
-            "growth": one.growth,
-            "delay_margin_s": one.delay if math.isfinite(one.delay) else None,
-            "damps": one.damps,
-            "reversed": one.cause.turned,
+            "channel": margin.channel,
+            "late_deg": math.degrees(margin.late),
+            "latest_deg": math.degrees(margin.latest) if math.isfinite(margin.latest) else None,
+            "gain": margin.gain,
+            "growth": margin.growth,
+            "delay_margin_s": margin.delay if math.isfinite(margin.delay) else None,
+            "damps": margin.damps,
+            "reversed": margin.cause.turned,
         }
-        for one in found
+        for margin in margins
     ]

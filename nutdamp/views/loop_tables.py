@@ -1,4 +1,4 @@
-"""The screen of ``loop``, and what ``check`` says of a loop: verdict, firings, dead band, how far from feeding."""
+"""The screen of ``loop``, and the lines of ``check`` on a loop: verdict, firings, dead band, margins before feeding."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from nutdamp.views.plan_tables import header
 from nutdamp.views.text import degrees, duration, in_degrees, moment, most
 
 SHOWN = 40
-"""Firings in the table, at most."""
+"""Largest number of firings in the table."""
 
 
 def loop_screen(plan: LoopPlan) -> RenderableType:
-    """Everything that ``loop`` shows."""
+    """All tables of ``loop``."""
     run, decision = plan.flown_run, Decision(plan)
     parts: list[RenderableType] = [header(plan.spacecraft), Text(), Text(described(run.loop), style="bold")]
     why = stopped(run)
@@ -43,7 +43,7 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
         parts.append(Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), "."))
     else:
         parts += list(requirement(decision, looped=True))
-    parts += [Text.assemble(("Warning: ", "bold red"), f"{one}.") for one in warnings(plan.spacecraft)]
+    parts += [Text.assemble(("Warning: ", "bold red"), f"{warning}.") for warning in warnings(plan.spacecraft)]
     parts += [Text(), decision_table(decision, "nominal" if run.case is None else "this case"), Text(), _outcome(plan)]
     if run.fired:
         parts += [Text(), _firings(run)]
@@ -64,14 +64,14 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
 
 
 def stopped(run: Run) -> str:
-    """Why the loop was stopped; empty where it was flown to its end."""
+    """The reason why the loop was stopped; empty where it was flown to its end."""
     if not run.stop.fault:
         return ""
     count, after = len(run.fired), ""
     if run.fired:
         after = f"after {count} firing{'s' * (count != 1)}, at {moment(run.fired[-1].pulse.end)}: "
-    name, fired = run.channel, " and ".join(dict.fromkeys(one.pulse.channel for one in run.fired))
-    said = {
+    name, fired = run.channel, " and ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
+    reasons = {
         Stop.EMPTY: "the tank is empty, and nothing fires any more",
         Stop.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
         "sensor shows against what it should",
@@ -82,17 +82,17 @@ def stopped(run: Run) -> str:
         "bias, noise or delay hide which",
         Stop.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
     }
-    return after + said[run.stop]
+    return after + reasons[run.stop]
 
 
 def warnings(spacecraft: Spacecraft) -> Iterator[str]:
-    """What of the loop in the file will feed the nutation, or wastes propellant: before it is flown."""
+    """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is flown."""
     loop = spacecraft.loop
     if loop is None:
         return
-    found = margins(spacecraft, loop)
-    turned = [one.channel for one in found if one.cause.turned]
-    if turned and len(turned) == len(found) and loop.sensor.scale < 0.0:
+    per_channel = margins(spacecraft, loop)
+    turned = [margin.channel for margin in per_channel if margin.cause.turned]
+    if turned and len(turned) == len(per_channel) and loop.sensor.scale < 0.0:
         scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
         yield f"{scale} is a reversed sensor: every firing feeds the nutation"
     elif turned:
@@ -135,7 +135,7 @@ def _outcome(plan: LoopPlan) -> Table:
 
 
 def _settled(run: Run) -> str:
-    """When the loop was first quiet."""
+    """The time when the loop was first quiet."""
     if run.settled is not None:
         return f"at {moment(run.settled)}"
     if not run.fired and not run.lost:
@@ -147,35 +147,35 @@ def _firings(run: Run) -> Table:
     heads = ("firing\n", "start\ns", "on-time\ns", "channel\n", "nutation seen\ndeg", "before\ndeg", "after\ndeg")
     table = columns(*heads, text=("channel\n",))
     before, after = run.flight.around_pulses()
-    for index, one in enumerate(run.fired[:SHOWN]):
-        angles = (one.seen, float(before.nutation[index]), float(after.nutation[index]))
+    for index, firing in enumerate(run.fired[:SHOWN]):
+        angles = (firing.seen, float(before.nutation[index]), float(after.nutation[index]))
         shown = (in_degrees(angle) for angle in angles)
-        pulse = one.pulse
+        pulse = firing.pulse
         table.add_row(str(index + 1), f"{pulse.start:.4f}", f"{pulse.on_time:.4f}", pulse.channel, *shown)
     return table
 
 
-def verification_screen(found: LoopVerification) -> RenderableType:
+def verification_screen(verification: LoopVerification) -> RenderableType:
     """The loop beside the same by DOP853."""
-    run, other = found.run, found.other
+    run, other = verification.run, verification.other
     parts: list[RenderableType] = [header(run.spacecraft), Text(), Text(described(run.loop), style="bold"), Text()]
     if other is None:
-        return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {found.missing}."))
+        return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {verification.missing}."))
     heads = ("start\ns", "differs by\ns", "on-time\ns", "differs by\ns", "nutation\ndeg", "differs by\ndeg")
     table = columns("firing\n", "channel\n", *heads, text=("channel\n",))
-    for index, (one, apart) in enumerate(zip(run.fired[:SHOWN], found.pairs, strict=False), start=1):
-        start, on_time = one.pulse.loaded
+    for index, (firing, apart) in enumerate(zip(run.fired[:SHOWN], verification.pairs, strict=False), start=1):
+        start, on_time = firing.pulse.loaded
         what = (f"{start:.4f}", _apart(apart[0]), f"{on_time:.4f}", _apart(apart[1]))
-        nutation = in_degrees(one.true_nutation)
-        table.add_row(str(index), one.pulse.channel, *what, nutation, _apart(math.degrees(apart[2])))
-    said = f"DOP853 on the full tensor, {found.evaluations:,} evaluations, fires "
-    if found.agree:
-        said += f"alike: {len(run.fired)} firings, times within {found.worst:.1g} s ({AGREE:g} s allowed)."
-    elif found.same:
-        said += f"DIFFERENTLY: times differ by up to {found.worst:.2g} s ({AGREE:g} s allowed)."
+        nutation = in_degrees(firing.true_nutation)
+        table.add_row(str(index), firing.pulse.channel, *what, nutation, _apart(math.degrees(apart[2])))
+    result = f"DOP853 on the full tensor, {verification.evaluations:,} evaluations, fires "
+    if verification.agree:
+        result += f"alike: {len(run.fired)} firings, times within {verification.worst:.1g} s ({AGREE:g} s allowed)."
+    elif verification.same:
+        result += f"DIFFERENTLY: times differ by up to {verification.worst:.2g} s ({AGREE:g} s allowed)."
     else:
-        said += f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, or other channels."
-    return Group(*parts, table, Text(), Text(said))
+        result += f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, or other channels."
+    return Group(*parts, table, Text(), Text(result))
 
 
 def _apart(value: float) -> str:
@@ -186,12 +186,12 @@ ROUNDING = 1e-12
 """Share of the nutation that a firing leaves by rounding alone."""
 
 
-def margin_table(found: tuple[Margin, ...]) -> Table:
-    """How far each channel is from feeding the nutation."""
+def margin_table(margins: tuple[Margin, ...]) -> Table:
+    """Margin of each channel before it feeds the nutation."""
     table = columns("channel\n", "late\ndeg", "a firing leaves\n%", "growth in a period\n%", "delay margin\n")
-    for one in found:
-        margin = "none" if one.delay < 0.0 else duration(one.delay)
-        growth = f"{100.0 * (one.growth - 1.0):.3g}"
-        left = 0.0 if one.gain < ROUNDING else 100.0 * one.gain
-        table.add_row(one.channel, f"{math.degrees(one.late):.4g}", f"{left:.4g}", growth, margin)
+    for row in margins:
+        margin = "none" if row.delay < 0.0 else duration(row.delay)
+        growth = f"{100.0 * (row.growth - 1.0):.3g}"
+        left = 0.0 if row.gain < ROUNDING else 100.0 * row.gain
+        table.add_row(row.channel, f"{math.degrees(row.late):.4g}", f"{left:.4g}", growth, margin)
     return table

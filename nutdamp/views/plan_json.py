@@ -21,17 +21,17 @@ RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
-    """How the JSON of every command begins: the version, and the spacecraft."""
+    """Head of the JSON of every command: the version, and the spacecraft."""
     return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
 
 
 def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
-    """What the JSON file of any command holds where nothing that was asked for is feasible."""
+    """The JSON of any command where nothing requested is feasible."""
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
 def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``plan --json`` gives; ``spoken`` are the words about it, such as the ``reason`` of the recommendation."""
+    """The object of ``plan --json``; ``spoken`` are its words, such as the ``reason`` of the recommendation."""
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
@@ -61,7 +61,7 @@ def compared_json(compared: Comparison, plan: Plan) -> dict[str, Any]:
 def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Derived quantities of a spacecraft at t = 0."""
     inertia = spacecraft.inertia
-    found = spacecraft.widest
+    motion = spacecraft.widest
     return {
         "name": spacecraft.name,
         "A_kgm2": inertia.A,
@@ -71,9 +71,9 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
         "moments_kgm2": list(inertia.moments),
         "principal_axes": cleaned(inertia.axes.T).tolist(),
         "omega0_rad_s": inertia.in_file(spacecraft.omega0).tolist(),
-        "nutation_deg": math.degrees(found.nutation),
-        "body_cone_deg": math.degrees(found.body),
-        "space_cone_deg": math.degrees(found.space),
+        "nutation_deg": math.degrees(motion.nutation),
+        "body_cone_deg": math.degrees(motion.body),
+        "space_cone_deg": math.degrees(motion.space),
         "nutation_at_start_deg": math.degrees(spacecraft.tilt),
         "body_nutation_period_s": spacecraft.body_period,
         "inertial_nutation_period_s": spacecraft.inertial_period,
@@ -84,7 +84,7 @@ def spacecraft_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def plan_json(plan: Plan) -> dict[str, Any]:
-    """One plan; an infeasible one has no pulses, nulls, and why."""
+    """One plan; an infeasible one has no pulses, nulls, and the reason."""
     schedule, body = plan.schedule, plan.spacecraft
     return {
         "scheme": plan.scheme,
@@ -110,18 +110,18 @@ def plan_json(plan: Plan) -> dict[str, Any]:
 
 
 def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
-    """What is required, part by part, and what is left of it; None where nothing is, or without a schedule."""
-    found = []
-    for one in plan.held:
-        if one.bound.required:
-            unit, scale = ("rad_s", 1.0) if one.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
-            left, most = scale * one.left, scale * one.bound.most
-            found.append({"part": one.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": one.met})
-    return found or None
+    """The requirement and the residuals, part by part; None where nothing is required, or without a schedule."""
+    parts = []
+    for part in plan.held:
+        if part.bound.required:
+            unit, scale = ("rad_s", 1.0) if part.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            left, most = scale * part.left, scale * part.bound.most
+            parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
+    return parts or None
 
 
 def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
-    """One pulse of ``body``; with an epoch ``utc`` is when it starts.
+    """One pulse of ``body``; with an epoch ``utc`` is its start.
 
     Through a valve start and on-time are those of the command, and the effective ones are there too.
     """
@@ -142,7 +142,7 @@ def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
-    """Where spin axis and angular momentum end, and what the body does from then on."""
+    """Final spin axis and angular momentum, and the motion from then on."""
     body, final = flown.spacecraft, flown.final
     return {
         "axis": direction_json(body, final.axis),
@@ -153,27 +153,27 @@ def final_json(flown: Flight) -> dict[str, Any]:
 
 
 def target_json(body: Spacecraft) -> dict[str, Any] | None:
-    """What is required of the end, in the form of `final_json`; None where nothing is."""
+    """The requirement on the end, in the form of `final_json`; None where nothing is required."""
     axis, spin = body.goal.axis, body.goal.spin
     if axis is None and spin is None:
         return None
     return {"axis": None if axis is None else direction_json(body, axis), "spin_rad_s": spin}
 
 
-def aspects_json(found: tuple[Aspect, ...]) -> dict[str, Any]:
-    """How near the spin axis comes to each direction that is watched; nothing for a file that names none."""
+def aspects_json(aspects: tuple[Aspect, ...]) -> dict[str, Any]:
+    """Range of angles of the spin axis from each direction that is watched; nothing for a file that names none."""
     entries = [
         {
-            "name": one.keep.name,
-            "least_deg": math.degrees(one.least),
-            "least_s": one.least_at,
-            "largest_deg": math.degrees(one.largest),
-            "largest_s": one.largest_at,
-            "min_deg": math.degrees(one.keep.least),
-            "max_deg": math.degrees(one.keep.most),
-            "kept": one.kept,
+            "name": aspect.keep.name,
+            "least_deg": math.degrees(aspect.least),
+            "least_s": aspect.least_at,
+            "largest_deg": math.degrees(aspect.largest),
+            "largest_s": aspect.largest_at,
+            "min_deg": math.degrees(aspect.keep.least),
+            "max_deg": math.degrees(aspect.keep.most),
+            "kept": aspect.kept,
         }
-        for one in found
+        for aspect in aspects
     ]
     return {"aspects": entries} if entries else {}
 

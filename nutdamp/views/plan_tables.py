@@ -28,20 +28,20 @@ from nutdamp.views.text import MISSING, degrees, digits, duration, in_degrees, m
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:
-    """Everything that ``plan`` shows, the decision on top."""
+    """All tables of ``plan``, the decision on top."""
     decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
-    found: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
-    found += _reasons(compared)
+    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), _comparison(compared)]
+    results += _reasons(compared)
     needless = verdicts.needless(compared)
     parts = [name] if needless is None else [name, Text.assemble(("No pulse needed: ", "bold"), f"{needless}.")]
     if decided is None:
         parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
-        return Group(*parts, *found)
+        return Group(*parts, *results)
     if decided.plan.pulses.blocks:
-        found += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
+        results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
-        found += [Text(), pulse_table(decided.plan)]
-    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *found)
+        results += [Text(), pulse_table(decided.plan)]
+    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *results)
 
 
 def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
@@ -52,7 +52,7 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
     inertia = spacecraft.inertia
-    found = spacecraft.widest
+    motion = spacecraft.widest
     table = facts()
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
     table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
@@ -61,8 +61,8 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
         table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
     table.add_row("spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0))
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
-    cones = f"body cone {degrees(found.body)} + space cone {degrees(found.space)}"
-    table.add_row("nutation", f"{now}{degrees(found.nutation)} = {cones}")
+    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
+    table.add_row("nutation", f"{now}{degrees(motion.nutation)} = {cones}")
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
     table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
@@ -89,7 +89,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
 
 
 def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
-    """What is required, and where it is not what the key of the file says."""
+    """The requirement, and the differences from the key of the file."""
     bounds = requirements.required(spacecraft)
     if bounds:
         yield verdicts.required(spacecraft)
@@ -98,7 +98,7 @@ def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
 
 
 def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
-    """What energy dissipation does to the nutation, and whether it is as slow as the model of it takes for granted."""
+    """Effect of energy dissipation on the nutation, and a note where it is too fast for its model."""
     if spacecraft.growth == 0.0:
         return "none: a sphere has no energy to lose"
     what = "grows" if spacecraft.growth > 0.0 else "decays"
@@ -108,13 +108,13 @@ def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
 
 
 def beyond_floors(spacecraft: Spacecraft) -> str:
-    """What the floors A|ω0| and C|ω3|β do not hold with, in words; empty where they hold."""
-    found = [
+    """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
+    causes = [
         *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
         *["dissipation"] * (spacecraft.growth != 0.0),
         *["disturbances"] * bool(spacecraft.disturbances),
     ]
-    return " and ".join(found)
+    return " and ".join(causes)
 
 
 def _turning(spacecraft: Spacecraft) -> float:
@@ -140,17 +140,17 @@ MILLISECONDS = 3
 Cell = Callable[[Plan], str]
 
 NOT = "✗"
-"""Sign before what is more than required."""
+"""Sign before a value above the requirement."""
 
 UNIT = re.compile(r"\d (\D+)$")
-"""What follows the last digit of a cell and a space."""
+"""Pattern of the unit behind the last digit of a cell and a space."""
 
 SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
 
 
 def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
-    """What the comparison shows of each feasible plan."""
+    """Rows of the comparison, with the values of each feasible plan."""
     (least, ratio), *others = ratios(compared.spacecraft)
     rows: list[tuple[str, Cell]] = [
         ("pulses", lambda plan: str(len(plan.pulses))),
@@ -191,7 +191,7 @@ def _rows(compared: Comparison) -> list[tuple[str, Cell]]:
             rows.append((f"  {COUNT}", lambda plan: verdicts.share_text(compared.shares.get(plan))))
         rows += [_part(bound) for bound in requirements.required(compared.spacecraft)]
         cones = enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)])
-        rows += [_cone(at, one.keep.name, kept) for at, one in cones for kept, _, _ in cone_margins(one)]
+        rows += [_cone(at, cone.keep.name, kept) for at, cone in cones for kept, _, _ in cone_margins(cone)]
     return rows
 
 
@@ -207,11 +207,11 @@ def ratios(body: Spacecraft) -> Iterator[tuple[str, Cell]]:
 
 
 def _part(bound: Bound) -> tuple[str, Cell]:
-    """The row of one thing that is required: its bound, and what the plans leave of it."""
+    """The row of one part of the requirement: its bound, and the residuals of the plans."""
 
     def cell(plan: Plan) -> str:
-        (found,) = (one for one in plan.held if one.bound == bound)
-        return size(bound, found.left) if found.met else f"{NOT} {size(bound, found.left)}"
+        (part,) = (part for part in plan.held if part.bound == bound)
+        return size(bound, part.left) if part.met else f"{NOT} {size(bound, part.left)}"
 
     return f"  {bound.part.label} {limit(bound)}", cell
 
@@ -220,8 +220,8 @@ def _cone(at: int, name: str, kept: str) -> tuple[str, Cell]:
     """The row of one bound of the cone with the number ``at``, and the angle at which the plans come nearest to it."""
 
     def cell(plan: Plan) -> str:
-        found = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
-        return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in found)
+        angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
+        return next(degrees(angle) if left >= -SLACK else f"{NOT} {degrees(angle)}" for angle, left in angles)
 
     return f"  from {name} {kept}", lambda plan: cell(plan) if plan.feasible else MISSING
 
@@ -245,7 +245,7 @@ def _comparison(compared: Comparison) -> Table:
 
 def _unit_first(name: str, cells: list[str]) -> tuple[str, list[str]]:
     """The name of a row with the unit that all its numbers share, and these without it; else both as they are."""
-    units = {found.group(1) for found in map(UNIT.search, cells) if found}
+    units = {match.group(1) for match in map(UNIT.search, cells) if match}
     if len(units) != 1:
         return name, cells
     (unit,) = units
@@ -253,7 +253,7 @@ def _unit_first(name: str, cells: list[str]) -> tuple[str, list[str]]:
 
 
 def _reasons(compared: Comparison) -> list[RenderableType]:
-    """Why a scheme is infeasible, and the remarks of the others; what holds for several is said once."""
+    """Reasons why schemes are infeasible, and the remarks of the others; those that several share stand once."""
     schemes_of: dict[str, list[str]] = {}
     for plan in compared.plans:
         for remark in said(plan):
@@ -263,7 +263,7 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
 
 
 def pulse_table(plan: Plan) -> Table:
-    """One row a pulse: when, how long, which channel, and the nutation before and after.
+    """One row a pulse: time, duration, channel, and the nutation before and after.
 
     With an epoch the start in UTC takes the room of the centre. Through valves start and on-time are those of the
     command, and the effective on-time is shown beside it.
@@ -302,7 +302,7 @@ def _clocks(dates: list[str | None]) -> tuple[str, list[str]]:
 
 
 def flown_by(compared: Comparison) -> str:
-    """By which model schemes are flown beside each other, and which of them fire ideal impulses where others do not."""
+    """Model by which schemes are flown beside each other, with those that alone fire ideal impulses."""
     how = model_name(plan.pulses for plan in compared.plans)
     ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     return how if how != REAL_WIDTHS or not ideal else f"{how} (ideal impulses: {listed(ideal)})"

@@ -1,4 +1,4 @@
-"""What ``plan --robust --json`` adds to the plans."""
+"""Part of ``plan --robust --json`` beside the plans."""
 
 from __future__ import annotations
 
@@ -11,73 +11,78 @@ from nutdamp.spacecraft.requirements import aim
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 
 
-def robust_json(found: RobustComparison, reason: str) -> dict[str, Any]:
-    """The candidates from the best down, the one to fly with its pulses, and what it costs against the usual one.
+def robust_json(robust: RobustComparison, reason: str) -> dict[str, Any]:
+    """The candidates from the best down, the one to fly with its pulses, and its cost against the usual one.
 
-    ``reason``: why that one, in words.
+    ``reason``: that of the choice, in words.
     """
-    chosen, usual = found.chosen, found.usual
+    chosen, usual = robust.chosen, robust.usual
     return {
-        "probability": found.probability,
-        "samples": found.samples,
-        "seed": found.seed,
-        "target": target_json(found.comparison.spacecraft),
-        "candidates": [_candidate(one) for one in found.candidates],
+        "probability": robust.probability,
+        "samples": robust.samples,
+        "seed": robust.seed,
+        "target": target_json(robust.comparison.spacecraft),
+        "candidates": [_candidate(candidate) for candidate in robust.candidates],
         "recommended": None if chosen is None else {**_candidate(chosen), "plan": plan_json(chosen.plan)},
         "reason": reason,
-        "meets_requirement": found.meets_requirement,
+        "meets_requirement": robust.meets_requirement,
         "fresh": None
-        if found.fresh is None
+        if robust.fresh is None
         else {
-            "samples": found.fresh.cases.samples,
-            "seed": found.fresh.cases.seed,
-            "met_fraction": found.fresh.met,
-            "interval": list(found.fresh.interval),
+            "samples": robust.fresh.cases.samples,
+            "seed": robust.fresh.cases.seed,
+            "met_fraction": robust.fresh.met,
+            "interval": list(robust.fresh.interval),
         },
         "tightening": None
-        if found.tightening is None
+        if robust.tightening is None
         else {
-            "factor": found.tightening.factor,
+            "factor": robust.tightening.factor,
             "tolerances": {
-                one.tolerance: {"sigma": one.sigma, "needed": found.tightening.factor * one.sigma}
-                for one, _ in reversed(found.tightening.inputs)
+                entry.tolerance: {"sigma": entry.sigma, "needed": robust.tightening.factor * entry.sigma}
+                for entry, _ in reversed(robust.tightening.inputs)
             },
             "inputs": [
-                {"name": one.name, one.kind: one.size, "needed": found.tightening.factor * one.size, "unit": one.unit}
-                for one, _ in found.tightening.inputs
+                {
+                    "name": entry.name,
+                    entry.kind: entry.size,
+                    "needed": robust.tightening.factor * entry.size,
+                    "unit": entry.unit,
+                }
+                for entry, _ in robust.tightening.inputs
             ],
             "checked": {
-                "samples": found.tightening.cases,
-                "seed": found.tightening.seed,
-                "met_fraction": found.tightening.complied,
-                "at_least": found.tightening.least,
+                "samples": robust.tightening.cases,
+                "seed": robust.tightening.seed,
+                "met_fraction": robust.tightening.complied,
+                "at_least": robust.tightening.least,
             },
         },
         "against": None if usual is None else _candidate(usual),
         "cost": None
-        if found.cost is None
+        if robust.cost is None
         else {
-            "propellant_kg": found.cost.propellant,
-            "total_impulse_Nms": found.cost.impulse,
-            "end_s": found.cost.end,
-            "nutation_deg": math.degrees(found.cost.nutation),
+            "propellant_kg": robust.cost.propellant,
+            "total_impulse_Nms": robust.cost.impulse,
+            "end_s": robust.cost.end,
+            "nutation_deg": math.degrees(robust.cost.nutation),
         },
     }
 
 
-def _candidate(one: Candidate) -> dict[str, Any]:
-    plan, pulses = one.plan, one.plan.pulses
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    plan, pulses = candidate.plan, candidate.plan.pulses
     return {
         "scheme": plan.scheme,
-        "variant": one.variant,
+        "variant": candidate.variant,
         "pulses": len(pulses),
         "end_s": pulses.end,
         "total_impulse_Nms": pulses.total_impulse,
         "propellant_kg": pulses.propellant,
         "nominal_nutation_deg": None if plan.flown is None else math.degrees(plan.flown.nutation),
-        "nutation_deg": math.degrees(one.nutation),
-        aim(plan.spacecraft).value + "_deg": math.degrees(one.off),
-        "samples": one.cases.samples,
-        "met_fraction": one.met,
+        "nutation_deg": math.degrees(candidate.nutation),
+        aim(plan.spacecraft).value + "_deg": math.degrees(candidate.off),
+        "samples": candidate.cases.samples,
+        "met_fraction": candidate.met,
         "final": final_json(plan.flight),
     }

@@ -1,4 +1,4 @@
-"""The screen of ``plan --robust``: candidates by how many cases comply, the one to fly and what it costs."""
+"""The screen of ``plan --robust``: candidates by the share of cases that comply, the one to fly and its cost."""
 
 from __future__ import annotations
 
@@ -17,46 +17,48 @@ from nutdamp.views.plan_tables import derived_table, pulse_table
 from nutdamp.views.text import in_degrees
 
 MOST_ROWS = 12
-"""Candidates that the table names."""
+"""Largest number of candidates in the table."""
 
 
-def robust_screen(found: RobustComparison) -> RenderableType:
-    """Everything that ``plan --robust`` shows."""
-    body, decided, reason = found.comparison.spacecraft, found.decision, robust_verdicts.robust_reason(found)
-    infeasible = [plan for plan in found.comparison.plans if not plan.feasible]
+def robust_screen(robust: RobustComparison) -> RenderableType:
+    """All tables of ``plan --robust``."""
+    body, decided = robust.comparison.spacecraft, robust.decision
+    reason = robust_verdicts.robust_reason(robust)
+    infeasible = [plan for plan in robust.comparison.plans if not plan.feasible]
     reasons = [Text.assemble((f"{plan.scheme}: ", "bold"), _why(plan)) for plan in infeasible]
-    if decided is None or found.chosen is None:
+    if decided is None or robust.chosen is None:
         none = Text(f"No recommendation: {reason}.", style="bold")
         return Group(Text(body.name, style="bold"), none, *reasons, Text(), derived_table(body))
-    named = f"{decided.plan.scheme}, {found.chosen.variant}"
+    named = f"{decided.plan.scheme}, {robust.chosen.variant}"
     parts: list[RenderableType] = [
         Text(body.name, style="bold"),
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
-        *(Text(one) for one in filter(None, [_fresh(found)])),
-        Text(robust_verdicts.robust_cost(found)),
-        *(Text(one) for one in filter(None, [robust_verdicts.tightened(found)])),
+        *(Text(text) for text in filter(None, [_fresh(robust)])),
+        Text(robust_verdicts.robust_cost(robust)),
+        *(Text(text) for text in filter(None, [robust_verdicts.tightened(robust)])),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(
-            f"{'Up to ' * bool(_fewer(found))}{found.samples:,} dispersed cases of each plan, "
-            f"flown through real widths, seed {found.seed}",
+            f"{'Up to ' * bool(_fewer(robust))}{robust.samples:,} dispersed cases of each plan, "
+            f"flown through real widths, seed {robust.seed}",
             style="bold",
         ),
-        *(Text(), _candidates(found), *reasons),
+        *(Text(), _candidates(robust), *reasons),
     ]
     if len(decided.plan.pulses):
         parts += [Text(), pulse_table(decided.plan)]
     return Group(*parts)
 
 
-def _fresh(found: RobustComparison) -> str:
-    """How the plan fares in new cases; nothing where none were flown."""
-    if found.fresh is None or found.chosen is None:
+def _fresh(robust: RobustComparison) -> str:
+    """Result of the plan in new cases; nothing where none were flown."""
+    if robust.fresh is None or robust.chosen is None:
         return ""
-    cases = found.fresh.cases
-    met, low, high = (verdicts.percent(one, found.probability) for one in (found.fresh.met, *found.fresh.interval))
-    few = f", fewer than the {verdicts.exact_percent(found.probability)} required" * found.lucky
+    cases = robust.fresh.cases
+    shares = (robust.fresh.met, *robust.fresh.interval)
+    met, low, high = (verdicts.percent(share, robust.probability) for share in shares)
+    few = f", fewer than the {verdicts.exact_percent(robust.probability)} required" * robust.lucky
     new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
     return f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
 
@@ -65,39 +67,39 @@ def _why(plan: Plan) -> str:
     return f"infeasible: {infeasibility(plan)}" if plan.failure is None else f"{infeasibility(plan)}"
 
 
-def _fewer(found: RobustComparison) -> list[int]:
-    """With how many cases plans were given up."""
-    return sorted({one.cases.samples for one in found.candidates} - {found.samples})
+def _fewer(robust: RobustComparison) -> list[int]:
+    """Numbers of cases after which plans were given up."""
+    return sorted({candidate.cases.samples for candidate in robust.candidates} - {robust.samples})
 
 
-def _candidates(found: RobustComparison) -> RenderableType:
-    level = verdicts.exact_percent(found.probability)
-    counted = requirements.judged(found.comparison.spacecraft)
-    propellant = all(one.plan.pulses.propellant is not None for one in found.candidates)
+def _candidates(robust: RobustComparison) -> RenderableType:
+    level = verdicts.exact_percent(robust.probability)
+    counted = requirements.judged(robust.comparison.spacecraft)
+    propellant = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     cost = "propellant\ng" if propellant else "impulse\nN m s"
-    cones = bool(found.comparison.spacecraft.keep)
+    cones = bool(robust.comparison.spacecraft.keep)
     heads = ("plan\n", "variant\n", "ends at\ns", cost, "nominal\ndeg", f"{level}\ndeg", *["nominal\ncones"] * cones)
     table = columns(*heads, *["cases that\ncomply"] * counted, text=("variant\n",))
-    named = list(found.candidates[:MOST_ROWS])
-    named += [one for one in (found.chosen, found.usual) if one is not None and one not in named]
-    for one in named:
-        plan, pulses = one.plan, one.plan.pulses
+    named = list(robust.candidates[:MOST_ROWS])
+    named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
+    for candidate in named:
+        plan, pulses = candidate.plan, candidate.plan.pulses
         spent = 1e3 * (pulses.propellant or 0.0) if propellant else pulses.total_impulse
         table.add_row(
-            Text(plan.scheme, style="bold" if one is found.chosen else ""),
-            one.variant + " *" * (one is found.usual),
+            Text(plan.scheme, style="bold" if candidate is robust.chosen else ""),
+            candidate.variant + " *" * (candidate is robust.usual),
             f"{pulses.end:.3f}",
             f"{spent:.4g}",
-            *(in_degrees(angle) for angle in (one.nominal, one.left)),
+            *(in_degrees(angle) for angle in (candidate.nominal, candidate.left)),
             *[KEPT[plan.kept is not False]] * cones,
-            *[verdicts.share_text(one.share)] * counted,
+            *[verdicts.share_text(candidate.share)] * counted,
         )
-    what = robust_verdicts.left_name(found.comparison.spacecraft)
-    rest = len(found.candidates) - len(named)
+    what = robust_verdicts.left_name(robust.comparison.spacecraft)
+    rest = len(robust.candidates) - len(named)
     more = f"{rest} more plan{'s rank' if rest > 1 else ' ranks'} below these. " if rest else ""
-    fewer = [f"{count:,}" for count in _fewer(found)]
+    fewer = [f"{count:,}" for count in _fewer(robust)]
     if fewer:
         more += f"Plans that could not be chosen any more after {listed(fewer, 'or')} cases flew no more of them. "
     note = f"{more}nominal, {level}: the {what} left with nominal values, and not exceeded in so many cases."
-    star = " * is recommended without --robust." if found.usual is not None else ""
+    star = " * is recommended without --robust." if robust.usual is not None else ""
     return Group(table, Text(note + star, style="dim"))

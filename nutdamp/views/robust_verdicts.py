@@ -1,4 +1,4 @@
-"""The words of a robust plan: why it, what it costs against the nominal one, which tolerances would have to shrink."""
+"""Words of a robust plan: its reason, its cost against the nominal one, and tolerances that would have to shrink."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from nutdamp.planning.robust import RobustComparison
 
 
-def robust_reason(found: RobustComparison) -> str:
-    """Why the robust plan, or none."""
-    chosen, count = found.chosen, len(found.candidates)
+def robust_reason(robust: RobustComparison) -> str:
+    """The reason for the robust plan, or for none."""
+    chosen, count = robust.chosen, len(robust.candidates)
     if chosen is None:
         return "no scheme is feasible"
     if chosen.met is None:
-        level = exact_percent(found.probability)
-        best = f"least {left_name(found.comparison.spacecraft)} in {level} of the cases, of {count} plans"
-        as_good = f"{found.equals} leave about as little"
-    elif chosen.met >= found.probability:
-        best = f"at least {exact_percent(found.probability)} of cases comply with it, of {count} plans"
-        as_good = f"they do with {found.equals}"
+        level = exact_percent(robust.probability)
+        best = f"least {left_name(robust.comparison.spacecraft)} in {level} of the cases, of {count} plans"
+        as_good = f"{robust.equals} leave about as little"
+    elif chosen.met >= robust.probability:
+        best = f"at least {exact_percent(robust.probability)} of cases comply with it, of {count} plans"
+        as_good = f"they do with {robust.equals}"
     else:
         best = f"most cases comply, of {count} plans"
-        as_good = f"{found.equals} comply equally often within the sampling error"
+        as_good = f"{robust.equals} comply equally often within the sampling error"
     if count == 1:
-        return "the scheme named" if len(found.comparison.plans) == 1 else "the only plan"
-    cost = "propellant" if found.by_propellant else "impulse"
+        return "the scheme named" if len(robust.comparison.plans) == 1 else "the only plan"
+    cost = "propellant" if robust.by_propellant else "impulse"
     then = {
         Ground.COST: f"least {cost}",
         Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended without --robust",
@@ -41,12 +41,12 @@ def robust_reason(found: RobustComparison) -> str:
         Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
     }
-    return best if found.ground not in then else f"{best}; {as_good}, of these {then[found.ground]}"
+    return best if robust.ground not in then else f"{best}; {as_good}, of these {then[robust.ground]}"
 
 
-def robust_cost(found: RobustComparison) -> str:
+def robust_cost(robust: RobustComparison) -> str:
     """The robust plan against the one that is recommended without ``--robust``."""
-    chosen, usual, cost = found.chosen, found.usual, found.cost
+    chosen, usual, cost = robust.chosen, robust.usual, robust.cost
     if chosen is None or usual is None or cost is None:
         return "There is nothing to compare it with."
     if chosen is usual:
@@ -59,36 +59,36 @@ def robust_cost(found: RobustComparison) -> str:
         less = cost.propellant if abs(cost.propellant) > ROUNDING * (pulses.propellant or 0.0) else 0.0
         spent = _more(less, mass(abs(less)), "propellant")
     when = "as early" if cost.end == 0.0 else f"{moment(abs(cost.end))} {'later' if cost.end > 0 else 'earlier'}"
-    level = exact_percent(found.probability)
-    what = left_name(found.comparison.spacecraft)
+    level = exact_percent(robust.probability)
+    what = left_name(robust.comparison.spacecraft)
     gained = f"{degrees(chosen.left)} instead of {degrees(usual.left)} of {what} in {level} of the cases"
     if chosen.met is not None and usual.met is not None:
-        shares = (percent(one.met or 0.0, found.probability) for one in (chosen, usual))
+        shares = (percent(candidate.met or 0.0, robust.probability) for candidate in (chosen, usual))
         gained = f"{' instead of '.join(dict.fromkeys(shares))} of cases comply"
     return f"Against {usual.plan.scheme}, recommended without --robust: {gained}; it takes {spent} and ends {when}."
 
 
-def tightened(found: RobustComparison) -> str:
-    """Which tolerances would have to shrink to what, where too few cases comply; empty where that is not known."""
+def tightened(robust: RobustComparison) -> str:
+    """Tolerances that would have to shrink, and to which size, where too few cases comply; empty where not known."""
     from nutdamp.montecarlo.study import CONFIDENCE
     from nutdamp.views.tolerance_tables import in_words, stated_text
 
-    needed, chosen = found.tightening, found.chosen
+    needed, chosen = robust.tightening, robust.chosen
     if needed is None or chosen is None:
         return ""
-    sizes, tolerances = [], [one.tolerance for one, _ in needed.inputs]
-    for one, relative in needed.inputs:
-        less = stated_text(one._replace(size=needed.factor * one.size), relative, down=True)
-        named = in_words(one.tolerance if tolerances.count(one.tolerance) == 1 else one.name)
-        sizes.append(f"{named} {{{one.kind}: {less}}} instead of {stated_text(one, relative)}")
-    level, least = exact_percent(found.probability), 100.0 * math.floor(1e4 * needed.least) / 1e4
-    checked = f"{percent(needed.complied, found.probability)} of {needed.cases:,} other cases (seed {needed.seed}) do"
+    sizes, tolerances = [], [entry.tolerance for entry, _ in needed.inputs]
+    for entry, relative in needed.inputs:
+        less = stated_text(entry._replace(size=needed.factor * entry.size), relative, down=True)
+        named = in_words(entry.tolerance if tolerances.count(entry.tolerance) == 1 else entry.name)
+        sizes.append(f"{named} {{{entry.kind}: {less}}} instead of {stated_text(entry, relative)}")
+    level, least = exact_percent(robust.probability), 100.0 * math.floor(1e4 * needed.least) / 1e4
+    checked = f"{percent(needed.complied, robust.probability)} of {needed.cases:,} other cases (seed {needed.seed}) do"
     shown = f"which shows at least {least:.4g} % with {exact_percent(CONFIDENCE)} confidence"
     return f"{level} of cases would comply with it, given {listed(sizes)}: {checked}, {shown}."
 
 
 def left_name(spacecraft: Spacecraft) -> str:
-    """What a plan is to leave least of."""
+    """Name of the residual that a plan is to minimise."""
     return "nutation" if spacecraft.goal.axis is None else "nutation or error of H"
 
 

@@ -1,4 +1,4 @@
-"""The comparison of schemes as CSV: one row a scheme, what it costs, leaves, and how the spacecraft ends."""
+"""The comparison of schemes as CSV: one row a scheme, with cost, residuals, and final motion."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ WORDS = ("scheme", "feasible", "recommended", "meets_requirement", "why")
 
 
 def schemes_array(compared: Comparison, decided: Decision | None) -> NDArray[np.void]:
-    """One row a scheme; what is left is that of the flight through real widths. What is not known is NaN or empty.
+    """One row a scheme; residuals are those of the flight through real widths. Unknown values are NaN or empty.
 
-    ``decided``: which plan is recommended; ``met_fraction`` is the share of cases that comply, where all have flown.
+    ``decided``: decision on the recommended plan; ``met_fraction``: share of cases that comply, where all have flown.
     """
     chosen, shares = None if decided is None else decided.plan, compared.shares
     rows = []
@@ -64,7 +64,7 @@ _CELESTIAL = ("right_ascension_deg", "declination_deg")
 
 
 def schemes_csv(compared: Comparison, decided: Decision | None) -> str:
-    """The rows of `schemes_array` as CSV; what is not known is empty."""
+    """The rows of `schemes_array` as CSV; unknown values are empty."""
     table = schemes_array(compared, decided)
     texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
     return csv_text(table.dtype.names or WORDS, texts)

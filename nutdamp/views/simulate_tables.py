@@ -22,14 +22,14 @@ from nutdamp.views.verdicts import model_warnings
 
 
 def simulation_screen(simulation: Simulation) -> RenderableType:
-    """Everything that ``simulate`` shows."""
-    flight, found, decided = simulation.shown, simulation.extremes, simulation.decision
+    """All tables of ``simulate``."""
+    flight, extremes, decided = simulation.shown, simulation.extremes, simulation.decision
     impulses, flown, pulses = simulation.impulses, simulation.flown, len(simulation.plan.pulses)
     how = f"{simulation.plan.scheme}, propagated by the {flight.model}"
     parts: list[RenderableType] = [header(flight.spacecraft), Text(), Text(how, style="bold")]
     if len(flight.schedule) < pulses:
         begun = f"{len(flight.schedule) or 'none'} of {pulses} pulses begun"
-        parts.append(Text(f"the track ends at {moment(found.until)}, with {begun}"))
+        parts.append(Text(f"the track ends at {moment(extremes.until)}, with {begun}"))
     if flight.schedule.blocks:
         parts += [Text(), blocks_screen(flight, simulation.plan.delta_v)]
     if len(flight.schedule):
@@ -37,12 +37,12 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
         parts += [Text(), _pulses(flight, shown)]
         if len(shown) < len(flight.schedule):
             parts.append(Text(f"{len(shown)} of {len(flight.schedule)} pulses; --json writes all.", style="dim"))
-    parts += [Text(), _ends(impulses, flown, found.until)]
+    parts += [Text(), _ends(impulses, flown, extremes.until)]
     if flight.spacecraft.attitude is None:
         parts.append(Text(f"{FRAME_N}.", style="dim"))
     parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
     parts += [Text(), *requirement(decided), decision_table(decided)]
-    parts += [Text(), _extremes(found, flight)]
+    parts += [Text(), _extremes(extremes, flight)]
     return Group(*parts)
 
 
@@ -61,7 +61,7 @@ def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
 
 
 def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
-    """What both models leave, and where they point, at ``until`` s."""
+    """Residuals and directions of both models at ``until`` s."""
     body = flown.spacecraft
     table = columns(f"at {moment(until)}", "by impulses (17)", "flown, real widths")
     rows = [
@@ -74,30 +74,30 @@ def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
         rows.append(("off the target", "axis_error"))
     both = (impulses, flown)
     for name, key in rows:
-        table.add_row(Text(name, style="dim"), *(degrees(getattr(one.residual, key)) for one in both))
+        table.add_row(Text(name, style="dim"), *(degrees(getattr(end.residual, key)) for end in both))
     for what, key in (("spin axis", "axis"), ("H", "momentum")):
-        angles = (angle_texts(body, getattr(one.final, key)) for one in both)
+        angles = (angle_texts(body, getattr(end.final, key)) for end in both)
         for name, *texts in zip(angle_names(body), *angles, strict=True):
             table.add_row(Text(f"{what}: {name}", style="dim"), *texts)
-    table.add_row(Text("spin", style="dim"), *(quantity(one.final.spin, "rad/s", 6) for one in both))
+    table.add_row(Text("spin", style="dim"), *(quantity(end.final.spin, "rad/s", 6) for end in both))
     return table
 
 
-def _extremes(found: Extremes, flight: Flight) -> Table:
+def _extremes(extremes: Extremes, flight: Flight) -> Table:
     table = facts()
-    far, near = found.farthest, found.nearest
+    far, near = extremes.farthest, extremes.nearest
     table.add_row(
         "spin axis from H(0)", f"{degrees(near[0])} at {moment(near[1])} to {degrees(far[0])} at {moment(far[1])}"
     )
-    table.add_row("spin axis in x, in y", f"{_range(found.x)}, {_range(found.y)} of the inertial frame")
+    table.add_row("spin axis in x, in y", f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame")
     given = flight.spacecraft.attitude
     if given is not None:
         frame = given.frame or "the frame of the file"
-        west, east = map(longitude, found.right_ascension)
+        west, east = map(longitude, extremes.right_ascension)
         table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
-        table.add_row("declination", _range(found.declination))
-    add_aspects(table, aspects(flight, found.until))
-    table.add_row("track", f"{found.rows} rows, 0 to {moment(found.until)}")
+        table.add_row("declination", _range(extremes.declination))
+    add_aspects(table, aspects(flight, extremes.until))
+    table.add_row("track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}")
     return table
 
 

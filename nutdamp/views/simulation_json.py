@@ -1,4 +1,4 @@
-"""What ``simulate --json`` gives."""
+"""Result of ``simulate --json``."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from nutdamp.views.plan_json import aspects_json, final_json, heading, pulses_js
 
 
 def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
-    """Pulses with the cone angles around them, how both models end, and the extremes of the axis track in degrees."""
-    flight, found, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
+    """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
+    flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
     return {
         **heading(flight.spacecraft),
@@ -26,25 +26,25 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
         "flown": residual_json(flown.residual),
         "final": final_json(flown),
         "final_by_impulses": final_json(impulses),
-        "differ": [one.part.value for one in end_state.deviations(impulses, flown)],
+        "differ": [bound.part.value for bound in end_state.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
-        **aspects_json(aspects(flight, found.until)),
+        **aspects_json(aspects(flight, extremes.until)),
         "decision": decision_json(simulation.decision, verdict),
-        "until_s": found.until,
+        "until_s": extremes.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
-            "farthest_from_momentum_deg": math.degrees(found.farthest[0]),
-            "farthest_s": found.farthest[1],
-            "nearest_to_momentum_deg": math.degrees(found.nearest[0]),
-            "nearest_s": found.nearest[1],
-            "x_deg": [math.degrees(value) for value in found.x],
-            "y_deg": [math.degrees(value) for value in found.y],
-            "right_ascension_deg": None if attitude is None else _turns(found.right_ascension),
-            "declination_deg": None if attitude is None else [math.degrees(v) for v in found.declination],
+            "farthest_from_momentum_deg": math.degrees(extremes.farthest[0]),
+            "farthest_s": extremes.farthest[1],
+            "nearest_to_momentum_deg": math.degrees(extremes.nearest[0]),
+            "nearest_s": extremes.nearest[1],
+            "x_deg": [math.degrees(value) for value in extremes.x],
+            "y_deg": [math.degrees(value) for value in extremes.y],
+            "right_ascension_deg": None if attitude is None else _turns(extremes.right_ascension),
+            "declination_deg": None if attitude is None else [math.degrees(v) for v in extremes.declination],
         },
     }
 
 
 def _turns(angles: tuple[float, float]) -> list[float]:
-    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, whatever lies between."""
+    """Western and eastern end of a range of right ascension in degrees from 0 to below 360, for any range between."""
     return [math.degrees(full_turn(angle)) for angle in angles]

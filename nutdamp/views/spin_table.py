@@ -1,6 +1,6 @@
-"""A schedule spin by spin, as operators of spinners count: one row a spin, with what fires in it.
+"""A schedule spin by spin, as operators of spinners count: one row a spin, with its firings.
 
-Where the file has a Sun sensor a spin begins with its pulse, 1 with the first one, as in command blocks; what comes
+Where the file has a Sun sensor a spin begins with its pulse, 1 with the first one, as in command blocks; the time
 before that is spin 0. Else spin 1 begins at t = 0, and each is a turn of the body about axis 3: ∫ω3 dt grows by 2π.
 """
 
@@ -22,10 +22,10 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 HEADER = ("spin", "start_utc", "start_s", "period_s", "pulses", "channel", "phase_deg", "on_time_s")
 
 BETWEEN = "; "
-"""Between the values of several pulses in one spin."""
+"""Separator of the values of several pulses in one spin."""
 
 MOST_SPINS = 100_000
-"""More make no table that anyone reads."""
+"""Largest number of spins: more make no table that anyone reads."""
 
 DIGITS = 9
 """Decimals of seconds and degrees that are written."""
@@ -34,16 +34,16 @@ SAME = 1e-9
 """Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
 
 PIECES = 16
-"""Pieces of each turn over which ω3 is integrated by `velocity_change.LEGENDRE`."""
+"""Pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`."""
 
 NEWTON = 3
-"""Steps by which the end of a turn is found within its piece: the second one is at rounding already."""
+"""Newton steps to the end of a turn within its piece: the second one is at rounding already."""
 
 
 def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last one is whole.
 
-    ``phase_deg`` is how much of its spin is over when a pulse is commanded, ``on_time_s`` the length of the command.
+    ``phase_deg`` is the part of its spin before a pulse is commanded, ``on_time_s`` the length of the command.
     Without an epoch ``start_utc`` is empty. Raises BadRequest for more than `MOST_SPINS`, Infeasible where the sensor
     does not see the Sun.
     """
@@ -53,28 +53,29 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
     starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])
-    for pulse, index in zip(starts, np.searchsorted(begins, [one.loaded[0] for one in starts], "right"), strict=True):
+    for pulse, index in zip(starts, np.searchsorted(begins, [each.loaded[0] for each in starts], "right"), strict=True):
         fired.setdefault(max(int(index) - 1, 0), []).append(pulse)
     rows = []
     spins = pairwise(begins[: int(np.searchsorted(begins, last, "right")) + 1].tolist())
     for index, (begin, end) in enumerate(spins):
         firing = fired.get(index, [])
-        # Spin 0 is what is left of a spin: it ends a whole period after it began.
+        # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
         phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
-        several = ([one.channel for one in firing], map(_number, phases), (_number(one.loaded[1]) for one in firing))
+        on_times = (_number(each.loaded[1]) for each in firing)
+        several = ([each.channel for each in firing], map(_number, phases), on_times)
         times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
         rows.append([str(first + index), *times, *map(BETWEEN.join, several)])
     return csv_text(HEADER, rows)
 
 
 def _number(value: float) -> str:
-    """Seconds or degrees without the rounding of what they were found by."""
+    """Seconds or degrees without the rounding of the search."""
     return number(round(value, DIGITS))
 
 
 def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:
-    """The number of the first spin, and when it and those after it begin, s: to after ``last``, and three at least."""
+    """Number of the first spin, and begins of it and those after it, s: to after ``last``, and three at least."""
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
     turn = spin_turn(body)
@@ -82,9 +83,9 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
     for _ in range(2):  # where the spin falls, turns get longer
         flown = propagation.flown(body, schedule, until)
         if body.sun is not None and body.sun_sensor is not None:
-            found = sun_pulses(flown, until)
-            at_once = len(found) > 0 and found[0] < SAME * turn
-            first, begins = (1, found) if at_once else (0, np.append(0.0, found))
+            times = sun_pulses(flown, until)
+            at_once = len(times) > 0 and times[0] < SAME * turn
+            first, begins = (1, times) if at_once else (0, np.append(0.0, times))
         else:
             first, begins = 1, _turns(flown, until)
         if len(begins) > 2 and begins[-1] > last:
@@ -94,7 +95,7 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
 
 
 def _turns(flown: Flight, until: float) -> Vector:
-    """When the body has turned by 0, 1, 2, … turns about axis 3, up to ``until`` s, (n,); none after the spin ends."""
+    """Times of 0, 1, 2, … turns of the body about axis 3, up to ``until`` s, (n,); none after the spin ends."""
     spin = abs(flown.spacecraft.spin)
     edges = [np.array([0.0])]
     for leg in flown.legs:
@@ -110,10 +111,10 @@ def _turns(flown: Flight, until: float) -> Vector:
     whole = 2.0 * math.pi * np.arange(math.floor(total[-1] / (2.0 * math.pi)) + 1)
     piece = np.clip(np.searchsorted(total, whole, "right") - 1, 0, len(gained) - 1)
     begin, length = times[piece], np.diff(times)[piece]
-    found = begin + length * (whole - total[piece]) / gained[piece]
+    ends = begin + length * (whole - total[piece]) / gained[piece]
     for _ in range(NEWTON):
-        found += (whole - total[piece] - _turned(flown, begin, found)) * length / gained[piece]
-    return np.asarray(found)
+        ends += (whole - total[piece] - _turned(flown, begin, ends)) * length / gained[piece]
+    return np.asarray(ends)
 
 
 def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:

@@ -1,4 +1,4 @@
-"""What the actuators can do, before any plan: steps of each channel, and how well two of them suit a pair."""
+"""Capability of the actuators before any plan: steps of each channel, and best pair for two pulses."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Disturbance, Spacecraft
 
 SHORTEST, GRID = 1e-6, 600
-"""Part of the longest on-time from which on, and number of on-times among which, the largest step is looked for."""
+"""Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
 
 
 DIGITS = 9
-"""Of misses in rad, those that are no rounding: among equals the pair that is named first."""
+"""Digits of misses in rad that are no rounding: among equals the pair that is named first."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelSteps:
     """A channel and the nutation angles (rad) that its pulses take out or put in.
 
-    ``smallest`` is that of the shortest on-time that can be commanded, `limits.shortest_on_time`, and is 0 without any;
-    ``largest`` the most of on-times up to `limits.longest_useful`, a right angle where nothing bounds it.
+    ``smallest`` is that of the shortest on-time to be commanded, `constraints.shortest_on_time`, and is 0 without any;
+    ``largest`` the most of on-times up to `constraints.longest_useful`, a right angle where nothing bounds it.
     """
 
     channel: Channel
@@ -49,7 +49,7 @@ class ChannelSteps:
 class SunPhases:
     """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
 
-    ``first`` is None where there is none, and ``refusal`` then says why.
+    ``first`` is None where there is none, and ``refusal`` is then the reason.
     """
 
     turn: float
@@ -58,7 +58,7 @@ class SunPhases:
 
 
 def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
-    """When Sun pulses come; None where the file says nothing of Sun and sensor."""
+    """The Sun pulses; None where the file has no Sun or no sensor."""
     if spacecraft.sun is None or spacecraft.sun_sensor is None:
         return None
     turn = block_model.spin_turn(spacecraft)
@@ -70,7 +70,7 @@ def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """By how much one pulse of a command block turns H at the spin of t = 0: least and most, rad, of which width, s."""
+    """Turn of H by one pulse of a command block at the spin of t = 0: least and most, rad, and their widths, s."""
 
     channel: Channel
     smallest: float
@@ -80,8 +80,8 @@ class Turns:
 
 
 def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
-    """Of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
-    found, commands, spin = [], spacecraft.commands, spacecraft.spin
+    """Turns of each channel that blocks can fire, in the order of the file; nothing where the file has no commands."""
+    steps, commands, spin = [], spacecraft.commands, spacecraft.spin
     for channel in () if commands is None else usable(spacecraft):
         assert commands is not None
         widths = commandable_widths(commands, channel)
@@ -90,13 +90,13 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
             each = precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
             least, most = int(np.argmin(each)), int(np.argmax(each))
             ends = (float(value[at]) for at in (least, most) for value in (each, widths))
-            found.append(Turns(channel, *ends))
-    return tuple(found)
+            steps.append(Turns(channel, *ends))
+    return tuple(steps)
 
 
 @dataclass(frozen=True, slots=True)
 class PairFit:
-    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is how far the second is off the direction needed."""
+    """Two channels for Magnus' two pulses at once: ``miss`` (rad) is the error of direction of the second."""
 
     first: Channel
     second: Channel
@@ -117,7 +117,7 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """What a command of ``on_time`` s gives: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
+    """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
 
     The centroid counts from the start of the command.
     """
@@ -130,8 +130,8 @@ class Acting:
 
 
 def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
-    """What the shortest and the longest command of each channel give, of those that have valves."""
-    found = []
+    """Pulses of the shortest and the longest command of each channel, of those that have valves."""
+    pulses = []
     for channel in spacecraft.channels:
         if channel.valve is None:
             continue
@@ -139,12 +139,12 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
             if 0.0 < on_time < math.inf:
                 thrust = channel.valve.thrust(on_time)
                 impulse = channel.strength * thrust.on_time
-                found.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
-    return tuple(found)
+                pulses.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
+    return tuple(pulses)
 
 
 def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
-    """Those among which the largest step is, s: the longest, but where the spin changes during the pulse."""
+    """On-times that include that of the largest step, s: the longest, but where the spin changes during the pulse."""
     if channel.axial == 0.0 or math.isinf(longest) or not 0.0 < longest > shortest:
         return [longest]
     return [*np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist(), longest]
@@ -159,7 +159,7 @@ def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
 
 
 def mounting_angle(spacecraft: Spacecraft) -> float:
-    """`damping.mounting_angle` of the spacecraft, rad."""
+    """`body.mounting_angle` of the spacecraft, rad."""
     inertia = spacecraft.inertia
     return rigid_body.mounting_angle(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
 
@@ -185,7 +185,7 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """What one disturbance does in the long run.
+    """Effect of one disturbance in the long run.
 
     ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
     ``tilt`` (rad) the angle between H and the spin axis that goes with it, Magnus 1970 (13)/(14).
@@ -212,36 +212,36 @@ RESONANT = 3.0
 
 
 def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
-    """What each disturbance does, in the order of the file."""
+    """Effect of each disturbance, in the order of the file."""
     return tuple(_consequence(spacecraft, disturbance) for disturbance in spacecraft.disturbances)
 
 
-def _consequence(spacecraft: Spacecraft, one: Disturbance) -> Consequence:
+def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequence:
     inertia, spin = spacecraft.inertia, spacecraft.spin
     A, C = inertia.A, inertia.C
-    spin_rate = one.axial / C
-    if one.transverse == 0.0:
-        return Consequence(one, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
-    largest, period = response.beat(A, C, spin, one.transverse, one.rate)
+    spin_rate = disturbance.axial / C
+    if disturbance.transverse == 0.0:
+        return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
+    largest, period = response.beat(A, C, spin, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
     if period > RESONANT * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
-            (mark, response.resonant_time(A, C, omega0, spin, one.transverse, mark))
+            (mark, response.resonant_time(A, C, omega0, spin, disturbance.transverse, mark))
             for mark in MARKS
             if mark > spacecraft.nutation
         )
-        return Consequence(one, None, None, None, period, times, spin_rate)
-    steady = abs(response.steady_response(A, C, spin, one.transverse, one.rate))
+        return Consequence(disturbance, None, None, None, period, times, spin_rate)
+    steady = abs(response.steady_response(A, C, spin, disturbance.transverse, disturbance.rate))
     tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
-    return Consequence(one, steady, float(tilt), float(swell), period, (), spin_rate)
+    return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
 
 
 @dataclass(frozen=True, slots=True)
 class SpinAxis:
-    """Axis 3 as nature sees it.
+    """Principal axis 3 of inertia.
 
-    ``kind`` of `stability.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `stability.growth`; ``tilt``
+    ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt``
     (rad) of the principal axis against the third axis of the file (wobble); ``rates`` of the nutation in the body, the
     despun frame and inertially, K(7), K(10), K(13), rad/s.
     """

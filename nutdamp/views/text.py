@@ -19,11 +19,11 @@ LONG = (
     ("days", 86_400.0, 63_115_200.0),
     ("years", 31_557_600.0, math.inf),
 )
-"""Units of long times: their length, s, and up to which time, s, they are used."""
+"""Units of long times: their length, s, and the time, s, up to which they are used."""
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """A number with its unit; what is not known or infinite says so."""
+    """A number with its unit, or the word for an unknown or infinite one."""
     if value is None or math.isnan(value):
         return MISSING
     if math.isinf(value):
@@ -44,7 +44,7 @@ def sentence(clause: str) -> str:
 
 
 def degrees(angle: float | None) -> str:
-    """An angle given in rad, in degrees; what is below 1e-9 deg is rounding and shown as such."""
+    """An angle given in rad, in degrees; one below 1e-9 deg is rounding and shown as such."""
     if angle is None or math.isnan(angle):
         return MISSING
     shown = math.degrees(angle)
@@ -61,7 +61,7 @@ def in_degrees(angle: float | None) -> str:
 
 
 def most(angle: float) -> str:
-    """The most that an angle may be, given in rad, in degrees: as it was given, however small."""
+    """The bound of an angle, given in rad, in degrees: as it was given, however small."""
     return f"{math.degrees(angle):.4g} deg"
 
 
@@ -94,7 +94,7 @@ def lasting(value: float | None) -> str:
     """A time given in s that may be long: in s, hours, days or years."""
     if value is None or not math.isfinite(value):
         return quantity(value, "s")
-    unit, size = next(one for one in LONG if value < one[2])[:2]
+    unit, size = next(row for row in LONG if value < row[2])[:2]
     return quantity(value / size, unit)
 
 
@@ -104,7 +104,7 @@ def moment(value: float) -> str:
 
 
 def vector(components: Iterable[float]) -> str:
-    """Components in brackets, without what is rounding."""
+    """Components in brackets, with rounding as 0."""
     return "(" + ", ".join(f"{part:.4g}" for part in cleaned(list(components)).tolist()) + ")"
 
 
@@ -114,7 +114,7 @@ def pointing(angle: float | None) -> str:
 
 
 def longitude(angle: float | None) -> str:
-    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; what is at the pole has none."""
+    """A right ascension or azimuth given in rad, in degrees from 0 to below 360; a direction at the pole has none."""
     return MISSING if angle is None else f"{fixed(math.degrees(angle) % 360.0, 4, 360.0)} deg"
 
 
@@ -124,6 +124,6 @@ def steering(impulse: Sequence[float]) -> str:
 
 
 def fixed(value: float, digits: int, period: float = math.inf) -> str:
-    """A number with so many decimals, without -0; what rounds up to ``period`` is 0."""
+    """A number with so many decimals, without -0; one that rounds up to ``period`` is 0."""
     rounded = round(value, digits)
     return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"

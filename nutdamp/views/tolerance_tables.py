@@ -1,4 +1,4 @@
-"""Tolerances in words, and the tolerance budget: what each input does alone, and its share of what varies."""
+"""Tolerances in words, and the tolerance budget: effect of each input alone, and its share of the variance."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ SHOWN = {
     "s": ("ms", 1e3),
     "Pa": ("bar", 1e-5),
 }
-"""Units that people read for those of inputs, and the factor."""
+"""Units for people of those of inputs, and the factor."""
 
 MOST_ROWS = 12
-"""Inputs that the budget names; the rest is summed up."""
+"""Largest number of inputs that the budget names; the rest is summed up."""
 
 TINY = 1e-300
 
 ROUNDING = 1e-12
-"""rad; what varies by less does not vary."""
+"""rad; a smaller variation is rounding."""
 
 
 class BudgetRow(NamedTuple):
     """A line of the tolerance budget: one input, or those that are left together.
 
-    ``size``: one sigma or the bias as text; ``effects``: what it alone does to the two `budgeted_outputs`, rad, or the
-    root mean square of what correlated inputs do together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
+    ``size``: one sigma or the bias as text; ``effects``: those of it alone on the two `budgeted_outputs`, rad, or the
+    root mean square of those of correlated inputs together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
     it varies.
     """
 
@@ -75,7 +75,7 @@ def budget_rows(study: Study) -> list[BudgetRow]:
 
 
 def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
-    """What an input does alone, or what correlated ones do together (root mean square)."""
+    """Effect of an input alone, or of correlated ones together (root mean square)."""
     if len(rows) == 1:
         return float(first.effects(output)[rows[0]])
     return float(np.linalg.norm(first.independent(output)[:, rows]))
@@ -83,7 +83,7 @@ def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
 
 def _named(entries: list[Input]) -> tuple[str, str]:
     """Name and size of an input, or of correlated ones."""
-    name, size = (", ".join(map(text, entries)) for text in (lambda one: in_words(one.name), size_text))
+    name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
     return (f"{name} (correlated)" if len(entries) > 1 else name), size
 
 
@@ -107,7 +107,7 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
         table.add_row(Text(name, style="dim"), size, *cells)
     remainder = [
-        1.0 - math.fsum(found[output] for found in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
+        1.0 - math.fsum(fractions[output] for fractions in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
         for output, _ in budgeted
     ]
     texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
@@ -134,7 +134,7 @@ def _dominating(results: Results) -> list[RenderableType]:
             entries = [first.inputs[row] for row in rows]
             key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
             sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        ranked = sorted(sums.items(), key=lambda one: -one[1])
+        ranked = sorted(sums.items(), key=lambda item: -item[1])
         leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
         leading = leading or [ranked[0][0]]
         verb = "dominates" if len(leading) == 1 else "dominate"
@@ -156,7 +156,7 @@ def in_words(name: str) -> str:
 
 
 def size_text(entry: Input) -> str:
-    """One sigma, or the bias, as the file might have it."""
+    """One sigma, or the bias, in the form of the file."""
     if entry.unit == "":
         return of_nominal(entry, entry.sigma or entry.size, ".3g")
     unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
@@ -180,6 +180,6 @@ def of_nominal(entry: Input, value: float, form: str) -> str:
 
 
 def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The outputs of the tolerance budget, and what people call them."""
+    """The outputs of the tolerance budget, and their names for people."""
     first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
     return (first.value, first.label), (second.value, second.label)

@@ -30,9 +30,9 @@ HEADER = (
 )
 
 
-def trade_csv(found: Sequence[Front]) -> str:
+def trade_csv(fronts: Sequence[Front]) -> str:
     """One row a point; a shift allowed of any size is empty."""
-    return csv_text(HEADER, (_row(index, front, point) for index, front, point in numbered(found)))
+    return csv_text(HEADER, (_row(index, front, point) for index, front, point in numbered(fronts)))
 
 
 def _row(index: int, front: Front, point: Point) -> list[str]:
@@ -52,27 +52,27 @@ def _row(index: int, front: Front, point: Point) -> list[str]:
     ]
 
 
-def trade_json(spacecraft: Spacecraft, found: Sequence[Front]) -> dict[str, Any]:
-    """All fronts with their plans, as ``plan --json`` gives them."""
-    numbers: dict[int, list[dict[str, Any]]] = {id(front): [] for front in found}
-    for index, front, point in numbered(found):
+def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
+    """All fronts with their plans, in the form of ``plan --json``."""
+    numbers: dict[int, list[dict[str, Any]]] = {id(front): [] for front in fronts}
+    for index, front, point in numbered(fronts):
         numbers[id(front)].append({"point": index, "horizon_s": point.horizon, **plan_json(point.plan)})
     return {
         **heading(spacecraft),
         "fronts": [
             {"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": numbers[id(front)]}
-            for front in found
+            for front in fronts
         ],
     }
 
 
-def schedule_files(found: Sequence[Front], folder: str) -> list[tuple[str, str]]:
+def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    points = list(numbered(found))
+    points = list(numbered(fronts))
     paths = schedule_paths(folder, len(points))
     return [(path, pulses_csv(point.plan.flight)) for path, (_, _, point) in zip(paths, points, strict=True)]
 
 
 def schedule_paths(folder: str, count: int) -> list[str]:
-    """Where the pulses of ``count`` points go."""
+    """Paths of the files of pulses of ``count`` points."""
     return [str(Path(folder) / f"point-{index}.csv") for index in range(1, count + 1)]

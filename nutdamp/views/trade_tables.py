@@ -23,26 +23,26 @@ from nutdamp.views.text import cost, degrees, duration, moment
 from nutdamp.views.verdicts import FARTHER
 
 
-def trade_screen(spacecraft: Spacecraft, found: Sequence[Front]) -> RenderableType:
-    """Everything that ``trade`` shows."""
-    return Group(header(spacecraft), *front_parts(spacecraft, found))
+def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
+    """All tables of ``trade``."""
+    return Group(header(spacecraft), *front_parts(spacecraft, fronts))
 
 
-def front_parts(spacecraft: Spacecraft, found: Sequence[Front]) -> list[RenderableType]:
+def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
     """The table of each front under its name."""
     parts: list[RenderableType] = []
-    pointing, by_others = spacecraft.goal.axis is not None, schemes_of(found) != [OPTIMAL.name]
-    for front in found:
+    pointing, by_others = spacecraft.goal.axis is not None, schemes_of(fronts) != [OPTIMAL.name]
+    for front in fronts:
         parts += [Text(), Text(front_name(front, pointing=pointing), style="bold")]
         if front.why is not None:
             parts.append(Text(_without_optimal(front)))
         if front.points:
-            parts.append(_table(found, front, by_others=by_others))
-    if any(_below(front, point) for _, front, point in numbered(found)):
+            parts.append(_table(fronts, front, by_others=by_others))
+    if any(_below(front, point) for _, front, point in numbered(fronts)):
         parts += [Text(), Text(BELOW, style="dim")]
-    if any(_off(front, point) for front in found for point in front.points):
+    if any(_off(front, point) for front in fronts for point in front.points):
         parts += [Text(), Text(OFF, style="dim")]
-    if any(fails(point) for _, _, point in numbered(found)):
+    if any(fails(point) for _, _, point in numbered(fronts)):
         parts += [Text(), Text(f"{NOT} {FAILS}")]
     return parts
 
@@ -51,32 +51,32 @@ BELOW = (
     "The first-order least holds for small angles and for plans that leave no nutation: where a cost is below it, the "
     "plan leaves a little, or its flight at larger angles needs less than first order says."
 )
-"""Of points that cost less than their first-order least."""
+"""Note on points that cost less than their first-order least."""
 
 
 def _off(front: Front, point: Point) -> bool:
-    """Whether H ends visibly beside where a front has it."""
+    """True where H ends visibly beside its target of the front."""
     return front.shift == 0.0 and point.plan.flight.residual.axis_error > DAMPED_ANGLE
 
 
 OFF = (
     "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
 )
-"""Of points whose H ends a little beside where it is to end."""
+"""Note on points whose H ends a little beside its target."""
 
 
 def _below(front: Front, point: Point) -> bool:
-    """Whether it costs less than its first-order least, as the table writes both."""
+    """True where it costs less than its first-order least, as the table writes both."""
     least = front.least(point)
     return least is not None and point.cost < least and cost(point.cost, point.unit) != cost(least, point.unit)
 
 
 FAILS = "does not meet the requirement with nominal values"
-"""Of points that `fails` tells."""
+"""Note on points that do not meet the requirement of the file, or break a cone."""
 
 
 def fails(point: Point) -> bool:
-    """Whether it does not meet the requirement of the file, or breaks a cone."""
+    """True where it does not meet the requirement of the file, or breaks a cone."""
     return point.plan.meets_requirement is False
 
 
@@ -85,7 +85,7 @@ TOGETHER = 1e-3
 
 
 class _Better(NamedTuple):
-    """A point better than the recommended plan: by what share of the cost, and by how many s it ends earlier.
+    """A point better than the recommended plan: share of the cost saved, and s by which it ends earlier.
 
     ``only``: it meets the requirement, and the recommended plan does not.
     """
@@ -99,7 +99,7 @@ class _Better(NamedTuple):
 
     @property
     def how(self) -> str:
-        """What it is better in."""
+        """Words for its advantage."""
         if self.only:
             return "meets the requirement with nominal values, which the recommended plan does not"
         if self.saved:
@@ -108,7 +108,7 @@ class _Better(NamedTuple):
         return f"costs as much as the recommended plan and ends {duration(self.earlier)} earlier"
 
 
-def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
+def _better(fronts: Sequence[Front], chosen: Plan) -> _Better | None:
     """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
 
     Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
@@ -119,27 +119,27 @@ def _better(found: Sequence[Front], chosen: Plan) -> _Better | None:
         _Better(
             saved if misses or saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point, misses
         )
-        for index, front, point in numbered(found)
+        for index, front, point in numbered(fronts)
         if point.plan.meets_requirement
         for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
         if misses or (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
     ]
-    return max(better, key=lambda one: one[:2], default=None)
+    return max(better, key=lambda entry: entry[:2], default=None)
 
 
-def outdone(found: Sequence[Front], chosen: Plan) -> str:
-    """That a schedule of the fronts is better than the ``chosen`` one, for a headline; or nothing."""
-    better = _better(found, chosen)
+def outdone(fronts: Sequence[Front], chosen: Plan) -> str:
+    """Headline that a schedule of the fronts is better than the ``chosen`` one; or nothing."""
+    better = _better(fronts, chosen)
     return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
 
 
-def beats(found: Sequence[Front], chosen: Plan) -> str:
-    """Which schedule of the fronts is better than the ``chosen`` one, with the command that plans it; or nothing."""
-    better = _better(found, chosen)
+def beats(fronts: Sequence[Front], chosen: Plan) -> str:
+    """The schedule of a front that is better than the ``chosen`` one, with its command, in a sentence; or nothing."""
+    better = _better(fronts, chosen)
     if better is None:
         return ""
     front, point = better.front, better.point
-    off = [one.flight.residual.axis_error for one in (point.plan, chosen)]
+    off = [plan.flight.residual.axis_error for plan in (point.plan, chosen)]
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     within = f'--set "limits.horizon={point.horizon:.6g} s"'
     pointing = chosen.spacecraft.goal.axis is not None
@@ -147,7 +147,7 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
     asides = []
     if abs(off[0] - off[1]) > SAME_ANGLE:
         asides.append(f"{where.format(degrees(off[0]))} instead of {degrees(off[1])}")
-    counts = [len(one.pulses) for one in (point.plan, chosen)]
+    counts = [len(plan.pulses) for plan in (point.plan, chosen)]
     if counts[0] != counts[1]:
         asides.append(f"takes {counts[0]} pulse{'s' * (counts[0] != 1)} instead of {counts[1]}")
     aside = f"; it {listed(asides)}" * bool(asides)
@@ -158,21 +158,21 @@ def beats(found: Sequence[Front], chosen: Plan) -> str:
     )
 
 
-def apart(found: Sequence[Front], chosen: Plan) -> str:
-    """Why the ``chosen`` plan may cost less than the schedules that are traded: it is of another scheme; or nothing."""
+def apart(fronts: Sequence[Front], chosen: Plan) -> str:
+    """The reason why the ``chosen`` plan may cost less than the schedules traded, by another scheme; or nothing."""
     points = {
         number: point
-        for number, _, point in numbered(found)
+        for number, _, point in numbered(fronts)
         if point.plan.pulses.end <= chosen.pulses.end and not fails(point)
     }
     if not points:
         return ""
-    number, nearest = min(points.items(), key=lambda one: one[1].cost)
+    number, nearest = min(points.items(), key=lambda item: item[1].cost)
     spent, cheapest = chosen.pulses.cost_in(nearest.unit), nearest.cost
     if spent >= cheapest * (1.0 - SAME_COST):
         alike = spent < cheapest and cost(spent, nearest.unit) != cost(cheapest, nearest.unit)
         return ALIKE * alike
-    if chosen.scheme in schemes_of(found):
+    if chosen.scheme in schemes_of(fronts):
         return ""
     reasons = []
     if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
@@ -193,12 +193,12 @@ def apart(found: Sequence[Front], chosen: Plan) -> str:
 ALIKE = (
     "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
 )
-"""Of a plan that costs as little less than the points as does not count."""
+"""Share of the cost by which a plan may be cheaper than the points and still count as equal."""
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
-    """Whether a plan that saves that share of the cost, about none, ends clearly sooner and leaves H about as near."""
-    shifts = [one.flight.residual.axis_error for one in (plan, chosen)]
+    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H about as near."""
+    shifts = [flown.flight.residual.axis_error for flown in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
@@ -207,14 +207,14 @@ SOONER = 0.05
 """Share of its time by which a plan that costs as much has to end sooner to be worth a remark."""
 
 
-def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
+def _table(fronts: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
     """A row for each point; ``by_others``: with its scheme."""
     names = ("ends at", "cost", "first-order least", "pulses", "shift of H")
-    first = next(index for index, owner, _ in numbered(found) if owner is front)
+    first = next(index for index, owner, _ in numbered(fronts) if owner is front)
     schemes = ("scheme",) * by_others
     table = columns("point", *names, f"against point {first}", *schemes, text=("scheme",))
     dearest = front.points[0].cost
-    for index, owner, point in numbered(found):
+    for index, owner, point in numbered(fronts):
         if owner is front:
             spent, least = (cost(value, point.unit) for value in (point.cost, front.least(point)))
             plan, more = point.plan, round(100.0 * (point.cost / dearest - 1.0), 1) + 0.0  # no negative zero
@@ -225,27 +225,27 @@ def _table(found: Sequence[Front], front: Front, *, by_others: bool) -> Renderab
 
 
 def _without_optimal(front: Front) -> str:
-    """Why a front has no points, or none of the scheme optimal."""
+    """The reason why a front has no points, or none of the scheme optimal."""
     return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
 
 
-def missing(spacecraft: Spacecraft, found: Sequence[Front]) -> list[str]:
-    """What a picture of the fronts does not show, and why: a sentence for each reason."""
+def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[str]:
+    """Sentences on fronts and points that a picture lacks, with the reasons."""
     pointing = spacecraft.goal.axis is not None
     fronts: dict[str, list[str]] = {}
-    for one in found:
-        if one.why is not None:
-            fronts.setdefault(_without_optimal(one), []).append(front_name(one, pointing=pointing))
+    for entry in traded:
+        if entry.why is not None:
+            fronts.setdefault(_without_optimal(entry), []).append(front_name(entry, pointing=pointing))
     return [f"{', '.join(names)} \N{EN DASH} {reason}" for reason, names in fronts.items()]
 
 
-def schemes_of(found: Sequence[Front]) -> list[str]:
+def schemes_of(fronts: Sequence[Front]) -> list[str]:
     """Schemes of all points, by name; optimal where there are none."""
-    return sorted({point.plan.scheme for _, _, point in numbered(found)}) or [OPTIMAL.name]
+    return sorted({point.plan.scheme for _, _, point in numbered(fronts)}) or [OPTIMAL.name]
 
 
 def front_name(front: Front, *, pointing: bool) -> str:
-    """What is required of H, in words."""
+    """The requirement on H, in words."""
     if math.isinf(front.shift):
         return "H may end anywhere"
     if front.shift == 0.0:

@@ -1,6 +1,6 @@
-"""Verdicts in words: which plan is recommended and why, what is not met, what prevents it, how many cases comply.
+"""Verdicts in words: recommended plan and reason, requirements missed and their causes, share of cases that comply.
 
-The floors below give data; all sentences about them are here, so that every screen and page says the same.
+The floors below give data; all sentences about them are here, so that every screen and page agrees.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.text import MISSING, RPM, degrees, duration, mass, moment, most, quantity, sentence
 
 VERDICT = {True: "met", False: "NOT met", None: MISSING}
-"""What `Plan.meets_requirement` says of the requirement."""
+"""Words for the values of `Plan.meets_requirement`."""
 
 
 def no_plan(plan: Plan) -> str:
-    """What is printed in the column of a scheme that has no plan."""
+    """Text in the column of a scheme that has no plan."""
     if plan.failure is None:
         without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
         return "no thrusters" if without else "infeasible"
@@ -34,7 +34,7 @@ def no_plan(plan: Plan) -> str:
 
 
 def needless(compared: Comparison) -> str | None:
-    """That nothing has to be done, where that is so."""
+    """Sentence that nothing has to be done, where that is so."""
     body = compared.spacecraft
     if not compared.needless:
         return None
@@ -51,28 +51,28 @@ def needless(compared: Comparison) -> str | None:
     else:
         verdict = f"already count{count} as damped"
     lasting = f", up to the horizon of {duration(body.horizon)} too" if body.growth > 0.0 else ""
-    plans = "; the plans below reduce it further" if any(len(one.pulses) for one in compared.plans) else ""
+    plans = "; the plans below reduce it further" if any(len(plan.pulses) for plan in compared.plans) else ""
     return f"{' and '.join(there)} {verdict}{lasting}{plans}"
 
 
 def reason(compared: Comparison) -> str:
-    """Why the recommended plan, or none."""
-    found, body = compared.recommendation, compared.spacecraft
-    if found.plan is None and any(one.feasible for one in compared.plans):
+    """The reason for the recommended plan, or for none."""
+    recommendation, body = compared.recommendation, compared.spacecraft
+    if recommendation.plan is None and any(entry.feasible for entry in compared.plans):
         return "no plan can be sent as command blocks; with --timed pulses are timed one by one"
-    if found.plan is None:
-        untried = _optimal_untried(compared) and (body.goal.spin is None or any(one.axial for one in body.channels))
+    if recommendation.plan is None:
+        untried = _optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels))
         damped = requirements.subsides(body) if requirements.only_nutation(body) else None
         idle = "" if damped is None else f"; without a pulse the requirement is met from {quantity(damped, 's')} on"
         return f"no scheme is feasible{'; --scheme optimal was not compared' * untried}{idle}"
-    if found.ground is Ground.ONLY:
+    if recommendation.ground is Ground.ONLY:
         return _only(compared)
-    cones = " and keep the cones" * bool(found.plan.kept)
-    cost = "propellant" if found.by_propellant else "impulse"
-    if found.ground is Ground.CASES:
-        return f"most cases comply of the {found.count} feasible plans{cones.replace(' and', ' that')}"
-    if found.standing is Standing.COMPLIES:
-        among = f"of the {found.count} plans that {_those(body, found.plan)}{cones}"
+    cones = " and keep the cones" * bool(recommendation.plan.kept)
+    cost = "propellant" if recommendation.by_propellant else "impulse"
+    if recommendation.ground is Ground.CASES:
+        return f"most cases comply of the {recommendation.count} feasible plans{cones.replace(' and', ' that')}"
+    if recommendation.standing is Standing.COMPLIES:
+        among = f"of the {recommendation.count} plans that {_those(body, recommendation.plan)}{cones}"
         least, equal = f"least {cost} {among}", "; of those that cost as much within 0.1 %"
         then = {
             Ground.PULSES: f"{equal}, fewest pulses",
@@ -80,16 +80,16 @@ def reason(compared: Comparison) -> str:
             Ground.SHIFT: f"{equal}, least shift of H",
             Ground.END: f"{equal}, it ends first",
         }
-        return f"{least}{then.get(found.ground or Ground.COST, '')}"
-    meeting = found.standing is Standing.MEETS
+        return f"{least}{then.get(recommendation.ground or Ground.COST, '')}"
+    meeting = recommendation.standing is Standing.MEETS
     those = (
-        f"plans that {_meeting(found.plan, 'meet')}{cones}"
+        f"plans that {_meeting(recommendation.plan, 'meet')}{cones}"
         if meeting
         else f"feasible plans{cones.replace(' and', ' that')}"
     )
-    among = f"of the {found.count} {those}"
+    among = f"of the {recommendation.count} {those}"
     least = "leaves the least residual nutation" if body.goal.axis is None else "comes nearest to the target"
-    if found.ground is Ground.NEAREST:
+    if recommendation.ground is Ground.NEAREST:
         return f"comes nearest to the requirement {among}" if requirements.required(body) else f"{least} {among}"
     least_cost = f", within {degrees(requirements.DAMPED_ANGLE)}; of these least {cost}"
     then = {
@@ -99,26 +99,26 @@ def reason(compared: Comparison) -> str:
         Ground.SHIFT: f"{least_cost}, then least shift of H",
         Ground.END: f"{least_cost}, then it ends first",
     }
-    return f"{least} {among}{then.get(found.ground or Ground.LEFT, '')}"
+    return f"{least} {among}{then.get(recommendation.ground or Ground.LEFT, '')}"
 
 
 def _only(compared: Comparison) -> str:
-    """Why a plan that had no rival of its standing."""
-    found, body = compared.recommendation, compared.spacecraft
+    """The reason for a plan that had no rival of its standing."""
+    recommendation, body = compared.recommendation, compared.spacecraft
     verdict = {
-        Standing.COMPLIES: _those(body, found.plan, plural=False),
-        Standing.MEETS: _meeting(found.plan, "meets"),
+        Standing.COMPLIES: _those(body, recommendation.plan, plural=False),
+        Standing.MEETS: _meeting(recommendation.plan, "meets"),
         Standing.MISSES: "",
-    }[found.standing or Standing.MISSES]
+    }[recommendation.standing or Standing.MISSES]
     if len(compared.plans) == 1:
         return f"the scheme named{f'; it {verdict}' * bool(verdict)}"
-    cones = "keeps the cones" if found.plan is not None and found.plan.kept else ""
-    said = " and ".join(filter(None, ("can be commanded" * compared.restricted, verdict, cones)))
-    return f"the only {'' if verdict else 'feasible '}plan{f' that {said}' * bool(said)}"
+    cones = "keeps the cones" if recommendation.plan is not None and recommendation.plan.kept else ""
+    merits = " and ".join(filter(None, ("can be commanded" * compared.restricted, verdict, cones)))
+    return f"the only {'' if verdict else 'feasible '}plan{f' that {merits}' * bool(merits)}"
 
 
 def _those(body: Spacecraft, chosen: Plan | None = None, *, plural: bool = True) -> str:
-    """What the plans do that comply, of which one was ``chosen``."""
+    """The common merit of the plans that comply, of which one was ``chosen``."""
     if requirements.required(body):
         return _meeting(chosen, f"meet{'s' * (not plural)}")
     if body.goal.axis is None:
@@ -127,43 +127,43 @@ def _those(body: Spacecraft, chosen: Plan | None = None, *, plural: bool = True)
 
 
 def _meeting(chosen: Plan | None, verb: str) -> str:
-    """That plans meet the requirement; at the end alone, where the one ``chosen`` breaks a cone on the way."""
+    """Words for plans that meet the requirement; at the end alone, where the ``chosen`` one breaks a cone before."""
     return f"{verb} the requirement{' at the end' * (chosen is not None and chosen.kept is False)}"
 
 
 def warnings(compared: Comparison, *, beside_verdict: bool = False) -> tuple[str, ...]:
-    """What the recommended plan does not reach, and what prevents it; nothing for one that complies.
+    """Requirements that the recommended plan misses, and the causes; nothing for a plan that complies.
 
-    Then the cones that the spin axis breaks; ``beside_verdict``: of these only which plans keep them, since the verdict
-    says the rest.
+    Then the cones that the spin axis breaks; ``beside_verdict``: only the plans that keep them, since the verdict says
+    the rest.
     """
-    found = compared.recommendation
-    if found.plan is None:
+    recommendation = compared.recommendation
+    if recommendation.plan is None:
         return ()
-    return (*_missed(found.plan, compared), *_cones_broken(found.plan, compared, beside_verdict))
+    return (*_missed(recommendation.plan, compared), *_cones_broken(recommendation.plan, compared, beside_verdict))
 
 
 def _cones_broken(chosen: Plan, compared: Comparison, beside_verdict: bool) -> Iterator[str]:
-    """The cones that the spin axis does not keep with the recommended plan, and which plans do."""
-    keeping = [one.scheme for one in compared.plans if one.feasible and one.kept]
+    """The cones that the spin axis breaks with the recommended plan, and the plans that keep them."""
+    keeping = [entry.scheme for entry in compared.plans if entry.feasible and entry.kept]
     if beside_verdict:
         yield from [sentence(f"plans that keep all cones: {listed(keeping) or 'none'}")] * (chosen.kept is False)
         return
     those = f"{listed(keeping)} keep{'s' * (len(keeping) == 1)} all cones" if keeping else "no plan compared keeps it"
-    yield from (sentence(f"{strays(one)}; {those}") for one in chosen.aspects if not one.kept)
+    yield from (sentence(f"{strays(entry)}; {those}") for entry in chosen.aspects if not entry.kept)
 
 
 def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
-    """What the recommended plan does not reach, and what prevents it."""
-    found, body = compared.recommendation, compared.spacecraft
-    if found.standing is Standing.COMPLIES:
+    """Requirements that the recommended plan misses, and the causes."""
+    recommendation, body = compared.recommendation, compared.spacecraft
+    if recommendation.standing is Standing.COMPLIES:
         return
     share = compared.shares.get(chosen)
     if share is not None and not share.met and chosen.standing is not Standing.MISSES:
         if chosen.kept is not False:  # else the cones are the reason
             yield _too_few(chosen, compared)
         return
-    required = found.standing is Standing.MISSES and bool(requirements.required(body))
+    required = recommendation.standing is Standing.MISSES and bool(requirements.required(body))
     does, do, what = ("damps", "damp", "nutation") if body.goal.axis is None else ("reaches", "reach", "target")
     if required:
         does, do, what = "meets", "meet", "requirement"
@@ -175,7 +175,7 @@ def _missed(chosen: Plan, compared: Comparison) -> Iterator[str]:
 
 
 def _too_few(chosen: Plan, compared: Comparison) -> str:
-    """That no plan meets the requirement in enough dispersed cases."""
+    """Sentence that no plan meets the requirement in enough dispersed cases."""
     share = compared.shares[chosen]
     if share.met is None:
         return f"{sentence(UNDECIDED)} Nominal values alone: plan --nominal."
@@ -185,16 +185,16 @@ def _too_few(chosen: Plan, compared: Comparison) -> str:
 
 
 def _rivals(compared: Comparison) -> str:
-    """Among which the recommended plan was chosen."""
+    """The plans among which the recommended one was chosen."""
     return "plans that can be commanded" if compared.restricted else f"{len(compared.plans)} schemes compared"
 
 
 UNDECIDED = "the share of cases that comply is undecided: not all of them could be flown within the budget of work"
-"""Of dispersed cases that were to decide."""
+"""Note on dispersed cases that do not decide between plans."""
 
 
 def idealised(plan: Plan) -> str:
-    """That a plan fires impulses which take no time, and why; empty where it does not."""
+    """The reason why a plan fires impulses which take no time; empty where it does not."""
     if not plan.pulses.idealised:
         return ""
     torquer, unknown = plan.spacecraft.torquer, ""
@@ -206,20 +206,20 @@ def idealised(plan: Plan) -> str:
 
 
 def model_warnings(impulses: Flight, flown: Flight) -> tuple[str, ...]:
-    """How far the impulse sum (17) ends from real widths, where that is more than may be."""
+    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the tolerance."""
     apart = end_state.deviations(impulses, flown)
     if not apart:
         return ()
     required = {bound.part for bound in requirements.required(flown.spacecraft)}
     parts = []
-    for one in apart:
-        most = "a tenth of the requirement" if one.part in required else degrees(one.most)
-        parts.append(f"{one} (more than {most})")
+    for part in apart:
+        most = "a tenth of the requirement" if part.part in required else degrees(part.most)
+        parts.append(f"{part} (more than {most})")
     return (f"the impulse sum (17) and real widths differ by {' and '.join(parts)}. What is flown counts.",)
 
 
 def shortfall(plan: Plan, bound: Bound) -> str:
-    """One thing that a plan misses: how much is left, and how much may be."""
+    """One part that a plan misses: its residual, and its bound."""
     left = plan.left
     assert left is not None
     value = requirements.left_of(bound.part, left, plan.spacecraft)
@@ -231,7 +231,7 @@ def shortfall(plan: Plan, bound: Bound) -> str:
 
 
 def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
-    """What prevents a smaller residual, in sentences; what cures it first."""
+    """Causes that prevent a smaller residual, in sentences; the best cure first."""
     body = plan.spacecraft
     parts = {bound.part for bound in plan.shortfalls}
     if body.disturbances and not plan.options.with_disturbances:
@@ -249,26 +249,26 @@ def _obstacles(plan: Plan, compared: Comparison) -> Iterator[str]:
 
 
 def _optimal_untried(compared: Comparison) -> bool:
-    """Whether there are channels that it can fire, and it was not compared."""
+    """True where there are channels that optimal can fire, and it was not compared."""
     able = any(channel.damps for channel in compared.spacecraft.channels)
-    return able and OPTIMAL.name not in {one.scheme for one in compared.plans}
+    return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
 
 
 def _unplanned(compared: Comparison) -> str:
-    """What planning with the disturbances would change."""
-    one, body = len(compared.plans) == 1, compared.spacecraft
-    made = f"The plan{' was' if one else 's were'} made without the disturbances of the file"
+    """Changes by planning with the disturbances."""
+    single, body = len(compared.plans) == 1, compared.spacecraft
+    planned = f"The plan{' was' if single else 's were'} made without the disturbances of the file"
     aware = compared.with_disturbances
     if aware is not None and aware.standing is Standing.COMPLIES:
-        return f"With --with-disturbances {aware.scheme} {_those(body, plural=False)}. {made}."
-    plans = f"{made}; --with-disturbances plans with them"
+        return f"With --with-disturbances {aware.scheme} {_those(body, plural=False)}. {planned}."
+    plans = f"{planned}; --with-disturbances plans with them"
     if aware is None:
         return f"{plans}."
-    return f"{plans}, but then too {'it does not ' if one else 'no scheme compared '}{_those(body, plural=one)}."
+    return f"{plans}, but then too {'it does not ' if single else 'no scheme compared '}{_those(body, plural=single)}."
 
 
 def _spent(plan: Plan) -> str:
-    """How much of what damping takes the pulses give, and what ends them."""
+    """Share that the pulses give of the impulse that damping takes, and the cause of its limit."""
     body, pulses = plan.spacecraft, plan.pulses
     count = f"{len(pulses)} pulses give" if len(pulses) != 1 else "pulse gives"
     width = f", {'each ' * (len(pulses) > 1)}as long as max_on_time allows" if plan.hindrance.full else ""
@@ -284,24 +284,24 @@ def _spent(plan: Plan) -> str:
 
 
 def hints(compared: Comparison) -> tuple[str, ...]:
-    """What the reader may prefer: a plan that is much better in some way for little more, and what it is worse in."""
+    """Plans that the reader may prefer: much better in some way for little more, with their drawbacks."""
     others = dict.fromkeys(compared.recommendation.alternatives.values())
     return tuple(hint(compared, other) for other in others)
 
 
 def hint(compared: Comparison, other: Plan) -> str:
-    """In what one of the alternatives is better than the recommended plan, and in what it is worse."""
-    found = compared.recommendation
-    chosen = found.plan
+    """Advantage of one of the alternatives over the recommended plan, and its drawbacks."""
+    recommendation = compared.recommendation
+    chosen = recommendation.plan
     assert chosen is not None
-    gains = [_gain(one, other, chosen) for one, plan in found.alternatives.items() if plan is other]
-    better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, found.by_propellant)}"
+    gains = [_gain(goal, other, chosen) for goal, plan in recommendation.alternatives.items() if plan is other]
+    better = f"{other.scheme} {listed(gains)}, for {_dearer(other, chosen, recommendation.by_propellant)}"
     worse = listed([*_drawbacks(other, chosen)])
     return f"{'; '.join(filter(None, (better, f'but it {worse}' * bool(worse))))}."
 
 
 def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
-    """In what a plan is better than the ``chosen`` one."""
+    """Advantage of a plan over the ``chosen`` one."""
     if gain is Gain.REAL:
         return "fires real pulse widths"
     if gain is Gain.COMMANDED:
@@ -314,7 +314,7 @@ def _gain(gain: Gain, other: Plan, chosen: Plan) -> str:
 
 
 def _drawbacks(other: Plan, chosen: Plan) -> Iterator[str]:
-    """In what a plan is clearly worse than the ``chosen`` one: farther off, more nutation, a later end."""
+    """Clear drawbacks of a plan against the ``chosen`` one: farther off, more nutation, a later end."""
     assert other.flown is not None
     assert chosen.flown is not None
     if other.flown.axis_error > FARTHER * chosen.flown.axis_error + requirements.DAMPED_ANGLE:
@@ -335,10 +335,10 @@ def _shift(plan: Plan) -> str:
     return degrees(plan.flown.momentum_shift)
 
 
-def _dearer(one: Plan, other: Plan, by_propellant: bool) -> str:
-    """How much more a plan costs than another, with the share of it."""
+def _dearer(plan: Plan, other: Plan, by_propellant: bool) -> str:
+    """Extra cost of a plan against another, with the share of it."""
     unit, what = ("kg", "propellant") if by_propellant else ("N m s", "impulse")
-    more, less = one.pulses.cost_in(unit), other.pulses.cost_in(unit)
+    more, less = plan.pulses.cost_in(unit), other.pulses.cost_in(unit)
     if more <= less * (1.0 + ROUNDING):
         return f"no more {what}"
     extra = mass(more - less) if by_propellant else quantity(more - less, unit)
@@ -349,7 +349,7 @@ ROUNDING = 1e-9
 """Share by which costs that are equal may differ."""
 
 FARTHER = 1.1
-"""So many times as far off H ends, or as late, where a plan preferred for something else is said to be worse in it."""
+"""Factor of distance or of time by which H ends farther off, or later, for a plan to be called worse in it."""
 
 
 def spoken(compared: Comparison) -> dict[str, Any]:
@@ -363,7 +363,7 @@ def spoken(compared: Comparison) -> dict[str, Any]:
 
 
 def required(spacecraft: Spacecraft) -> str:
-    """What is required, on one line; empty where nothing is."""
+    """The requirement, on one line; empty where there is none."""
     texts = []
     for bound in requirements.required(spacecraft):
         if bound.part is Part.SPIN:
@@ -375,17 +375,17 @@ def required(spacecraft: Spacecraft) -> str:
 
 
 def cases_verdict(share: float, probability: float) -> str:
-    """Whether enough cases comply: "met: 99.9 % of cases comply (99.7 % required)"."""
+    """Verdict on the share of cases: "met: 99.9 % of cases comply (99.7 % required)"."""
     return f"{VERDICT[share >= probability]}: {cases_share(share, probability)}"
 
 
 def cases_share(share: float, probability: float) -> str:
-    """How many cases comply, of how many that must."""
+    """Share of cases that comply, and the share required."""
     return f"{percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
 
 
 def share_text(share: Share | None) -> str:
-    """The share of cases that comply with a plan; where not all have flown, on which side of the required one it is."""
+    """The share of cases that comply with a plan; where not all have flown, the side of the required one it is on."""
     if share is None or (share.exact is None and share.met is None):
         return MISSING
     if share.exact is not None:

@@ -1,4 +1,4 @@
-"""What ``verify --json`` gives."""
+"""Result of ``verify --json``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from nutdamp.flight.verification import Verification
 from nutdamp.views.plan_json import final_json, heading, target_json
 
 
-def verification_json(flown: Flight, name: str, found: Verification) -> dict[str, Any]:
+def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
     """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
     spacecraft = flown.spacecraft
     return {
         **heading(spacecraft),
         "scheme": name,
-        "agree": found.agree if found.checks else None,
-        "disagreeing": list(found.disagreeing),
+        "agree": verification.agree if verification.checks else None,
+        "disagreeing": list(verification.disagreeing),
         "final": final_json(flown),
         "target": target_json(spacecraft),
         "methods": [
@@ -30,12 +30,12 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
                 "rate_difference": method.rate,
                 "missing": method.missing or None,
             }
-            for method in found.methods
+            for method in verification.methods
         ],
-        "momentum_drift": found.momentum.drift,
-        "momentum_kept": found.momentum.kept,
-        "energy_drift": found.energy.drift,
-        "energy_kept": found.energy.kept,
+        "momentum_drift": verification.momentum.drift,
+        "momentum_kept": verification.momentum.kept,
+        "energy_drift": verification.energy.drift,
+        "energy_kept": verification.energy.kept,
         "budget": [
             {
                 "imperfection": row.name,
@@ -43,7 +43,7 @@ def verification_json(flown: Flight, name: str, found: Verification) -> dict[str
                 "momentum_shift_deg": math.degrees(row.momentum_shift),
                 "axis_error_deg": math.degrees(row.axis_error),
             }
-            for row in found.budget
+            for row in verification.budget
         ],
     }
 

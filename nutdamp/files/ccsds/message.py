@@ -1,13 +1,8 @@
-"""Blocks and keywords; KVN and XML.
-
-What a message on attitude or orbit holds, whatever its notation: blocks of keywords, and the tables that rule them.
+"""Messages on attitude or orbit, whatever their notation: blocks of keywords, their tables, and KVN and XML.
 
 The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
-502.0-B-3: 3-1 to 3-3 (OPM).
-
-Keyword = value notation, CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7 alike): messages as plain text.
-
-XML notation, CCSDS 504.0-B-2 section 7.
+502.0-B-3: 3-1 to 3-3 (OPM). Keyword = value notation (KVN) follows CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7
+alike), XML section 7.
 """
 
 from __future__ import annotations
@@ -72,7 +67,7 @@ _SPIN = (
     *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
 )
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
-"""Keywords that say where H is, and how fast the spin axis turns about it."""
+"""Keywords of the direction of H, and of the rate of the spin axis about it."""
 
 HEADER = (
     *_text("CLASSIFICATION", required=False),
@@ -152,13 +147,13 @@ OPM_BLOCKS: dict[str, Layout] = {
         ),
     ),
 }
-"""What is written of the blocks of an OPM, in their order; their names are not in the message."""
+"""Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the message."""
 
 AEM_METADATA = _text(
     *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
     *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
 )
-"""What is written of table 4-3."""
+"""Keywords of table 4-3 that are written."""
 
 QUATERNION_ANGVEL, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN/NUTATION_MOM"
 """Values of ATTITUDE_TYPE."""
@@ -186,7 +181,7 @@ class MessageEntry(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MessageBlock:
-    """Keywords that belong together; ``name`` is that of the layout, empty for what is outside of blocks."""
+    """Keywords that belong together; ``name`` is that of the layout, empty outside of blocks."""
 
     name: str
     entries: tuple[MessageEntry, ...]
@@ -214,7 +209,7 @@ class Message:
 
     @property
     def version(self) -> str:
-        """Of the form that it has."""
+        """The version of its form."""
         return OPM_VERSION if self.kind == "OPM" else VERSION
 
 
@@ -257,7 +252,7 @@ def comment(text: str) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Without accents and without what ASCII does not have."""
+    """Text in ASCII: accents and other characters are dropped."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return "".join(character if character.isprintable() else " " for character in plain)
 
@@ -339,7 +334,7 @@ def _block(block: MessageBlock) -> list[str]:
 
 
 def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
-    """The blocks of an APM, the first of what is outside of blocks, and what is not of this notation.
+    """The blocks of an APM, the first for keywords outside of blocks, and the faults of notation.
 
     Lines count from 1; ``name`` is that of the file in faults.
     """

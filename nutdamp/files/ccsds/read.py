@@ -1,13 +1,8 @@
-"""Attitude parameter messages read: state, inertia, manoeuvres, every fault with its line.
+"""Attitude parameter messages in KVN read, and turned into a spacecraft file and a schedule.
 
-Reads attitude parameter messages in KVN: state, inertia and manoeuvres, with every fault and its line.
-
-Other readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here
-nothing is guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
-
-A spacecraft file, and a schedule, from an attitude parameter message.
-
-Blocks that were read, held against their tables: every keyword known, once, in order, of the right form.
+Every keyword is checked against its table: known, once, in order, of the right form; every fault has its line. Other
+readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here nothing is
+guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
 """
 
 from __future__ import annotations
@@ -47,7 +42,7 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Checked:
-    """A block by keyword; what is wrong goes to ``faults``, and what cannot be read is then None."""
+    """A block by keyword; problems go to ``faults``, and an unreadable value is then None."""
 
     def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
         self.file, self.block, self.faults = file, block, faults
@@ -79,7 +74,7 @@ class Checked:
                 self._form(entry, self._known[name])
 
     def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
-        """Whether the value is of the kind that the table has, in its unit."""
+        """Check that the value is of the kind in the table, and in its unit."""
         if not entry.value:
             self.fault(keyword.name, "empty; expected a value")
         elif not keyword.text and not _NUMBER.fullmatch(entry.value):
@@ -110,8 +105,8 @@ class Checked:
 
     def numbers(self, *keywords: str) -> list[float] | None:
         """Several numbers; None where one cannot be read."""
-        found = [self.number(keyword) for keyword in keywords]
-        return None if any(value is None for value in found) else [value for value in found if value is not None]
+        values = [self.number(keyword) for keyword in keywords]
+        return None if None in values else [value for value in values if value is not None]
 
     def epoch(self, keyword: str, system: str) -> Epoch | None:
         """The value as a moment of a time system, see `Epoch.parse`."""
@@ -125,7 +120,7 @@ class Checked:
             return None
 
     def has(self, keywords: Iterable[str]) -> bool:
-        """Whether all of ``keywords`` are here; some without the others is a fault."""
+        """True where all of ``keywords`` are here; some without the others is a fault."""
         expected = list(keywords)
         there = [keyword for keyword in expected if keyword in self.entries]
         if there and len(there) < len(expected):
@@ -136,7 +131,7 @@ class Checked:
 
 
 def unit_length(parts: list[float], tolerance: float) -> bool:
-    """Whether the parts are those of a unit vector, but for rounding of what was written."""
+    """True where the parts are those of a unit vector, but for rounding in the message."""
     return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
 
 
@@ -144,7 +139,7 @@ UNIT = 1e-4
 """Deviation from length one up to which a quaternion counts as rounded."""
 
 AGREES = 1e-4
-"""Difference up to which SPIN says the same as the other blocks: rad, and relative for rates."""
+"""Difference up to which SPIN agrees with the other blocks: rad, and relative for rates."""
 
 SAME_AXES = {"ICRF": "GCRF"}
 """Frames whose axes are those of another that a spacecraft file knows."""
@@ -171,11 +166,11 @@ class Manoeuvre:
 
 @dataclass(frozen=True, slots=True)
 class ApmContents:
-    """What a message says, in body axes.
+    """Contents of a message, in body axes.
 
     ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m².
-    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` what a reader
-    should know.
+    ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` are for
+    the reader.
     """
 
     name: str
@@ -192,7 +187,7 @@ class ApmContents:
 
 
 MOST_BYTES = 16 << 20
-"""Of a message: many times more than its most manoeuvres take."""
+"""Size of a message, many times more than its most manoeuvres take."""
 
 
 def read_apm(path: str) -> ApmContents:
@@ -222,7 +217,7 @@ def _refuse_other_versions(path: str, outside: MessageBlock, faults: list[Fault]
 
 
 class _MessageReader:
-    """One message; what is wrong goes to ``faults``."""
+    """One message; problems go to ``faults``."""
 
     def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
         self.path, self.faults = path, faults
@@ -292,7 +287,7 @@ class _MessageReader:
         )
 
     def _endpoints(self, block: Checked, *, reversible: bool = True) -> bool | None:
-        """Whether the block leads from the inertial frame to the body (else the other way); None for other frames."""
+        """True where the block leads from inertial frame to body, False for the reverse; None for other frames."""
         first, second = block.text("REF_FRAME_A"), block.text("REF_FRAME_B")
         if first is None or second is None:
             return None
@@ -375,7 +370,7 @@ class _MessageReader:
         return None
 
     def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
-        """Fills in what the other blocks do not say; remarks where it says something else."""
+        """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
         block = self._one("SPIN")
         if block is None or self._endpoints(block, reversible=False) is None:
             return quaternion, rates
@@ -421,7 +416,7 @@ class _MessageReader:
         return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]]) + 0.0
 
     def _manoeuvres(self, epoch: Epoch | None) -> tuple[Manoeuvre, ...]:
-        found: list[Manoeuvre] = []
+        manoeuvres: list[Manoeuvre] = []
         last: tuple[Epoch, int] | None = None
         for block in self.blocks["MAN"]:
             begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
@@ -441,8 +436,8 @@ class _MessageReader:
                     block.fault("MAN_EPOCH_START", f"begins before the block of line {last[1]}; put them in order")
                 last = begins, block.block.line
             if begins is not None and epoch is not None and duration is not None and torque is not None:
-                found.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
-        return tuple(found)
+                manoeuvres.append(Manoeuvre(begins.since(epoch), duration, np.array(torque), mass, block.block.line))
+        return tuple(manoeuvres)
 
 
 def euler(sequence: str, *angles: float) -> Vector:
@@ -456,7 +451,7 @@ def euler(sequence: str, *angles: float) -> Vector:
 
 
 def _same_turn(first: Vector, second: Vector) -> bool:
-    """Whether two quaternions are the same attitude within `AGREES`."""
+    """True where two quaternions are the same attitude within `AGREES`."""
     return float(min(np.linalg.norm(first - second), np.linalg.norm(first + second))) <= 0.5 * AGREES
 
 
@@ -464,7 +459,7 @@ ALIKE = 1e-9
 """Relative difference up to which torques count as transverse, and as of one magnitude."""
 
 _BLOCKS = {"inertia": "INERTIA", "omega0": "ANGVEL", "attitude": "EPOCH", "steerable": "MAN"}
-"""Where a part of the spacecraft file comes from in the message."""
+"""Block of the message behind each part of the spacecraft file."""
 
 
 SAME_NUTATION, ROUNDED = 0.01, 1e-5
@@ -474,10 +469,10 @@ SAME_NUTATION, ROUNDED = 0.01, 1e-5
 def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedule]:
     """Text of the spacecraft file, the spacecraft in it, and the manoeuvres as a schedule (empty without any).
 
-    Raises FaultyFile, with lines of the message, where what it says cannot be a spacecraft for nutdamp.
+    Raises FaultyFile, with lines of the message, where its contents cannot be a spacecraft for nutdamp.
     """
     bare = _read(spacecraft_text(contents, path, None), contents, path)
-    torques = [bare.inertia.axes.T @ one.torque for one in contents.manoeuvres]
+    torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
     torquer = _torquer(torques)
     text = spacecraft_text(contents, path, torquer)
     body = _read(text, contents, path)
@@ -485,7 +480,7 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
 
 
 def contradictions(contents: ApmContents, body: Spacecraft) -> list[str]:
-    """Where the motion of the spacecraft is another than the message states: its nutation, by inertia and period."""
+    """Contradictions between the nutation stated in the message and that by inertia and period."""
     stated, follows = contents.nutation, body.widest.nutation
     if stated is None or abs(follows - abs(stated)) <= ROUNDED + SAME_NUTATION * abs(stated):
         return []
@@ -560,7 +555,7 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
         ]
         first = round(manoeuvres[0].start, DIGITS)
         return [*lines, f"limits: {{earliest: {first!r} s}}   # the first manoeuvre begins then"] if first else lines
-    distinct = {tuple(one.torque.tolist()): None for one in manoeuvres}
+    distinct = {tuple(manoeuvre.torque.tolist()): None for manoeuvre in manoeuvres}
     return [
         "# The torques that the message fires, as thrusters to begin with; without any, an ideal steerable impulse is",
         "# assumed.",
@@ -585,18 +580,18 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
     """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
     pulses: list[Pulse] = []
     free = 0.0
-    for number, one in enumerate(manoeuvres, start=1):
-        torque = body.inertia.axes.T @ one.torque
-        alone = one.start >= free - 1e-9
+    for number, manoeuvre in enumerate(manoeuvres, start=1):
+        torque = body.inertia.axes.T @ manoeuvre.torque
+        alone = manoeuvre.start >= free - 1e-9
         pulses.append(
             Pulse(
-                t=one.start + 0.5 * one.duration,
-                on_time=one.duration,
+                t=manoeuvre.start + 0.5 * manoeuvre.duration,
+                on_time=manoeuvre.duration,
                 channel=STEERABLE if alone else f"MAN{number}",
-                impulse=torque * one.duration,
+                impulse=torque * manoeuvre.duration,
                 torque=torque,
-                propellant=None if one.mass is None else -one.mass,
+                propellant=None if manoeuvre.mass is None else -manoeuvre.mass,
             )
         )
-        free = max(free, one.start + one.duration) if alone else free
+        free = max(free, manoeuvre.start + manoeuvre.duration) if alone else free
     return Schedule(tuple(pulses))

@@ -1,23 +1,13 @@
-"""APM, AEM, OPM.
+"""Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM) written.
 
-The attitude parameter message: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse.
+APM: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse, in the axes of the spacecraft file,
+which the message calls `message.BODY_FRAME`.
 
-Everything is given in the axes of the spacecraft file, which the message calls `message.BODY_FRAME`.
+OPM (CCSDS 502.0-B-3): the velocity change of each pulse as a manoeuvre. Its state vector is the orbit of the spacecraft
+file. Without one the message is only the part with the manoeuvres, which says so: the standard demands a state.
 
-The orbit parameter message (CCSDS 502.0-B-3): the velocity change of each pulse as a manoeuvre.
-
-Its state vector is the orbit of the spacecraft file. Without one the message is only the part with the manoeuvres,
-which says so: the standard demands a state.
-
-The attitude ephemeris message: the flown motion, a new segment at each edge of a pulse.
-
-As quaternions and rates, which fit every body, or as spin, nutation and momentum, for those symmetric about axis 3.
-
-Spin and nutation of a body that is symmetric about its third axis, as attitude data messages have them.
-
-Euler angles Z-X-Z (504.0-B-2, annex F5): the third body axis turns about H at |H|/A, and the body about that axis at ω3
-less its share of that turn, aω3 (Poinsot). A body that spins backwards has its third axis at more than 90 deg from H.
-Both rates are those of the moment, under torque too: ω = (|H|/A) h + aω3 e3 whatever moves H.
+AEM: the flown motion, a new segment at each edge of a pulse; as quaternions and rates, which fit every body, or as
+spin, nutation and momentum, for those symmetric about axis 3.
 """
 
 from __future__ import annotations
@@ -67,7 +57,7 @@ FULL = 2.0 * math.pi
 
 
 def spinning(inertia: Inertia) -> bool:
-    """Whether the model of these keywords is that of the body."""
+    """True where the body fits the model of these keywords: symmetric about axis 3."""
     return inertia.symmetric and math.hypot(*inertia.axes[:2, 2]) <= AXIS
 
 
@@ -132,7 +122,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
 
 
 def header(plan: Plan, created: Epoch) -> MessageBlock:
-    """Who made the message, when, and of what."""
+    """Originator, date and object of the message."""
     moment = created.text.partition(".")[0]
     values: Values = {
         "CREATION_DATE": moment,
@@ -148,27 +138,27 @@ def identity(body: Spacecraft) -> Values:
 
 
 def unsaid(body: Spacecraft) -> list[str]:
-    """What the spacecraft file has and a message of state and pulses cannot hold."""
-    found = []
+    """Notes on parts of the spacecraft file that a message of state and pulses cannot hold."""
+    remarks = []
     if body.disturbances:
-        found.append("The disturbances of the spacecraft file are not in this message.")
+        remarks.append("The disturbances of the spacecraft file are not in this message.")
     if body.dissipation is not None:
-        found.append("The energy dissipation of the spacecraft file is not in this message.")
+        remarks.append("The energy dissipation of the spacecraft file is not in this message.")
     per_kg = shed(body)
     if per_kg is not None:
-        values = ", ".join(f"{one:.9g}" for one in per_kg)
-        found.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
-    return found
+        values = ", ".join(f"{moment:.9g}" for moment in per_kg)
+        remarks.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
+    return remarks
 
 
 def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
-    """What is said of the manoeuvre of a pulse: its channel, and through a valve what is commanded for it."""
-    found = [f"pulse {number}: {pulse.channel}"]
+    """Comments on the manoeuvre of a pulse: its channel, and the command behind a pulse through a valve."""
+    comments = [f"pulse {number}: {pulse.channel}"]
     if pulse.through_valve:
         start, on_time = pulse.loaded
-        found.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
-        found.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
-    return found
+        comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
+        comments.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
+    return comments
 
 
 def _spinless(spins: bool) -> list[str]:
@@ -203,12 +193,12 @@ def angular_velocity(rates: Vector) -> dict[str, float]:
 def _spin(body: Spacecraft) -> Values:
     """Spin and nutation at t = 0."""
     rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    found = spin_values(body.inertia, rates[None], quaternion[None])
-    return {name: float(value[0]) for name, value in found.items() if name not in MOMENTUM}
+    spin = spin_values(body.inertia, rates[None], quaternion[None])
+    return {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
 
 
 def _inertia(body: Spacecraft) -> Values:
-    """Moments and products; the products are minus what is off the diagonal (annex F6)."""
+    """Moments and products; the products are minus the entries off the diagonal (annex F6)."""
     tensor = body.inertia.tensor.tolist()
     return {
         "INERTIA_REF_FRAME": BODY_FRAME,
@@ -285,9 +275,9 @@ def _turns(stretch: AttitudeSegment) -> Iterable[tuple[float, ...]]:
 
 def _spins(body: Spacecraft, stretch: AttitudeSegment) -> Iterable[list[float]]:
     """Spin axis, angle and its rate, momentum, and the rate about that."""
-    found = spin_values(body.inertia, stretch.rates, stretch.quaternion)
+    spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
     names = [keyword.name for keyword in AEM_RECORDS[SPIN_NUTATION_MOM].keywords[1:]]
-    rows: list[list[float]] = np.column_stack([found[name] for name in names]).tolist()
+    rows: list[list[float]] = np.column_stack([spin[name] for name in names]).tolist()
     return rows
 
 
@@ -330,7 +320,7 @@ def _state(orbit: Orbit) -> Values:
 
 
 def _velocity(pulse: Pulse, number: int, flown: Flight, mass: float) -> Vector:
-    """What a pulse adds to the velocity, (3,) m/s, inertial: along its force as the body turns."""
+    """Velocity change by a pulse, (3,) m/s, inertial: along its force as the body turns."""
     if pulse.force is None:
         cure = "give the thrusters position, direction and force"
         raise BadRequest(f"the velocity change by pulse {number} ({pulse.channel}) is not known; {cure}")
