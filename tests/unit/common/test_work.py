@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -33,10 +34,14 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
             assert (first.done, outer.done) == (8.0, 8.0)
             with work.budget("second", 7.0) as second:
                 assert second.most == 2.0
+                work.spend(0.5)
+                assert work.left() == 1.5
+                work.spend(-0.5)
             assert not work.exhausted()
             assert outer.share == 0.8
         seen.append(watch.budget)
     assert seen == [None, first, outer, None]
+    assert work.left() == math.inf
     work.spend(1e9)  # nobody counts
     assert not work.exhausted()
 
