@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -237,8 +238,8 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
     figure = loop_figure(loop_of(looping(), 60.0))
     check_layout(figure)
     fired = figure.axes[2]
-    assert [axes.xaxis.get_tick_params()["labelbottom"] for axes in figure.axes[:3]] == [False, False, True]
     assert len(fired.get_yticks()) == 4
+    assert all(re.fullmatch(r"[\d–-]*", text.get_text()) for text in fired.texts)
     numbers = [text.get_window_extent() for text in fired.texts if text.get_text()]
     assert numbers
     for number in numbers:
