@@ -139,9 +139,9 @@ def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, in
 
 
 def test_the_pace_bounds_what_turns_with_a_torque_too() -> None:
-    none = np.zeros(1)
-    drive = taylor.Drive(none, none + 0j, none, ((np.array([0.01 + 0j]), -7.0),))
-    assert drive.pace(none + 0.2j, np.array([-0.5]), np.ones(1))[0] > 7.0 + 0.5 + 0.2
+    none, rest = np.zeros(1), np.zeros(1, dtype=complex)
+    drive = taylor.Drive(none, rest, none, ((np.array([0.01 + 0j]), -7.0),))
+    assert drive.pace(np.array([0.2j]), np.array([-0.5]), np.ones(1))[0] > 7.0 + 0.5 + 0.2
 
 
 def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:
