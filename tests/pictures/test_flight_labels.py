@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 from support import places
 from support.builders import aimed, spinner
@@ -20,7 +21,7 @@ from support.colours import check_colours, contrast, pages
 from support.layout import check_layout, texts
 from support.shown import BODY, CASES, NAMES, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
 
-from nutdamp.figures import geometry, overview, style
+from nutdamp.figures import geometry, labels, overview, style
 from nutdamp.figures.motion import _together
 from nutdamp.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.files.reader import load_spacecraft
@@ -37,6 +38,16 @@ pytestmark = [
 
 
 # --- labels ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("role", "complete"), [("vital", True), ("label", False)])
+def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role: str, complete: bool) -> None:
+    figure = Figure((3.0, 2.0), layout="constrained")
+    axes = figure.subplots()
+    for number in range(30):
+        labels.add(axes, f"label {number}", np.full(2, 0.5), role=role)
+    labels.settle(figure)
+    assert all(one.get_visible() for one in axes.texts) == complete
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import math
 import os
 import re
 import shutil
@@ -17,6 +18,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib import style as matplotlib_style
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from PIL import Image
 from support import places
 from support.builders import spinner
@@ -30,6 +33,7 @@ from nutdamp.figures.animation import Scene, Timing, film_format, timing
 from nutdamp.figures.image import _brief
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
 from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -232,6 +236,33 @@ def test_a_frame_shows_the_cones_of_its_moment_on_scales_that_stand_still(damped
         assert np.hypot(*place) == pytest.approx(away, abs=1e-6)
     assert scales[0] == scales[1] == scales[2]
     assert scene.sky.get_aspect() == scene.space.get_aspect() == 1.0
+
+
+def diamonds(axes: Axes) -> list[Line2D]:
+    """Those drawn: the legend's have no place."""
+    return [line for line in axes.lines if line.get_marker() == "D" and np.size(line.get_xdata())]
+
+
+@pytest.mark.usefixtures("plain")
+def test_where_frames_follow_the_turns_a_mark_over_body_axis_1_shows_how_the_body_rolls() -> None:
+    made = propagation.flown(spinner(degrees=20.0), Schedule(), 4.0)
+    scene, seen = Scene(made, Timing(4.0, 24, 10, 1.0), 320), []
+    for number in (0, 5):
+        scene.show(number)
+        (mark,), (solid,) = diamonds(scene.sky), diamonds(scene.space)
+        x, y = np.radians(np.asarray(mark.get_xydata(), dtype=float)[0])
+        angle = math.hypot(x, y)
+        local = np.array([x * math.sin(angle) / angle, y * math.sin(angle) / angle, math.cos(angle)])
+        direction = local @ scene.plane
+        in_body = attitude.matrix(scene.quaternions[number]).T @ direction
+        assert in_body[0] > 0.0
+        assert in_body[1] == pytest.approx(0.0, abs=1e-3)
+        assert np.asarray(solid.get_xydata())[0] == pytest.approx(scene.looked.seen(direction)[0][0], abs=1e-4)
+        seen.append(direction)
+    assert float(seen[0] @ seen[1]) < 0.999
+    scene = Scene(made, Timing(4.0, 4, 10, 1.0), 320)
+    scene.show(1)
+    assert not diamonds(scene.sky)
 
 
 @pytest.mark.usefixtures("plain")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -10,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch, StepPatch
+from matplotlib.patches import PathPatch, Rectangle, StepPatch
 from support.builders import aimed, spinner
 from support.cases import deep, weekly
 from support.colours import check_colours
@@ -238,6 +239,7 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
     check_layout(figure)
     fired = figure.axes[2]
     assert len(fired.get_yticks()) == 4
+    assert all(re.fullmatch(r"[\d–-]*", text.get_text()) for text in fired.texts)
     numbers = [text.get_window_extent() for text in fired.texts if text.get_text()]
     assert numbers
     for number in numbers:
@@ -250,10 +252,20 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
 @pytest.mark.parametrize(("most", "beside"), [deep(1e-3, True), deep(80.0, False)])
 def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bool) -> None:
     body = looping(Requirement(momentum_shift=math.radians(most)))
-    figure = loop_cases_figure(run_loops(LoopResults(loop_study(body, 60.0), 20)))
+    results = run_loops(LoopResults(loop_study(body, 60.0), 20))
+    figure = loop_cases_figure(results)
     check_layout(figure)
-    assert "propellant, g" in {axes.get_xlabel() for axes in figure.axes}
-    (shift,) = (axes for axes in figure.axes if axes.get_xlabel() == "shift of H, deg")
+    panels = {axes.get_xlabel(): axes for axes in figure.axes}
+    for name, output, scale in (
+        ("first quiet, s", "settled", 1.0),
+        ("left then, deg", "quiet", 180.0 / math.pi),
+        ("propellant, g", "propellant", 1e3),
+    ):
+        bars, values = [one for one in panels[name].patches if isinstance(one, Rectangle)], scale * results.of(output)
+        assert sum(one.get_height() for one in bars) == len(values)
+        ends = [bars[0].get_x(), bars[-1].get_x() + bars[-1].get_width()]
+        assert ends == pytest.approx([values.min(), values.max()]) or values.min() == values.max()
+    shift = panels["shift of H, deg"]
     levels = [float(np.asarray(one.get_xdata())[0]) for one in shift.lines if one.get_label() == "required"]
     assert levels == ([pytest.approx(most)] if beside else [])
     assert ("outside the view" in shift.get_title()) is not beside

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
 from support.builders import cross, spinner
 from support.dispersed import normal
 
-from nutdamp.planning.decision import Comparison, compare
 from nutdamp.spacecraft.model import Limits, Requirement, Vector
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
@@ -29,11 +27,6 @@ BODY = replace(
     spinner(channels=cross(8.0, min_on_time=0.02, max_on_time=2.0), requirement=REQUIRED, limits=Limits(horizon=40.0)),
     dispersions=TOLERANCES,
 )
-
-
-@cache
-def compared() -> Comparison:
-    return compare(BODY, ("one-pulse", "two-pulse", "four-pulse", "optimal"))
 
 
 def line(axes: Axes, label: str) -> Vector:

@@ -197,22 +197,6 @@ def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Arra
     return [Motion(rotation.T @ h / np.asarray(moments), rotation) for h, rotation in found]
 
 
-def euler_angles(A: float, C: float, size: float, growth: float, start: Array, times: Array) -> Array:
-    """φ about H, θ and ψ about axis 3 (n, 3) rad of a symmetric body with |H| = ``size`` and dissipation, from
-    ``start`` (3,) rad, by DOP853 on the equations of the angles themselves.
-    """
-
-    def slope(_: float, y: Array) -> Array:
-        tilt = float(y[1])
-        return size * vector(1 / A, growth / size * math.sin(tilt) * math.cos(tilt), (1 / C - 1 / A) * math.cos(tilt))
-
-    solution = solve_ivp(
-        slope, (0.0, float(times[-1])), start, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * RTOL
-    )
-    assert solution.success
-    return np.asarray(solution.y.T)
-
-
 def fly(
     moments: Sequence[float],
     rates: Array,

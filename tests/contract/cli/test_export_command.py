@@ -12,6 +12,8 @@ from support.commands import DATED, call, contents, refusals, result, rows, writ
 from support.golden import check_text
 from support.process import Run
 
+from nutdamp.files.ccsds.read import read_apm
+
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 APM = "export dated.yaml --format apm --scheme two-pulse"
@@ -165,6 +167,11 @@ def test_a_message_that_fires_nothing_gives_an_empty_schedule(run: Run, tmp_path
     written(tmp_path, a_apm=exported(run, "export dated.yaml --format apm --scheme none"))
     assert "fires nothing" in exported(run, "import apm a.apm")
     assert len(exported(run, "import -q apm a.apm -o a.yaml --schedule -").splitlines()) == 1
+    written(tmp_path, b_apm=(tmp_path / "a.apm").read_text().replace("= UTC", "= TAI"))
+    (said,) = read_apm(str(tmp_path / "b.apm")).remarks
+    loud, quiet = (call(run, f"import apm b.apm -o b.yaml{more}").stderr for more in ("", " -q"))
+    assert said in loud
+    assert said not in quiet
     spacecraft = result(run, "plan a.yaml --scheme one-pulse")["spacecraft"]
     assert spacecraft["nutation_deg"] == pytest.approx(5.0, rel=1e-13)
     assert math.isclose(spacecraft["A_kgm2"], 120.0)

@@ -36,6 +36,15 @@ thrusters: [{name: T1, torque: [0, 8, 0], min_on_time: 20 ms}, {name: SPIN, torq
 """
 
 
+# --- check -----------------------------------------------------------------------------------------------------------
+
+
+def test_each_of_several_files_is_shown_as_alone_with_a_blank_line_below(run: Run, tmp_path: Path) -> None:
+    written(tmp_path, good_yaml=GOOD, plain_yaml=EXACT)
+    alone = [run("check", name).stdout for name in ("good.yaml", "plain.yaml")]
+    assert run("check", "good.yaml", "plain.yaml").stdout == "".join(f"{text}\n" for text in alone)
+
+
 # --- init, schema, version --------------------------------------------------------------------------------------------
 
 

@@ -145,6 +145,14 @@ def test_what_validates_and_what_not() -> None:
                 assert VALIDATOR.is_valid(changed(path, value)) == expected, (path, value)
 
 
+def test_keywords_are_in_the_order_of_the_alphabet_and_keys_in_that_of_the_file() -> None:
+    for section in [SCHEMA, *SCHEMA["$defs"].values()]:
+        for key, field in section["properties"].items():
+            assert list(field) == sorted(field), key
+    names = list(SCHEMA["properties"])
+    assert names.index("name") < names.index("inertia") < names.index("thrusters") < names.index("limits")
+
+
 def test_every_key_is_explained_and_has_an_example_that_is_valid() -> None:
     """Each example alone, and all of those of the root that go together; no key takes null."""
     sections = [SCHEMA, *SCHEMA["$defs"].values()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -26,9 +27,9 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
         with work.budget("all", 10.0) as outer:
             with work.budget("first", 7.0) as first:
                 seen.append(watch.budget)
-                for exhausted in (False, True):
+                for left in (3.0, 0.0):
                     work.spend(4.0)
-                    assert work.exhausted() == exhausted
+                    assert (work.left(), work.exhausted()) == (left, left == 0.0)
             seen.append(watch.budget)
             assert (first.done, outer.done) == (8.0, 8.0)
             with work.budget("second", 7.0) as second:
@@ -37,6 +38,7 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
             assert outer.share == 0.8
         seen.append(watch.budget)
     assert seen == [None, first, outer, None]
+    assert work.left() == math.inf
     work.spend(1e9)  # nobody counts
     assert not work.exhausted()
 

@@ -209,6 +209,10 @@ def test_noise_is_what_the_estimator_makes_of_noise(sensor: Sensor) -> None:
         assert math.sqrt(float((np.abs(noise) ** 2).mean()) / 2.0) == pytest.approx(seen.sigma, rel=0.05)
         lasting = complex((noise[1:] * noise[:-1].conj()).mean() * turn / (np.abs(noise) ** 2).mean())
         assert 1.0 - lasting.real == pytest.approx(seen.fresh, rel=0.1)
+    size = math.sqrt(float((np.abs(estimated) ** 2).mean()))
+    # Of an accelerometer it counts the axis in which the sensor shows least.
+    least = 0.95 * estimator.doubt if sensor.kind == "gyro" else 0.0
+    assert least < size < 1.05 * estimator.doubt
 
 
 @pytest.mark.parametrize(("sigma", "offset"), [deep(0.05, 0j), (0.3, 0j), (0.05, 0.2 + 0.1j)])
@@ -371,6 +375,7 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
     assert [patch.get_width() for patch in bars.patches] == pytest.approx([1e-4 * DAY, pulses * DAY])
     label, each = ("propellant, kg a year", propellant) if propellant else ("impulse, N m s a year", 0.01)
     assert (bars.get_xscale(), mass.get_xlabel()) == (scale, label)
+    assert bars.xaxis.get_major_formatter()(100.0, 0) == ("100" if scale == "log" else "")
     assert [patch.get_width() for patch in mass.patches] == pytest.approx([each * YEAR] * 2)
     (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1

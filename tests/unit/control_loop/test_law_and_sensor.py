@@ -14,6 +14,7 @@ from support.cases import deep, spread
 from support.golden import refused
 from support.loops import fired_by, fires, four, transverse_size
 
+from nutdamp.control_loop.controller import Watch
 from nutdamp.control_loop.law import ComplexArray, Firing, Law
 from nutdamp.control_loop.sensor import Estimator, Signal, gain, is_blind, lag
 from nutdamp.errors import Infeasible
@@ -241,3 +242,10 @@ def test_low_pass_filter_is_the_recursion_and_its_lag_is_known(spin: float) -> N
     raw = best[-1] * (1.0 - beta) / (1.0 - beta * np.exp(1j * law.rate(spin) * 0.05))
     behind = np.angle(raw / true[-1]) + law.rate(spin) * 0.05
     assert lag(law, sensor, spin) == pytest.approx(behind, abs=1e-12)
+
+
+def test_a_channel_comes_to_fire_where_it_is_due_as_z_is_first_known() -> None:
+    """Not where the moment is past; later only as its wait falls below what is looked ahead."""
+    law = Law(body(), Loop(Sensor(rate=20.0), start=0.01))
+    waits = np.array([[math.nan, 0.0], [math.nan, -0.1 * law.period], [0.2, 0.2], [0.03, 0.01]])
+    assert Watch(law, 0.0).triggered(waits, 0.02)[:, 0].tolist() == [True, False, False, True]

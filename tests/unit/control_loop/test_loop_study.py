@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Sensor
 from nutdamp.spacecraft.model import Attitude, Disturbance, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views.loop_cases import LoopCasesWriter
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)
 FORCES = {"+M1": (0.0, -9.0, 0.0), "-M1": (0.0, 9.0, 0.0), "+M2": (9.0, 0.0, 0.0), "-M2": (-9.0, 0.0, 0.0)}
@@ -305,3 +307,9 @@ def test_cases_that_break_a_cone_do_not_comply(dissipation: float | None) -> Non
     assert kept.aspects[0] == pytest.approx([kept.angles[0, 0].min(), kept.angles[0, 1].max()])
     only = results_of(replace(watched, requirement=None), 40)
     assert only.met_fraction == pytest.approx(np.mean(~broken))
+
+
+def test_a_file_of_cases_has_its_header_before_the_first_case(tmp_path: Path) -> None:
+    with (tmp_path / "cases.csv").open("wb") as stream:
+        LoopCasesWriter(stream, study(craft()))
+        assert (tmp_path / "cases.csv").read_text().startswith("case,")

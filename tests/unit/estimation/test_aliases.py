@@ -9,7 +9,7 @@ import pytest
 from support.hand_made_fit import silent, told
 
 import nutdamp
-from nutdamp.estimation.initial_guess import neighbours
+from nutdamp.estimation.initial_guess import neighbours, nutation_rate
 from nutdamp.estimation.results import estimates
 
 BODY = nutdamp.example().with_(dispersions={"A": {"normal": "30 %"}, "C": {"normal": "30 %"}})
@@ -61,3 +61,8 @@ def test_ratio_and_moments_are_told_with_their_sigmas_and_those_of_the_file() ->
     assert (rows["a"].source, rows["A"].file) == ("data", 120.0)
     sure = told(nutdamp.example().replace(dispersions=None), silent("omega_1", "omega_2"), {}, {})
     assert {one.key for one in estimates(sure, 0.0)} & {"C/A", "a", "A", "C"} == {"C/A", "a", "C"}
+
+
+def test_the_nutation_rate_is_that_of_the_spin_estimated_or_of_the_file() -> None:
+    seen = told(BODY, silent("omega_1", "omega_2", "omega_3"), {"C/A": 0.75, "omega_3": 2.0}, {})
+    assert nutation_rate(seen.model, seen.values) == pytest.approx(0.25 * 2.0)

@@ -87,6 +87,8 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
 
     pairs = ((1.23456789, 1e-4), (1.23456789, 2.0), (1.23456789, 1.2), (0.0, 0.1), (1e-9, 1.0), (1.0, math.inf))
     check_text("estimation.digits", shown(_table(tuple(row(*pair) for pair in pairs))))
+    (scaled,) = shown(_table((Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3),))).splitlines()[-1:]
+    assert scaled.split()[:6] == ["x", "12.3", "0.1", "mm", "12", "+0.3"]
 
 
 def test_longer_coasts_tell_more_and_a_probe_pulse_its_thrust(fitted: Fitted, monkeypatch: pytest.MonkeyPatch) -> None:

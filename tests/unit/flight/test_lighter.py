@@ -58,8 +58,8 @@ def fires(body: Spacecraft, *numbers: int, on_time: float = 0.05) -> Schedule:
     return Schedule(supplied(body, list(commands)))
 
 
-def independent(body: Spacecraft, made: Schedule) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rates (3,), rotation (3, 3) and moments (3,) after the last pulse, from commands and pressure alone."""
+def independent(body: Spacecraft, made: Schedule, until: float = math.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rates (3,), rotation (3, 3), moments (3,) at ``until`` s or the last pulse's end, from commands and pressure."""
     assert body.tank is not None
     start, per_kg = np.asarray(body.inertia.moments), np.asarray(body.tank.inertia_per_kg)
     channels, swells = {one.name: one for one in body.channels}, []
@@ -79,7 +79,8 @@ def independent(body: Spacecraft, made: Schedule) -> tuple[np.ndarray, np.ndarra
         return np.concatenate([(torque - spins @ (moments * w)) / moments, (rotation @ spins).ravel(), [flow]])
 
     y = np.concatenate([body.omega0, reference.frame_n(body.inertia.moments, body.omega0).ravel(), [0.0]])
-    edges = sorted({0.0, made.end, *(edge for one in swells for edge in one[:2])})
+    until = min(until, made.end)
+    edges = sorted({0.0, until, *(edge for one in swells for edge in one[:2] if edge < until)})
     for now, end in itertools.pairwise(edges):
         firing = [one for one in swells if one.start <= 0.5 * (now + end) <= one.end]
         y = solve_ivp(slope, (now, end), y, "DOP853", rtol=1e-13, atol=1e-15, args=(firing,)).y[:, -1]
@@ -99,7 +100,11 @@ def test_the_flight_is_that_of_eulers_equations_with_falling_moments(shed: Shed,
     assert by_flight.final.momentum == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-11)
     assert by_flight.sampled(50, made.end).momentum[-1] == pytest.approx(momentum, abs=1e-9)
     # The impulse sum takes each pulse at its centre: what it leaves out is of second order.
-    assert by_impulses(body, made).motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
+    summed, amid = by_impulses(body, made), made.pulses[2].t
+    assert summed.motion(np.array([made.end]))[0][0] == pytest.approx(rates, abs=2e-6)
+    assert by_flight.moments_at(np.array([amid]))[0] == pytest.approx(independent(body, made, amid)[2], rel=1e-6)
+    before, after = (independent(body, made, one)[2] for one in (amid - 0.3, amid + 0.3))
+    assert summed.moments_at(np.array([amid - 1e-6, amid])) == pytest.approx(np.array([before, after]), rel=1e-9)
 
 
 @pytest.mark.parametrize(("growth", "numbers"), [(None, (0, 2)), deep(40.0, (0, 1, 2, 3))])

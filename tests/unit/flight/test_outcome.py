@@ -27,7 +27,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 BODY = spinner(channels=cross(8.0, max_on_time=0.75), limits=Limits(horizon=60.0))
 FLIES = (propagation.flown, propagation.by_impulses)
@@ -164,3 +164,12 @@ def test_where_the_models_end_apart_is_shown_for_each_and_warned_of(run: Run, tm
     assert data["final"]["axis"]["tilt_deg"] == pytest.approx(10.0, abs=1e-6)
     assert data["final_by_impulses"]["axis"]["tilt_deg"] == pytest.approx(11.94, abs=0.01)
     assert "Warning" not in run("simulate", "--scheme", "none").stdout
+
+
+def test_widths_are_named_where_any_pulse_has_one() -> None:
+    wide = channel_pulse(BODY.channels[0], 1.0, 0.2)
+    kick = replace(wide, on_time=0.0)
+    both, kicks = Schedule((wide, kick)), Schedule((kick,))
+    for schedules in ([both], [kicks, both], [Schedule((wide,)), kicks]):
+        assert propagation.model_name(schedules) == propagation.REAL_WIDTHS
+    assert propagation.model_name([kicks, Schedule()]) == propagation.IDEAL_IMPULSES

@@ -114,12 +114,17 @@ def test_what_cannot_be_integrated_is_refused() -> None:
         last(body, vector(1, 0, 0), rates, 0.0, 1e6)
 
 
-@pytest.mark.parametrize("forcing", [Forcing(), Forcing(TURNING)], ids=["fixed", "turning"])
-def test_few_cases_fly_as_each_alone_does(forcing: Forcing) -> None:
+@pytest.mark.parametrize(
+    ("forcing", "alike"),
+    [(Forcing(), (0, 1)), (Forcing(TURNING), (0, 1)), (Forcing(), (0, 2))],
+    ids=["fixed", "turning", "symmetric about axis 2"],
+)
+def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, int]) -> None:
     """Bodies, motions, torques, begins and durations of their own."""
     rng, count = np.random.default_rng(12), 7
     A = 100.0 * (1.0 + 0.2 * rng.normal(size=count))
-    moments = np.array([A, A, 80.0 * (1.0 + 0.2 * rng.normal(size=count))])
+    moments = np.tile(80.0 * (1.0 + 0.2 * rng.normal(size=count)), (3, 1))
+    moments[[*alike]] = A
     rates, torque = rng.normal(size=(3, count)), 20.0 * rng.normal(size=(3, count))
     now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
     omega, quaternion = rates.copy(), np.repeat(START[:, None], count, axis=1)
@@ -131,6 +136,12 @@ def test_few_cases_fly_as_each_alone_does(forcing: Forcing) -> None:
         pieces = taylor.integrate(body, torque[:, case], rates[:, case], START, begin, end, forcing)
         alone = np.concatenate(pieces[-1].final)
         assert np.concatenate([omega[:, case], quaternion[:, case]]) == pytest.approx(alone, abs=1e-12)
+
+
+def test_the_pace_bounds_what_turns_with_a_torque_too() -> None:
+    none, rest = np.zeros(1), np.zeros(1, dtype=complex)
+    drive = taylor.Drive(none, rest, none, ((np.array([0.01 + 0j]), -7.0),))
+    assert drive.pace(np.array([0.2j]), np.array([-0.5]), np.ones(1))[0] > 7.0 + 0.5 + 0.2
 
 
 def test_steps_are_halved_where_the_torque_changes_faster_than_promised() -> None:

@@ -301,13 +301,26 @@ def test_what_cannot_give_thrust_is_neither_fired_nor_planned() -> None:
 
 
 def test_cold_pulses_leave_the_nutation_of_the_closed_form() -> None:
-    """It is not the mean that counts: the first kicks are missing."""
-    body = replace(at_rest(), cold=Cold(0.3, 3.0))
-    for count in range(2, 12):
-        block = Block(body.channels[0].name, 1, 1.0, 0.2, count)
+    """It is not the mean that counts: the first kicks are missing, and fewer after pulses fired before."""
+    name = at_rest().channels[0].name
+    for count, before in ((2, 0), (3, 0), (4, 0), (6, 0), (11, 0), (4, 2), (8, 5)):
+        body = replace(at_rest(), cold=Cold(0.3, 3.0, {name: before}))
+        block = Block(name, 1, 1.0, 0.2, count)
         model, state = in_form(body, block)
         flown = left_by(propagation.flown(body, fired(body, (block,))))
         assert float(model.left(state).nutation) == pytest.approx(flown.nutation, abs=math.radians(2e-3))
+
+
+@pytest.mark.parametrize("phase", [0.3, 1.8, 3.4, 5.0])
+def test_the_damping_delay_is_the_one_of_a_nutation_period_that_leaves_least(phase: float) -> None:
+    body = commanded(spinner(degrees=3.0, phase=phase, channels=cross(8.0)), SUN)
+    model, jet, period = BlockModel(body), body.channels[0], body.body_period
+    trial = Trial(0, 0.0, 0.05, 1, 1)
+    delay = float(model.damping_delay(model.start, jet, trial))
+    assert 0.0 <= delay < period
+    delays = delay + period * np.linspace(-0.5, 0.5, 21)
+    left = [float(model.left(model.after(model.start, jet, trial._replace(delay=one))).nutation) for one in delays]
+    assert int(np.argmin(left)) == 10
 
 
 FED = replace(

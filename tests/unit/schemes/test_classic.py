@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -406,3 +408,19 @@ def test_on_a_sphere_channels_share_the_nutation() -> None:
     assert max(one.on_time for one in on_a_sphere(0.3, cross(8.0, max_on_time=0.25)).pulses) <= 0.25
     # One channel alone takes out the component along it.
     on_a_sphere(math.pi - 0.4, cross(8.0)[:1], left=math.sin(0.4) * spinner(*SPHERE, 2.0, 5.0).transverse_rate)
+
+
+def test_what_a_tick_leaves_does_not_make_another_thruster_dearer() -> None:
+    """The alignment of the dear one is on a tick, so that it leaves nothing; the cheap one leaves some 0.1 %."""
+    channels = tuple(
+        channel(name, *torque, 0.0, thrust=8.0, isp=isp)
+        for name, torque, isp in (("dear", (8.0, 0.0), 100.0), ("cheap", (0.0, 8.0), 220.0))
+    )
+    body = spinner(channels=channels, limits=Limits(horizon=60.0, tick=0.01))
+    assert body.inertia.a * body.spin == pytest.approx(1.0)  # rad/s: the pulse from 2 to 2.5 s has its centre at 2.25 s
+    aligned = -16.0 * math.sin(0.25) / 120.0 * cmath.exp(2.25j)
+    body = replace(body, omega0=np.array([aligned.real, aligned.imag, 3.0]))
+    alone = planning.plan(replace(body, channels=channels[:1]), "one-pulse").pulses
+    assert [pulse.loaded for pulse in alone] == [pytest.approx((2.0, 0.5))]
+    (pulse,) = planning.plan(body, "one-pulse").pulses
+    assert pulse.channel == "cheap"

@@ -14,7 +14,9 @@ import pytest
 from support import reference
 from support.builders import aimed, channel, cross, spinner
 from support.cases import deep, spread, weekly
+from support.golden import refused
 
+from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.flight.verification import verify
 from nutdamp.montecarlo.cases import Model
@@ -271,3 +273,10 @@ def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> Non
     assert len(train) == 3
     assert said_of(made) == pytest.approx([min(train), max(train)], rel=1e-3)
     assert max(train) < 0.05
+
+
+def test_a_pulse_so_weak_that_it_would_outlast_the_horizon_is_refused() -> None:
+    body = replace(SHORT, cold=Cold(0.01, 1e6), limits=replace(SHORT.limits, horizon=5.0))
+    made = Schedule((channel_pulse(body.channels[0], 2.0, 0.1),))
+    with refused(Infeasible, "commanding.weak"):
+        valve_commands.as_commands(body, made, Correction(RHUMB_LINE, RhumbLineOptions()))

@@ -255,3 +255,11 @@ def test_a_train_keeps_the_narrowest_bounds_of_its_channels() -> None:
     bounded = (jets[0].of(min_on_time=0.02, max_on_time=0.9), jets[1].of(min_on_time=0.05, max_on_time=1.0), *jets[2:])
     train = Train(aimed(spinner(channels=bounded), 5.0, 0.0), RhumbLineOptions(per_turn=len(jets)))
     assert (train.shortest, train.longest) == (0.05, 0.9)
+
+
+def test_ideal_impulses_turn_a_few_degrees_each_where_there_are_too_few_moments() -> None:
+    """Of a heavy body as of a light one."""
+    for size in (1.0, 300.0):
+        body = still(120.0 * size, 80.0 * size, 30.0, steerable=Steerable(), limits=Limits(horizon=0.5))
+        said = infeasibility(planning.plan(body, "rhumb-line"))
+        assert re.search(r"takes 15 pulses", said), said

@@ -312,3 +312,13 @@ def test_nothing_is_known_of_schedules_that_turn_the_spin_axis_over(degrees: flo
     body = spinner(channels=cross(8.0), limits=Limits(horizon=60.0))
     found = bounds.rigorous(body, prices(body), 100.0, Allowed(nutation=math.radians(degrees)), shift=True)
     assert (found is not None) is known
+
+
+def test_the_highest_of_a_curve_is_found_however_loosely_its_bend_is_known() -> None:
+    program, solution = solved_program(layout(np.random.default_rng(1), count=6))
+    curve = bounds.SmallAngles(program, solution.prices)
+    every = np.ones(len(program.channels), dtype=bool)
+    known = bounds._highest(curve, every)
+    assert known == pytest.approx(curve.at(np.linspace(curve.begins[0], program.end, 20_000)).max(), rel=1e-5)
+    curve.bends = 1e9 * curve.bends  # so that no quartering rules a stretch out
+    assert known * (1.0 - 1e-9) <= bounds._highest(curve, every) < 10.0 * known
