@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.estimation import initial_guess
-from nutdamp.estimation.fit import KEPT, Fit, step
+from nutdamp.estimation.consistency import step
+from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import Body, Matrix, Values, Vector
 from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_turn, thrust_prior
 from nutdamp.physics import attitude
