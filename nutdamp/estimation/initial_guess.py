@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Model, Values, Vector, tilted
+from nutdamp.estimation.model import Model, Values, Vector
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, Record
 from nutdamp.physics import attitude
 
@@ -207,8 +207,7 @@ def _cone(model: Model, values: Values) -> dict[str, float]:
         return made
     spin = values.get("omega_3", model.spacecraft.spin)
     rate = values[RATIO] * abs(spin) * math.sqrt(1.0 - cosine**2) / cosine
-    turned = attitude.multiply(model.reference.quaternion, tilted(made["attitude_1"], made["attitude_2"]))
-    in_body = attitude.rotate(attitude.conjugate(turned), rate / size * across)
+    in_body = attitude.rotate(attitude.conjugate(model.turned(made)), rate / size * across)
     return made | {"omega_1": float(in_body[0]), "omega_2": float(in_body[1])}
 
 

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.control_loop.sensor import felt, is_blind
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.parameters import (
@@ -31,7 +32,7 @@ from nutdamp.estimation.parameters import (
     parameters,
     prior,
 )
-from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, flown, make_dynamics
+from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, Push, flown, make_dynamics
 from nutdamp.physics import attitude, energy_sink, sky, triaxial
 from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
@@ -41,6 +42,15 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Values = Mapping[str, float]
+
+PREDICTION, SHOWN, SAMPLE = 0.1, 2e-4, 1e-3
+"""Units of `work` of a prediction, of each sample, and of each time of a motion that is new, besides steps."""
+
+POLHODE = 0.8
+"""Units of a coast of three moments between pulses."""
+
+OF_SENSORS = ("bias", "misalignment", "wobble")
+"""Beginnings of the names of parameters that change nothing of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +87,7 @@ class Model:
         self.spacecraft, self.record = spacecraft, record
         self.unequal = not spacecraft.inertia.symmetric if unequal is None else unequal
         self.start = record.start
+        self._last: tuple[tuple[tuple[str, float], ...], tuple[Vector, Vector]] | None = None
         self.parameters = parameters(spacecraft, record, unequal=self.unequal, growing=growing)
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
@@ -101,18 +112,23 @@ class Model:
         """The one of that name, if it is estimated."""
         return next((one for one in self.parameters if one.name == name), None)
 
+    def turned(self, values: Values) -> Vector:
+        """Attitude (4,) of the file's principal axes at the start of the record."""
+        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
+        turn = _turned(np.array([0.0, 0.0, values.get("attitude_3", 0.0)]))
+        return attitude.multiply(self.reference.quaternion, attitude.multiply(_tilted(values, "attitude"), turn))
+
     def body(self, values: Values) -> Body:
         """The body that parameters describe."""
         of_file, spacecraft = self.spacecraft.inertia, self.spacecraft
         A, C = in_moments(spacecraft, values)
         rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
-        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
-        tilt = np.array([values.get("attitude_1", 0.0), values.get("attitude_2", 0.0), 0.0])
-        turn = np.array([0.0, 0.0, values.get("attitude_3", 0.0)])
-        quaternion = attitude.multiply(self.reference.quaternion, attitude.multiply(_turned(tilt), _turned(turn)))
+        quaternion = self.turned(values)
         growth = values.get("growth", spacecraft.growth)
         e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
+        if not (A > 0.0 and C > 0.0 and size < 1.0):
+            raise Infeasible("no body has such moments of inertia")
         moments, axes = (A, A, C), of_file.axes
         if size > 0.0:
             half = 0.5 * math.atan2(e2, e1)
@@ -142,18 +158,24 @@ class Model:
 
     def predicted(self, values: Values) -> Vector:
         """What the samples of `measured` would be without noise, (m,)."""
-        times, back = self._all_times
-        if self._turned:
-            rates, quaternion = self.motion(values, times)
-            quaternion = quaternion[back]
-        else:
-            rates, quaternion = self._rates(values, times), np.empty((len(back), 0))
-        rates = rates[back]
+        work.spend(PREDICTION + SHOWN * len(self.measured))
+        _, back = self._all_times
+        rates, quaternion = (part[back] for part in self._remembered(values))
         parts = []
         for index, name in enumerate(self.signals):
             rows = self.signal == index
             parts.append(self._shown(name, values, rates[rows], quaternion[rows]))
         return np.concatenate(parts)
+
+    def _remembered(self, values: Values) -> tuple[Vector, Vector]:
+        """The motion at all times; once for values that differ in what only the sensors are off."""
+        key = tuple((name, value) for name, value in values.items() if not name.startswith(OF_SENSORS))
+        if self._last is None or self._last[0] != key:
+            times, _ = self._all_times
+            work.spend(SAMPLE * len(times))
+            bare = np.empty((len(times), 0))
+            self._last = key, self.motion(values, times) if self._turned else (self._rates(values, times), bare)
+        return self._last[1]
 
     @property
     def _turned(self) -> bool:
@@ -163,9 +185,11 @@ class Model:
     def _rates(self, values: Values, times: Vector) -> Vector:
         """The rates of `motion` alone."""
         body = self.body(values)
-        if self.pulses.pulses or self.spacecraft.disturbances or not body.symmetric:
+        if self.pulses.pulses or self.spacecraft.disturbances or not (body.symmetric or body.growth == 0.0):
             return self.motion(values, times)[0]
         state, (A, _, C) = body.state, body.moments
+        if not body.symmetric:
+            return triaxial.free_rates(body.moments, state.rates, times - self.start) @ body.axes.T
         omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, times - self.start)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
 
@@ -202,9 +226,9 @@ class Model:
     def _shown(self, name: str, values: Values, rates: Vector, quaternion: Vector) -> Vector:
         """A signal at the motion of its samples."""
         if name in GYROS:
-            tilt = np.array([values.get("misalignment_1", 0.0), values.get("misalignment_2", 0.0), 0.0])
-            shown = attitude.rotate(_turned(-tilt), rates)[:, GYROS.index(name)]  # of gyros that are turned by it
-            return np.asarray(shown + values.get(f"bias_{name}", 0.0))
+            # Of gyros that are turned by a rotation vector across axis 3: ω seen in their axes.
+            along = attitude.rotate(_tilted(values, "misalignment"), np.eye(3)[GYROS.index(name)])
+            return np.asarray(rates @ along + values.get(f"bias_{name}", 0.0))
         if name == ACCELERATION:
             assert self.spacecraft.loop is not None
             of_file = self.spacecraft.inertia
@@ -216,9 +240,8 @@ class Model:
             return self._sun_late(rates, quaternion)
         half = len(rates) // 2
         sense = math.copysign(1.0, self.spacecraft.spin)
-        wobble = np.array([values.get("wobble_2", 0.0), -values.get("wobble_1", 0.0), 1.0])
-        axis = attitude.rotate(quaternion[:half], sense * self.spacecraft.inertia.axes @ wobble)
-        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+        along = attitude.rotate(_tilted(values, "wobble"), np.array([0.0, 0.0, sense]))
+        axis = attitude.rotate(quaternion[:half], self.spacecraft.inertia.axes @ along)
         return np.concatenate([np.sum(one * axis, axis=1) for one in self._across])
 
     def _moments(self, values: Values) -> tuple[float, float, float]:
@@ -270,7 +293,7 @@ class Model:
             )
         spacecraft = self._as_spacecraft(body)
         made = make_dynamics(spacecraft)
-        dynamics = Dynamics(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
+        dynamics = _Closed(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
         pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
         return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
 
@@ -297,21 +320,38 @@ def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation."""
     if body.symmetric:
         return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth)
-    return _Polhode(body)
+    return _Polhode(body.moments, body.state)
 
 
 @dataclass(frozen=True)
 class _Polhode:
-    """Coast of a body of three different moments."""
+    """Coast of a body of three different moments from ``state`` at ``start`` s."""
 
-    body: Body
+    moments: tuple[float, float, float]
+    state: SpinState
+    start: float = 0.0
     steps: int = 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        body = self.body
-        rates = body.state.rates
-        turned = triaxial.free_attitude(body.moments, rates, body.state.quaternion, times)
-        return triaxial.free_rates(body.moments, rates, times), turned
+        since, rates = times - self.start, self.state.rates
+        turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
+        return triaxial.free_rates(self.moments, rates, since), turned
+
+
+class _Closed(Dynamics):
+    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them.
+
+    A fit flies thousands of times, and most of a record is coast.
+    """
+
+    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+        acts = bool(push.torques) or push.falling is not None or self.constant.any() or self.forcing != Forcing()
+        if acts or end == start or self.moments[0] == self.moments[1]:
+            return super()._path(state, start, end, push, most)
+        work.spend(POLHODE)
+        coast = _Polhode(self.moments, state, start)
+        rates, quaternion = coast.motion(np.array([end]))
+        return coast, SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
 
 
 @dataclass(frozen=True)
@@ -335,16 +375,16 @@ def _sinking(momentum: Vector, growth: float) -> Vector:
     return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
 
 
-def tilted(first: float, second: float) -> Vector:
-    """Quaternion (4,) of the tilt of an attitude by two angles about axes 1 and 2, rad."""
-    return _turned(np.array([first, second, 0.0]))
-
-
 def _turned(angles: Vector) -> Vector:
     """Quaternion of the turn by a vector of angles (3,), rad."""
     size = float(np.linalg.norm(angles))
     share = math.sin(0.5 * size) / size if size > 0.0 else 0.5
     return np.array([math.cos(0.5 * size), *(share * angles)])
+
+
+def _tilted(values: Values, kind: str) -> Vector:
+    """Quaternion of the turn by the rotation vector across axis 3 that two parameters of a kind make."""
+    return _turned(np.array([values.get(f"{kind}_1", 0.0), values.get(f"{kind}_2", 0.0), 0.0]))
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
