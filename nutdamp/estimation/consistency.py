@@ -12,13 +12,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import bdtrc
 
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn
 from nutdamp.estimation.model import Model, Vector
-from nutdamp.estimation.parameters import ACCELERATION, GYROS, SUN_PULSE
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, SUN_PULSE
 from nutdamp.estimation.search import NORMAL_MAD, least
 from nutdamp.physics import body as rigid_body
 
@@ -29,33 +30,43 @@ SHOW_NUTATION = {*GYROS[:2], "axis", ACCELERATION}
 """Signals one of which there must be."""
 
 STUCK, FEWEST, COARSE = 0.2, 20, 10
-"""Part of the samples of a rate gyro, and number of them, that are alike in a row where it is stuck; a record that has
+"""Part of the samples of a sensor, and number of them, that are alike in a row where it is stuck; a record that has
 so few different values is one of coarse steps."""
 
 
 def expect_alive(model: Model) -> None:
-    """Raises Infeasible for a transverse gyro that does not change while another signal shows the nutation."""
-    varying = [index for index, one in enumerate(model.signals) if one in SHOW_NUTATION and _run(model, index)[3] > 1]
+    """Raises Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
+
+    That gyro 3 does not change all along is as it should be.
+    """
+    varying = [index for index, name in enumerate(model.signals) if name in SHOW_NUTATION and _run(model, index)[3] > 1]
     for index, signal in enumerate(model.signals):
-        begins, ends, alike, different = _run(model, index)
-        count = int((model.signal == index).sum())
-        if signal not in GYROS[:2] or alike < max(FEWEST, STUCK * count) or not set(varying) - {index}:
+        if signal == SUN_PULSE:
             continue
-        if different == 1 or different > COARSE:
+        begins, ends, alike, different = _run(model, index)
+        count = int((model.signal == index).sum()) // (2 if signal == "axis" else 1)
+        if alike < max(FEWEST, STUCK * count):
+            continue
+        dead = different == 1 and signal != GYROS[2] and bool(set(varying) - {index})
+        if dead or different > COARSE:
+            while_others = " while others show a nutation" if dead else ""
             raise Infeasible(
-                f"{signal} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples) while others show a "
-                "nutation: the sensor is dead or stuck; leave its column out, or end the record before"
+                f"{signal} does not change from {begins:.4g} s to {ends:.4g} s ({alike} samples){while_others}: "
+                "the sensor is dead or stuck; leave its column out, or end the record before"
             )
 
 
 def _run(model: Model, index: int) -> tuple[float, float, int, int]:
     """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
     rows = np.flatnonzero(model.signal == index)
-    values, times = model.measured[rows], model.times[rows]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(values)]])
+    values, times = model.measured[rows, None], model.times[rows]
+    if model.signals[index] == "axis":
+        axis = np.column_stack([model.record.signals[name] for name in AXIS])
+        values = axis[np.isfinite(axis).all(axis=1)]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
     at = int(np.argmax(np.diff(edges)))
     first, last = edges[at], edges[at + 1] - 1
-    return float(times[first]), float(times[last]), int(last - first + 1), len(np.unique(values))
+    return float(times[first]), float(times[last]), int(last - first + 1), len(np.unique(values, axis=0))
 
 
 def expect_enough(model: Model) -> None:
@@ -191,23 +202,41 @@ def step(found: Fit, signals: Sequence[int], *, small: bool = False) -> float | 
     None where no step shows; ``small``: one that may hide in noise.
     """
     model = found.model
-    chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION)]
-    rate = initial_guess.nutation_rate(model, found.values)
+    chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION, "axis")]
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
     total, left = 0.0, np.zeros(len(splits))
     for index in chosen:
-        rows = np.flatnonzero((model.signal == index) & (found.used | (not small)))
-        rows = rows[:: -(-len(rows) // SAMPLES)]
-        times, values = model.times[rows], found.residuals[rows] / found.noise[index]
-        turn = rate * (times - model.record.start)
-        wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
-        # Waves that grow linearly stand for what a rate that is off does, with or without a step.
-        smooth = np.column_stack([wave, wave * (times - times.mean())[:, None] / model.record.length])
-        total += _remains(smooth, values)
-        left += [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
+        rows, rate = np.flatnonzero(model.signal == index), _rate(found, index)
+        # Of the axis what is off in two directions across it.
+        for part in np.array_split(rows, 2) if model.signals[index] == "axis" else (rows,):
+            without, with_step = _with_step(found, part[found.used[part] | (not small)], rate, splits)
+            total, left = total + without, left + with_step
     best = int(np.argmin(left))
     shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
     return float(splits[best]) if chosen and shows else None
+
+
+def _rate(found: Fit, signal: int) -> float:
+    """Rate at which a signal shows the nutation, rad/s: in the body, or of the axis about H."""
+    rate = initial_guess.nutation_rate(found.model, found.values)
+    if found.model.signals[signal] != "axis":
+        return rate
+    named = found.named
+    axial = named[RATIO] * named.get("omega_3", found.model.spacecraft.spin)
+    return math.hypot(axial, named["omega_1"], named["omega_2"])
+
+
+def _with_step(found: Fit, rows: NDArray[np.intp], rate: float, splits: Vector) -> tuple[float, Vector]:
+    """Sums of squares that waves of one rate leave of residuals: without a step, and with one at each of some times."""
+    model = found.model
+    rows = rows[:: max(-(-len(rows) // SAMPLES), 1)]
+    times, values = model.times[rows], found.residuals[rows] / found.noise[model.signal[rows]]
+    turn = rate * (times - model.record.start)
+    wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
+    # Waves that grow linearly stand for what a rate that is off does, with or without a step.
+    smooth = np.column_stack([wave, wave * (times - times.mean())[:, None] / model.record.length])
+    with_step = [_remains(np.column_stack([smooth, wave * (times > split)[:, None]]), values) for split in splits]
+    return _remains(smooth, values), np.array(with_step)
 
 
 def _remains(columns: Vector, values: Vector) -> float:

@@ -203,7 +203,7 @@ def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -
     yield from moments(spacecraft)
     for number in (1, 2):
         yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, TINY * abs(spin))
-    if record.has(GYROS[2]) or len(record.sun_pulses):
+    if shows_spin(record):
         yield Parameter("omega_3", "rad/s", spin, math.inf, TINY * abs(spin))
     elif given is not None and given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
@@ -241,6 +241,11 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 def shows_turn(record: Record) -> bool:
     """Whether a signal shows how the body is turned about its axis."""
     return len(record.sun_pulses) > 0 or any(record.has(name) for name in (*GYROS[:2], ACCELERATION))
+
+
+def shows_spin(record: Record) -> bool:
+    """Whether a signal shows ω3."""
+    return record.has(GYROS[2]) or len(record.sun_pulses) > 0
 
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -295,5 +300,5 @@ def untold(record: Record) -> Iterator[str]:
         yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
     if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
         yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
-    if not record.has(GYROS[2]) and not len(record.sun_pulses):
+    if not shows_spin(record):
         yield f"no signal shows the spin (omega_3 or {SUN_PULSE}): it is that of the file"

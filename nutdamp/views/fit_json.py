@@ -45,7 +45,7 @@ def fit_json(
         "information": found.information.tolist(),
         "parameters": [one.name for one in model.parameters],
         "values_SI": found.values.tolist(),
-        "covariance_SI": found.covariance.tolist(),
+        "covariance_SI": found.region.tolist(),
         "dispersed": {
             "inputs": list(carried.names),
             "values_SI": carried.values.tolist(),
