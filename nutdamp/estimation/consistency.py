@@ -19,7 +19,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn
 from nutdamp.estimation.model import Model, Vector
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, SUN_PULSE
+from nutdamp.estimation.parameters import ACCELERATION, GYROS, RATIO, SUN_PULSE
 from nutdamp.estimation.search import NORMAL_MAD, least
 from nutdamp.physics import body as rigid_body
 
@@ -61,8 +61,7 @@ def _run(model: Model, index: int) -> tuple[float, float, int, int]:
     rows = np.flatnonzero(model.signal == index)
     values, times = model.measured[rows, None], model.times[rows]
     if model.signals[index] == "axis":
-        axis = np.column_stack([model.record.signals[name] for name in AXIS])
-        values = axis[np.isfinite(axis).all(axis=1)]
+        values = model.axes
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
     at = int(np.argmax(np.diff(edges)))
     first, last = edges[at], edges[at + 1] - 1

@@ -198,10 +198,15 @@ class Model:
         return np.unique(self.times, return_inverse=True)
 
     @cached_property
+    def axes(self) -> Vector:
+        """The axes that are measured, unit vectors (n, 3)."""
+        axis = np.column_stack([self.record.signals[name] for name in AXIS])
+        return np.asarray(axis[np.isfinite(axis).all(axis=1)])
+
+    @cached_property
     def _across(self) -> tuple[Vector, Vector]:
         """Two unit vectors (n, 3) across each measured axis."""
-        axis = np.column_stack([self.record.signals[name] for name in AXIS])
-        axis = axis[np.isfinite(axis).all(axis=1)]
+        axis = self.axes
         aside = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
         first = np.cross(axis, aside)
         first /= np.linalg.norm(first, axis=1, keepdims=True)

@@ -86,12 +86,13 @@ def scales_of(model: Model) -> Vector:
 
 
 def share_left(model: Model, values: Vector) -> float:
-    """Largest share of a signal's own variation that the residuals still have."""
+    """Least share of a signal's own variation that the residuals still have."""
     left = residuals(model, values)
     shares = []
-    for index in range(len(model.signals)):
+    for index, name in enumerate(model.signals):
         rows = model.signal == index
-        varied = float(np.median(np.abs(model.measured[rows] - np.median(model.measured[rows]))))
+        shown = model.measured[rows, None] if name != "axis" else model.axes
+        varied = float(np.median(np.linalg.norm(shown - np.median(shown, axis=0), axis=1)))
         if varied > 0.0:
             shares.append(float(np.median(np.abs(left[rows]))) / varied)
     return min(shares, default=0.0)
