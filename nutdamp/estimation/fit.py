@@ -221,8 +221,9 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     unequal = _widened(found, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
     if not growing or not _shows_growth(unequal):
         return unequal
-    begin = _begun(unequal, three)
-    begin[_places(three, ("growth",))] = found.named["growth"]
+    begin = _begun(found, three)
+    of_moments = _places(three, UNEQUAL_BY)
+    begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 
 
@@ -335,7 +336,8 @@ def _settled(model: Model, values: Vector) -> Fit:
         if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
             break
         values, _ = search(model, values, noise, used, robust=False)
-    left, slopes = residuals(model, values), jacobian(model, values, range(len(values)))
+    left = residuals(model, values)
+    slopes = jacobian(model, values, range(len(values)), one_sided=work.exhausted())
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = covariance_of(model, scaled)

@@ -145,7 +145,7 @@ def test_thrust_of_random_bodies_of_three_moments(seed: int) -> None:
 
 @pytest.mark.weekly
 def test_three_moments_and_growth_together_are_found_within_the_budget() -> None:
-    """Each trial is integrated; begun with the moments found without growth, and the growth without them."""
+    """Each trial is integrated; begun with unequal moments as found without growth, all else as without them."""
     body, times = nutdamp.load(FILE | {"omega0": [0.1, 0.05, 0.9]}), np.linspace(0.0, 200.0, 400)
     shown = motion((121.0, 115.0, 170.0), body.omega0, times, -0.004)
     shown += math.radians(0.01) * np.random.default_rng(2).normal(size=shown.shape)
