@@ -1,4 +1,4 @@
-"""Whether a record can be fitted, and whether a fit explains it: what it leaves must be noise.
+"""Tests of records and fits: that a record can be fitted, and that what its fit leaves is noise.
 
 Second differences of the residuals, r[k-1] - 2 r[k] + r[k+1], have the standard deviation √6 s of noise s, and next to
 nothing of what changes slowly. Residuals far larger than that s are no noise but motion that the model does not have,
@@ -35,7 +35,7 @@ so few different values is one of coarse steps."""
 
 
 def expect_alive(model: Model) -> None:
-    """Raises Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
+    """Raise Infeasible for a sensor that does not change, all along while another one shows a nutation, or for long.
 
     That gyro 3 does not change all along is as it should be.
     """
@@ -69,13 +69,13 @@ def _run(model: Model, index: int) -> tuple[float, float, int, int]:
 
 
 def expect_enough(model: Model) -> None:
-    """Raises Infeasible for a record that cannot tell as much as is estimated."""
+    """Raise Infeasible for a record that cannot tell as much as is estimated."""
     if not SHOW_NUTATION & set(model.signals):
         raise Infeasible(
             f"no nutation is seen in {' and '.join(model.signals)} alone{once_a_turn(model.record)}; omega_1 or "
             "omega_2, the axis or an acceleration beside them would show it"
         )
-    rows, free = len(np.unique(model.times)), sum(math.isinf(one.prior) for one in model.parameters)
+    rows, free = len(np.unique(model.times)), sum(math.isinf(parameter.prior) for parameter in model.parameters)
     if len(model.measured) <= free + 2:
         raise Infeasible(
             f"{rows} row{'s' * (rows != 1)} of samples, with {len(model.measured)} values in all, cannot tell {free} "
@@ -117,49 +117,49 @@ SHOWN = 50.0
 """Decrease of the sum of squares, in units of the noise, by which a step shows in residuals that are nearly noise."""
 
 
-def expect_explained(found: Fit) -> None:
-    """Raises Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one.
+def expect_explained(fitted: Fit) -> None:
+    """Raise Infeasible where a fit leaves more than noise, with the time of a step in the motion if there is one.
 
     So it does where samples are left out that follow each other: outliers come one by one, motion does not.
     """
-    model = found.model
-    burst = left_out_together(found)
+    model = fitted.model
+    burst = left_out_together(fitted)
     if burst is not None:
         signal, begins, ends, count = burst
         raise Infeasible(
             f"from {begins:.4g} s to {ends:.4g} s the motion fitted does not explain {signal}: {count} samples would "
-            f"have to be left out, which is motion and no outlier; {_cure(found)}"
+            f"have to be left out, which is motion and no outlier; {_cure(fitted)}"
         )
-    left = [index for index in range(len(model.signals)) if _more_than_noise(found, index)]
+    left = [index for index in range(len(model.signals)) if _more_than_noise(fitted, index)]
     if not left:
         return
     signals = ", ".join(model.signals[index] for index in left)
-    more = max(found.noise[index] / _noise(found, index) for index in left)
+    more = max(fitted.noise[index] / _noise(fitted, index) for index in left)
     says = f"the motion fitted does not explain {signals}: residuals are {more:.2g} times the noise between samples"
-    time = step(found, left)
+    time = step(fitted, left)
     where = "" if time is None else f", with a step at about {time:.4g} s"
-    raise Infeasible(f"{says}{where}; {_cure(found)}")
+    raise Infeasible(f"{says}{where}; {_cure(fitted)}")
 
 
-def _cure(found: Fit) -> str:
-    fired = found.model.record.fired
+def _cure(fitted: Fit) -> str:
+    fired = fitted.model.record.fired
     what = "check the channels and times of the schedule" if fired else "give the pulses fired in it with --schedule"
     return f"{what}; a record of the coast before or after needs none"
 
 
-def left_out_together(found: Fit) -> tuple[str, float, float, int] | None:
+def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
     """Signal, first and last time (s), and number of samples that were left out though they follow each other.
 
     None where those left out lie as scattered as chance has it: of any `WINDOWS` samples in a row no more than by the
     share left out elsewhere (binomial tail, `CHANCE` for all windows).
     """
-    model, least, burst = found.model, CHANCE, None
+    model, least, burst = fitted.model, CHANCE, None
     for index, signal in enumerate(model.signals):
         rows = np.flatnonzero(model.signal == index)
         rows = rows[np.argsort(model.times[rows], kind="stable")]
-        out = ~found.used[rows]
+        out = ~fitted.used[rows]
         sums = np.concatenate([[0], np.cumsum(out)])
-        for width in (one for one in WINDOWS if one < len(rows)):
+        for width in (samples for samples in WINDOWS if samples < len(rows)):
             counts = sums[width:] - sums[:-width]
             elsewhere = np.maximum(sums[-1] - counts, 1.0) / (len(rows) - width)
             chances = len(rows) * bdtrc(counts - 1, width, np.minimum(elsewhere, 1.0))
@@ -171,65 +171,65 @@ def left_out_together(found: Fit) -> tuple[str, float, float, int] | None:
     return burst
 
 
-def _rows(found: Fit, signal: int) -> Vector:
-    return np.asarray(found.residuals[found.model.signal == signal])
+def _rows(fitted: Fit, signal: int) -> Vector:
+    return np.asarray(fitted.residuals[fitted.model.signal == signal])
 
 
-def _noise(found: Fit, signal: int) -> float:
+def _noise(fitted: Fit, signal: int) -> float:
     """Noise of a signal by its second differences; at least that of its steps."""
-    second = np.diff(_rows(found, signal), 2)
+    second = np.diff(_rows(fitted, signal), 2)
     noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
-    return max(noise, float(least(found.model)[signal]))
+    return max(noise, float(least(fitted.model)[signal]))
 
 
-def _more_than_noise(found: Fit, signal: int) -> bool:
-    model = found.model
+def _more_than_noise(fitted: Fit, signal: int) -> bool:
+    model = fitted.model
     values = model.measured[model.signal == signal]
     if (
         model.signals[signal] == SUN_PULSE
         or len(values) < FEWEST_JUDGED
-        or found.noise[signal] < FAR * _noise(found, signal)
+        or fitted.noise[signal] < FAR * _noise(fitted, signal)
     ):
         return False
     varied = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
-    return bool(found.noise[signal] > PART * varied) and not found.white(signal)
+    return bool(fitted.noise[signal] > PART * varied) and not fitted.white(signal)
 
 
-def step(found: Fit, signals: Sequence[int], *, small: bool = False) -> float | None:
-    """When the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals.
+def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float | None:
+    """Time at which the nutation steps, s: where a jump of its sine and cosine leaves the least of the residuals.
 
     None where no step shows; ``small``: one that may hide in noise.
     """
-    model = found.model
+    model = fitted.model
     chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION, "axis")]
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
     total, left = 0.0, np.zeros(len(splits))
     for index in chosen:
-        rows, rate = np.flatnonzero(model.signal == index), _rate(found, index)
+        rows, rate = np.flatnonzero(model.signal == index), _rate(fitted, index)
         # Of the axis what is off in two directions across it.
         for part in np.array_split(rows, 2) if model.signals[index] == "axis" else (rows,):
-            without, with_step = _with_step(found, part[found.used[part] | (not small)], rate, splits)
+            without, with_step = _with_step(fitted, part[fitted.used[part] | (not small)], rate, splits)
             total, left = total + without, left + with_step
     best = int(np.argmin(left))
     shows = total - left[best] > SHOWN if small else left[best] < STEP**2 * total
     return float(splits[best]) if chosen and shows else None
 
 
-def _rate(found: Fit, signal: int) -> float:
+def _rate(fitted: Fit, signal: int) -> float:
     """Rate at which a signal shows the nutation, rad/s: in the body, or of the axis about H."""
-    rate = initial_guess.nutation_rate(found.model, found.values)
-    if found.model.signals[signal] != "axis":
+    rate = initial_guess.nutation_rate(fitted.model, fitted.values)
+    if fitted.model.signals[signal] != "axis":
         return rate
-    named = found.named
-    axial = named[RATIO] * named.get("omega_3", found.model.spacecraft.spin)
+    named = fitted.named
+    axial = named[RATIO] * named.get("omega_3", fitted.model.spacecraft.spin)
     return math.hypot(axial, named["omega_1"], named["omega_2"])
 
 
-def _with_step(found: Fit, rows: NDArray[np.intp], rate: float, splits: Vector) -> tuple[float, Vector]:
+def _with_step(fitted: Fit, rows: NDArray[np.intp], rate: float, splits: Vector) -> tuple[float, Vector]:
     """Sums of squares that waves of one rate leave of residuals: without a step, and with one at each of some times."""
-    model = found.model
+    model = fitted.model
     rows = rows[:: max(-(-len(rows) // SAMPLES), 1)]
-    times, values = model.times[rows], found.residuals[rows] / found.noise[model.signal[rows]]
+    times, values = model.times[rows], fitted.residuals[rows] / fitted.noise[model.signal[rows]]
     turn = rate * (times - model.record.start)
     wave = np.column_stack([np.cos(turn), np.sin(turn), np.ones(len(rows))])
     # Waves that grow linearly stand for what a rate that is off does, with or without a step.

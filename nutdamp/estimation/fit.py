@@ -82,7 +82,7 @@ KEPT = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a record says of a spacecraft.
+    """Estimate of a spacecraft from a record.
 
     ``values`` (p,) of the model's parameters, SI, with their ``covariance`` (p, p); ``noise`` one sigma of each signal
     (rad of the axis, s of Sun pulses); ``used`` (m,) the samples that are no outliers, ``residuals`` (m,) measured
@@ -110,7 +110,7 @@ class Fit:
 
     def index(self, name: str) -> int | None:
         """Position of a parameter; None where it is not estimated."""
-        return next((at for at, one in enumerate(self.model.parameters) if one.name == name), None)
+        return next((at for at, parameter in enumerate(self.model.parameters) if parameter.name == name), None)
 
     @cached_property
     def region(self) -> Matrix:
@@ -142,7 +142,7 @@ class Fit:
     def kept(self) -> tuple[str, ...]:
         """Parameters that the data do not tell: they stay as the file has them."""
         pairs = zip(self.model.parameters, self.sigmas, strict=True)
-        return tuple(one.name for one, sigma in pairs if sigma > KEPT * one.prior)
+        return tuple(parameter.name for parameter, sigma in pairs if sigma > KEPT * parameter.prior)
 
     @cached_property
     def information(self) -> Vector:
@@ -150,7 +150,7 @@ class Fit:
 
         They are those of J/s in units of the priors, for the parameters that have one, the others being fitted.
         """
-        priors = np.array([one.prior for one in self.model.parameters])
+        priors = np.array([parameter.prior for parameter in self.model.parameters])
         with_prior = np.isfinite(priors)
         scaled = self.jacobian[self.used] / self.noise[self.model.signal[self.used], None]
         free, held = scaled[:, ~with_prior], scaled[:, with_prior] * priors[with_prior]
@@ -172,13 +172,13 @@ class Fit:
         return np.array([float(left[lag:] @ left[:-lag]) / total for lag in range(1, min(lags, len(left) - 1) + 1)])
 
     def white(self, signal: int) -> bool:
-        """Whether the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
+        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
         from scipy.special import chdtri
 
         count = int((self.used & (self.model.signal == signal)).sum())
-        found = self.whiteness(signal, 20)
-        lags = np.arange(1, len(found) + 1)
-        return bool(count * (count + 2) * np.sum(found**2 / (count - lags)) < chdtri(len(found), 0.001))
+        correlations = self.whiteness(signal, 20)
+        lags = np.arange(1, len(correlations) + 1)
+        return bool(count * (count + 2) * np.sum(correlations**2 / (count - lags)) < chdtri(len(correlations), 0.001))
 
 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
@@ -205,30 +205,30 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     model = Model(spacecraft, record, growing=spacecraft.inertia.symmetric)
     expect_enough(model)
     expect_alive(model)
-    found = _settled(model, _best(model))
-    _expect_seen(found)
-    found = initial_guess.likeliest(
-        [found, *(_settled(model, one) for one in initial_guess.neighbours(model, found.values))]
+    fitted = _settled(model, _best(model))
+    _expect_seen(fitted)
+    fitted = initial_guess.likeliest(
+        [fitted, *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values))]
     )
-    grown = found.index("growth")
-    growing = grown is not None and bool(abs(found.values[grown]) > GROWS * found.sigmas[grown])
+    grown = fitted.index("growth")
+    growing = grown is not None and bool(abs(fitted.values[grown]) > GROWS * fitted.sigmas[grown])
     if model.unequal:
-        return _widened(found, Model(spacecraft, record), ("growth",)) if _shows_growth(found) else found
+        return _widened(fitted, Model(spacecraft, record), ("growth",)) if _shows_growth(fitted) else fitted
     three = Model(spacecraft, record, unequal=True, growing=growing)
-    if not _shown(found, three, _begun(found, three), _places(three, UNEQUAL_BY)):
-        return found
+    if not _shown(fitted, three, _begun(fitted, three), _places(three, UNEQUAL_BY)):
+        return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
-    unequal = _widened(found, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
+    unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
     if not growing or not _shows_growth(unequal):
         return unequal
-    begin = _begun(found, three)
+    begin = _begun(fitted, three)
     of_moments = _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 
 
 def _shows_growth(narrow: Fit) -> bool:
-    """Whether the residuals of a fit of three moments show dissipation."""
+    """True where the residuals of a fit of three moments show dissipation."""
     wider = Model(narrow.model.spacecraft, narrow.model.record, unequal=True)
     which = _places(wider, ("growth",))
     return bool(which) and _shown(narrow, wider, _begun(narrow, wider), which)
@@ -254,16 +254,16 @@ def _widened(narrow: Fit, wider: Model, more: Sequence[str]) -> Fit:
     return _settled(wider, values)
 
 
-def _expect_seen(found: Fit) -> None:
-    """Raises Infeasible where there is no nutation in the record."""
-    at = [found.index("omega_1"), found.index("omega_2")]
-    omega = np.array([found.values[one] for one in at if one is not None])
-    across = found.covariance[np.ix_(at, at)]  # type: ignore[arg-type]
+def _expect_seen(fitted: Fit) -> None:
+    """Raise Infeasible where there is no nutation in the record."""
+    at = [fitted.index("omega_1"), fitted.index("omega_2")]
+    omega = np.array([fitted.values[place] for place in at if place is not None])
+    across = fitted.covariance[np.ix_(at, at)]  # type: ignore[arg-type]
     # Its size counts: where the phase is hardly known, the rate across it is not either.
     size = float(np.linalg.norm(omega))
     sigma = size / math.sqrt(float(omega @ np.linalg.pinv(across, hermitian=True) @ omega))
     if size < SEEN * sigma:
-        expect_explained(found)
+        expect_explained(fitted)
         least = math.degrees(SEEN * sigma)
         raise Infeasible(
             f"no nutation is seen: the transverse rate of {math.degrees(size):.3g} deg/s is below {least:.3g} deg/s, "
@@ -300,23 +300,23 @@ def _grown(model: Model, share: float, values: Vector) -> tuple[Vector, float]:
 def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, float]:
     """Values from the start of least cost; where these are poor, the best from the three starts of least cost."""
     scales, every = scales_of(model), np.ones(len(model.measured), dtype=bool)
-    vectors = [np.array([one[each.name] for each in model.parameters]) for one in begins]
+    vectors = [np.array([begin[each.name] for each in model.parameters]) for begin in begins]
     if len(vectors) > 1:
-        costs = [float(np.abs(residuals(model, one) / scales[model.signal]).sum()) for one in vectors]
+        costs = [float(np.abs(residuals(model, begin) / scales[model.signal]).sum()) for begin in vectors]
         vectors = [vectors[index] for index in np.argsort(costs)[:STARTS]]
-    found = []
-    for one in vectors:
-        found.append(search(model, one, scales, every, robust=True, near=False))
-        if share_left(model, found[-1][0]) < POOR:
+    ends = []
+    for begin in vectors:
+        ends.append(search(model, begin, scales, every, robust=True, near=False))
+        if share_left(model, ends[-1][0]) < POOR:
             break
-    values, cost = min(found, key=lambda one: one[1])
+    values, cost = min(ends, key=lambda end: end[1])
     if _unlikely(model, values):
-        found = [(values, cost), *(search(model, one, scales, every, robust=True) for one in vectors[:STARTS])]
-    return min(found, key=lambda one: one[1])
+        ends = [(values, cost), *(search(model, begin, scales, every, robust=True) for begin in vectors[:STARTS])]
+    return min(ends, key=lambda end: end[1])
 
 
 def _unlikely(model: Model, values: Vector) -> bool:
-    """Whether the file hardly allows for the values: the search may have left the valley in which it began."""
+    """True where the file hardly allows for the values: the search may have left the valley in which it began."""
     rows, nominal = model.prior
     return bool(np.any(np.abs(rows @ values - nominal) > UNLIKELY))
 
@@ -352,16 +352,16 @@ def estimated(model: Model, values: Vector, noise: Vector) -> Fit:
     return Fit(model, values, covariance, noise, np.ones(count, dtype=bool), np.zeros(count), slopes)
 
 
-def _shown(found: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
-    """Whether the residuals show parameters of a wider model: a score test, one step of least squares by them."""
-    model, count = found.model, len(which)
-    weights = 1.0 / found.noise[model.signal[found.used]]
-    slopes = jacobian(wider, at, which)[found.used] * weights[:, None] * units_of(wider)[list(which)]
+def _shown(fitted: Fit, wider: Model, at: Vector, which: Sequence[int]) -> bool:
+    """True where the residuals show parameters of a wider model: a score test, one step of least squares by them."""
+    model, count = fitted.model, len(which)
+    weights = 1.0 / fitted.noise[model.signal[fitted.used]]
+    slopes = jacobian(wider, at, which)[fitted.used] * weights[:, None] * units_of(wider)[list(which)]
     units, rows = units_of(model), len(model.prior[0])
-    known = found.jacobian[found.used] * weights[:, None] * units
+    known = fitted.jacobian[fitted.used] * weights[:, None] * units
     bound = np.concatenate([model.prior[0] * units, np.zeros((rows, count))], axis=1)
     stacked = np.concatenate([np.concatenate([known, slopes], axis=1), bound])
-    target = np.concatenate([found.residuals[found.used] * weights, np.zeros(rows)])
+    target = np.concatenate([fitted.residuals[fitted.used] * weights, np.zeros(rows)])
     solved = np.linalg.lstsq(stacked, target, rcond=1e-13)[0][-count:]
     covariance = np.linalg.pinv(stacked.T @ stacked, rcond=1e-14)[-count:, -count:]
     return bool(solved @ np.linalg.solve(covariance, solved) > UNEQUAL**2)

@@ -109,7 +109,7 @@ def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
 
 
 def once_a_turn(record: Record) -> str:
-    """What Sun pulses tell by themselves, in words; nothing without them."""
+    """Words on what Sun pulses tell by themselves; empty without them."""
     if len(record.sun_pulses) < 3:
         return ""
     spin, sigma = np.degrees(spin_of(record.sun_pulses, record.sun_step))
@@ -127,8 +127,8 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
         return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
     for name in (*GYROS[:2], ACCELERATION):
         if name in signals:
-            found = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
-            return None if found is None else math.copysign(found, expected)
+            turning = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            return None if turning is None else math.copysign(turning, expected)
     cone = _cone(model, share)
     return None if cone is None else spin - math.copysign(cone.rate * cone.cosine, spin)
 
@@ -297,12 +297,14 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
         ratios += [
             begin + k * step for k in range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1) if k != 0 or not itself
         ]
-    ratios = sorted((one for one in ratios if low < one < high), key=lambda one: abs(one - model.parameters[at].file))
-    made = []
+    ratios = sorted(
+        (ratio for ratio in ratios if low < ratio < high), key=lambda ratio: abs(ratio - model.parameters[at].file)
+    )
+    vectors = []
     for ratio in ratios[:MOST_ALIASES]:
-        made.append(values.copy())
-        made[-1][at] = ratio
-    return made
+        vectors.append(values.copy())
+        vectors[-1][at] = ratio
+    return vectors
 
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
@@ -313,9 +315,9 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     model = fits[0].model
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
-    costs = [2.0 * float(counts @ np.log(one.noise)) for one in fits]
-    alike = [one for one, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
-    left = [one for one in alike if low < one.values[at] < high]
+    costs = [2.0 * float(counts @ np.log(fitted.noise)) for fitted in fits]
+    alike = [fitted for fitted, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
+    left = [fitted for fitted in alike if low < fitted.values[at] < high]
     if not left and too_slow(model, alike[0].values):
         raise Infeasible(
             f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, and none of their "
@@ -324,17 +326,17 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     left = left or alike[:1]
     if len(left) == 1:
         return left[0]
-    ratios = sorted(float(one.values[at]) for one in left)
-    fastest = max(abs(nutation_rate(model, one.values)) for one in left)
+    ratios = sorted(float(fitted.values[at]) for fitted in left)
+    fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in left)
     raise Infeasible(
         f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: C/A may be "
-        f"{', '.join(f'{one:.4f}' for one in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at uneven "
-        "intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
+        f"{', '.join(f'{ratio:.4f}' for ratio in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at "
+        "uneven intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
     )
 
 
 def too_slow(model: Model, values: Vector) -> bool:
-    """Whether fewer than two samples fall in a nutation period."""
+    """True where fewer than two samples fall in a nutation period."""
     return abs(nutation_rate(model, values)) * interval(model) > math.pi
 
 
@@ -348,7 +350,7 @@ def interval(model: Model) -> float:
     """Usual time between the samples of the signal that is sampled fastest of those that show the nutation, s."""
     shown = [name in _transverse(model) or name == "axis" for name in model.signals]
     steps = [np.diff(model.times[model.signal == index]) for index in np.flatnonzero(shown)]
-    return min((float(np.median(one)) for one in steps if len(one)), default=model.record.interval)
+    return min((float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval)
 
 
 def _transverse(model: Model) -> list[str]:
@@ -356,12 +358,16 @@ def _transverse(model: Model) -> list[str]:
 
 
 def _spin_of(model: Model, values: Vector) -> float:
-    names = [one.name for one in model.parameters]
+    names = [parameter.name for parameter in model.parameters]
     return float(values[names.index("omega_3")]) if "omega_3" in names else model.spacecraft.spin
 
 
 def _range(model: Model) -> tuple[int, float, float]:
     """Position of C/A among the parameters, and the range that the file leaves it."""
-    at = next(index for index, one in enumerate(model.parameters) if one.name == RATIO)
-    one = model.parameters[at]
-    return at, max(one.file - WITHIN * one.prior, POSSIBLE[0]), min(one.file + WITHIN * one.prior, POSSIBLE[1])
+    at = next(index for index, parameter in enumerate(model.parameters) if parameter.name == RATIO)
+    parameter = model.parameters[at]
+    return (
+        at,
+        max(parameter.file - WITHIN * parameter.prior, POSSIBLE[0]),
+        min(parameter.file + WITHIN * parameter.prior, POSSIBLE[1]),
+    )

@@ -1,4 +1,4 @@
-"""What telemetry would read, for given parameters: closed forms for coasts, the flight where pulses were fired.
+"""Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were fired.
 
 A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
 pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What an accelerometer feels is
@@ -67,12 +67,12 @@ class Body:
 
     @property
     def symmetric(self) -> bool:
-        """Whether I1 = I2."""
+        """True where I1 = I2."""
         return self.moments[0] == self.moments[1]
 
 
 class Model:
-    """Predicts a record of a spacecraft.
+    """Predictor of a record of a spacecraft.
 
     ``parameters`` are estimated; ``measured`` (m,) are the samples that there are, signal by signal, ``signals`` their
     names and ``signal`` (m,) which of them each is; ``times`` (m,) s when. Raises BadRequest where the spacecraft
@@ -110,7 +110,7 @@ class Model:
 
     def parameter(self, name: str) -> Parameter | None:
         """The one of that name, if it is estimated."""
-        return next((one for one in self.parameters if one.name == name), None)
+        return next((parameter for parameter in self.parameters if parameter.name == name), None)
 
     def turned(self, values: Values) -> Vector:
         """Attitude (4,) of the file's principal axes at the start of the record."""
@@ -157,7 +157,7 @@ class Model:
         return body, self.moved(body, self._fired(values), time)
 
     def predicted(self, values: Values) -> Vector:
-        """What the samples of `measured` would be without noise, (m,)."""
+        """Samples of `measured` as they would be without noise, (m,)."""
         work.spend(PREDICTION + SHOWN * len(self.measured))
         _, back = self._all_times
         rates, quaternion = (part[back] for part in self._remembered(values))
@@ -179,7 +179,7 @@ class Model:
 
     @property
     def _turned(self) -> bool:
-        """Whether any signal shows the attitude."""
+        """True where any signal shows the attitude."""
         return "axis" in self.signals or SUN_PULSE in self.signals
 
     def _rates(self, values: Values, times: Vector) -> Vector:
@@ -247,7 +247,7 @@ class Model:
         sense = math.copysign(1.0, self.spacecraft.spin)
         along = attitude.rotate(_tilted(values, "wobble"), np.array([0.0, 0.0, sense]))
         axis = attitude.rotate(quaternion[:half], self.spacecraft.inertia.axes @ along)
-        return np.concatenate([np.sum(one * axis, axis=1) for one in self._across])
+        return np.concatenate([np.sum(across * axis, axis=1) for across in self._across])
 
     def _moments(self, values: Values) -> tuple[float, float, float]:
         A, C = in_moments(self.spacecraft, values)
@@ -255,7 +255,7 @@ class Model:
         return A * (1.0 + e1), A * (1.0 - e1), C
 
     def _sun_late(self, rates: Vector, quaternion: Vector) -> Vector:
-        """By how much later than it came each Sun pulse should have come, s, (k,)."""
+        """Times by which Sun pulses should have come later than they came, s, (k,)."""
         body, sensor = self.spacecraft, self.spacecraft.sun_sensor
         assert sensor is not None
         assert body.sun is not None
@@ -279,13 +279,13 @@ class Model:
 
     def _fired(self, values: Values) -> Schedule:
         """The pulses with the thrust factors and delays of their channels."""
-        made = []
+        pulses = []
         for pulse in self.pulses:
             factor = values.get(f"thrust {pulse.channel}", 1.0)
             torque = None if pulse.torque is None else factor * pulse.torque
             late = max(values.get(f"delay {pulse.channel}", 0.0), -pulse.thrust[0])
-            made.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
-        return Schedule(tuple(made))
+            pulses.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
+        return Schedule(tuple(pulses))
 
     def _path(self, body: Body, fired: Schedule, until: float) -> Path:
         """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
@@ -297,8 +297,8 @@ class Model:
                 "backwards: name a later --at"
             )
         spacecraft = self._as_spacecraft(body)
-        made = make_dynamics(spacecraft)
-        dynamics = _Closed(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
+        acting = make_dynamics(spacecraft)
+        dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth))
         pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
         return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
 
@@ -315,7 +315,10 @@ class Model:
         return replace(
             self.spacecraft,
             inertia=Inertia(body.moments, body.axes),
-            disturbances=tuple(replace(one, transverse=about * one.transverse) for one in self.spacecraft.disturbances),
+            disturbances=tuple(
+                replace(disturbance, transverse=about * disturbance.transverse)
+                for disturbance in self.spacecraft.disturbances
+            ),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
         )
@@ -393,7 +396,7 @@ def _tilted(values: Values, kind: str) -> Vector:
 
 
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
-    """Raises BadRequest where the file does not describe what a signal needs."""
+    """Raise BadRequest where the file does not describe what a signal needs."""
     if record.has(ACCELERATION):
         loop = spacecraft.loop
         if loop is None or loop.sensor.kind != ACCELEROMETER:

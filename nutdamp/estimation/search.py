@@ -34,13 +34,13 @@ EVALUATIONS = 60
 
 def least(model: Model) -> Vector:
     """Noise that each signal has at least: that of its steps, and rounding."""
-    found = []
+    sigmas = []
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
         step = model.record.sun_step if name == SUN_PULSE else 0.0 if name == "axis" else quantisation(values)
         size = {"axis": 1.0, SUN_PULSE: 1.0 / abs(model.spacecraft.spin)}.get(name, float(np.abs(values).max()))
-        found.append(max(step / math.sqrt(12.0), ROUNDING * size))
-    return np.array(found)
+        sigmas.append(max(step / math.sqrt(12.0), ROUNDING * size))
+    return np.array(sigmas)
 
 
 def robust(model: Model, left: Vector) -> Vector:
@@ -56,18 +56,18 @@ def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector 
     Of n samples with leverages that add up to p the mean of the variance is Σr²/(n - p - 2): that of its posterior,
     so that regions made with it hold as often as they should.
     """
-    found, signal = [], model.signal[used]
+    sigmas, signal = [], model.signal[used]
     for index in range(len(model.signals)):
         rows = signal == index
         spent = 0.0 if leverage is None else float(leverage[rows].sum()) + 2.0
         total = float(left[used][rows] @ left[used][rows])
-        found.append(math.sqrt(total / max(float(rows.sum()) - spent, 1.0)))
-    return np.array(found)
+        sigmas.append(math.sqrt(total / max(float(rows.sum()) - spent, 1.0)))
+    return np.array(sigmas)
 
 
 def named_of(model: Model, values: Iterable[float]) -> dict[str, float]:
     """The values (p,) by the names of their parameters."""
-    return {one.name: float(value) for one, value in zip(model.parameters, values, strict=True)}
+    return {parameter.name: float(value) for parameter, value in zip(model.parameters, values, strict=True)}
 
 
 def residuals(model: Model, values: Vector) -> Vector:
@@ -76,13 +76,13 @@ def residuals(model: Model, values: Vector) -> Vector:
 
 
 def scales_of(model: Model) -> Vector:
-    """What a residual of each signal is compared with before its noise is known: a tenth of what varies in it."""
-    found = []
+    """Sizes that residuals of each signal are compared with before its noise is known: a tenth of what varies."""
+    scales = []
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
         spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
-        found.append(0.1 * spread or {"axis": 1e-3, SUN_PULSE: 0.01 / abs(model.spacecraft.spin)}.get(name, 1e-4))
-    return np.array(found)
+        scales.append(0.1 * spread or {"axis": 1e-3, SUN_PULSE: 0.01 / abs(model.spacecraft.spin)}.get(name, 1e-4))
+    return np.array(scales)
 
 
 def share_left(model: Model, values: Vector) -> float:
@@ -118,7 +118,12 @@ def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
     spin = abs(model.spacecraft.spin)
     usual = {"rad/s": 1e-2 * spin, "1/s": 0.1 / max(model.record.length, 1e-9)}
-    return np.array([one.prior if math.isfinite(one.prior) else usual.get(one.unit, 1e-2) for one in model.parameters])
+    return np.array(
+        [
+            parameter.prior if math.isfinite(parameter.prior) else usual.get(parameter.unit, 1e-2)
+            for parameter in model.parameters
+        ]
+    )
 
 
 def search(
