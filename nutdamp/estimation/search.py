@@ -28,8 +28,8 @@ NORMAL_MAD = 1.4826
 ROUNDING = 1e-7
 """Noise that a signal has at least, as a share of its largest value: no telemetry has more digits."""
 
-EVALUATIONS = 60
-"""Jacobians of one least-squares search, at most."""
+EVALUATIONS, TRIAL = 60, 40
+"""Jacobians of one least-squares search, at most: of the last ones, and of one from a start, which may lead nowhere."""
 
 
 def least(model: Model) -> Vector:
@@ -163,7 +163,7 @@ def search(
             values / units,
             derivatives,
             loss=loss,
-            max_nfev=EVALUATIONS,
+            max_nfev=EVALUATIONS if near else TRIAL,
             x_scale="jac" if near else 1.0,
             xtol=1e-10,
             ftol=1e-10,
