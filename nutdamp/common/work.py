@@ -25,6 +25,9 @@ CASES = 20_000.0
 FRONTS = 30_000.0
 """Units that the searches of all points of `trade` may spend together."""
 
+FIT, FITTED = 4_500.0, 600
+"""Units that a fit may spend on a record of so many rows; in proportion if more."""
+
 
 @dataclass(eq=False)
 class Budget:

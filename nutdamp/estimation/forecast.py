@@ -1,4 +1,4 @@
-"""Whether knowing more would pay: what a plan leaves with other lengths of the coast, or after a probe pulse.
+"""Worth of knowing more: what a plan leaves with other lengths of the coast, or after a probe pulse.
 
 How well a longer record tells the spacecraft follows from the Cramér-Rao bound, before it is flown: the derivatives of
 the same signals, as noisy and as often sampled, over a coast of that length. A plan from the estimate is then flown in
@@ -41,7 +41,7 @@ MOST_SAMPLES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """What knowing as much as after ``length`` s of coast would leave: ``nutation`` rad, which most cases stay below.
+    """Prospect of knowing as much as after ``length`` s of coast: ``nutation`` rad, which most cases stay below.
 
     How many is said by `Outlook.probability`. ``ratio``: sigma of C/A; ``met``: share that meets the requirement, None
     without one; ``probe``: the channel that fires a pulse of ``on_time`` s meanwhile, and ``thrust``, sigma of its
@@ -79,46 +79,48 @@ class Outlook:
 
     @property
     def enough(self) -> bool:
-        """Whether as many cases as must meet the requirement already: then nothing pays."""
+        """True where as many cases as must meet the requirement already: then nothing pays."""
         return self.now.met is not None and self.now.met >= self.probability
 
     @property
     def longer(self) -> Prospect | None:
         """The shortest longer coast that pays; None where none does."""
-        return next((one for one in self.coasts if self._pays(one) and one.length > self.now.length), None)
+        return next(
+            (prospect for prospect in self.coasts if self._pays(prospect) and prospect.length > self.now.length), None
+        )
 
     @property
     def probe(self) -> Prospect | None:
         """The probe pulse that leaves least, where it pays."""
-        best = min(self.probes, key=lambda one: one.nutation, default=None)
+        best = min(self.probes, key=lambda prospect: prospect.nutation, default=None)
         return best if best is not None and self._pays(best) else None
 
-    def _pays(self, one: Prospect) -> bool:
-        return not self.enough and one.nutation < PAYS * self.now.nutation
+    def _pays(self, prospect: Prospect) -> bool:
+        return not self.enough and prospect.nutation < PAYS * self.now.nutation
 
 
-def outlook(found: Fit, time: float, progress: Callable[[int], None] = lambda _: None) -> Outlook:
-    """What other records would leave of a plan that begins at ``time`` s; raises Infeasible where there is no plan.
+def outlook(fitted: Fit, time: float, progress: Callable[[int], None] = lambda _: None) -> Outlook:
+    """Prospects of a plan that begins at ``time`` s, by other records; raises Infeasible where there is no plan.
 
     ``progress`` is called with the number of prospects that are done.
     """
-    spacecraft = found.model.spacecraft
-    now = carried(found, time)
+    spacecraft = fitted.model.spacecraft
+    now = carried(fitted, time)
     body = replaced(spacecraft, now)
     known = replace(body, dispersions=posterior(spacecraft.dispersions, now))
     plan = decision.compare(known).recommended
     if plan is None or not len(plan.pulses):
         raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
     probability = required_share(spacecraft.requirement)
-    length, done, made = found.model.record.length, 0, []
+    length, done, coasts = fitted.model.record.length, 0, []
     for share in LENGTHS:
-        made.append(_prospect(plan, found, time, probability, share * length))
+        coasts.append(_prospect(plan, fitted, time, probability, share * length))
         progress(done := done + 1)
     probes = []
     for name, on_time in _probes(plan, body):
-        probes.append(_prospect(plan, found, time, probability, length, name, on_time))
+        probes.append(_prospect(plan, fitted, time, probability, length, name, on_time))
         progress(done := done + 1)
-    return Outlook(plan.scheme, tuple(made), tuple(probes), probability, plan.propellant)
+    return Outlook(plan.scheme, tuple(coasts), tuple(probes), probability, plan.propellant)
 
 
 def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
@@ -131,12 +133,12 @@ def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
 
 
 def _prospect(
-    plan: Plan, found: Fit, time: float, level: float, length: float, probe: str = "", on_time: float = 0.0
+    plan: Plan, fitted: Fit, time: float, level: float, length: float, probe: str = "", on_time: float = 0.0
 ) -> Prospect:
-    imagined = _imagined(found, length, probe, on_time)
-    known = carried(imagined, time - (found.model.record.end - length))
+    imagined = _imagined(fitted, length, probe, on_time)
+    known = carried(imagined, time - (fitted.model.record.end - length))
     body = plan.spacecraft
-    dispersed = replace(body, dispersions=posterior(found.model.spacecraft.dispersions, known))
+    dispersed = replace(body, dispersions=posterior(fitted.model.spacecraft.dispersions, known))
     results = run(Results(dispersion.study_of(dispersed, plan.pulses), CASES))
     nutation = results.distribution("nutation")
     assert nutation is not None
@@ -154,15 +156,15 @@ def _prospect(
     )
 
 
-def _imagined(found: Fit, length: float, probe: str, on_time: float) -> Fit:
+def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
     """The fit of a record of ``length`` s that ends when the record does, with t = 0 at its start; of noise alone."""
-    model = found.model
+    model = fitted.model
     start = model.record.end - length
-    then: Carried = carried(found, start)
+    then: Carried = carried(fitted, start)
     body = replace(replaced(model.spacecraft, then), dispersions=model.spacecraft.dispersions)
     fired = Schedule()
     if probe:
-        channel = next(one for one in body.channels if one.name == probe)
+        channel = next(channel for channel in body.channels if channel.name == probe)
         fired = Schedule((channel_pulse(channel, 0.5 * length, on_time),))
     interval = max(model.record.interval, length / MOST_SAMPLES)
     times = np.asarray(interval * np.arange(max(math.floor(length / interval), 8) + 1), dtype=np.float64)
@@ -176,12 +178,12 @@ def _imagined(found: Fit, length: float, probe: str, on_time: float) -> Fit:
     if not model.record.signals:
         times, samples = np.empty(0), {}
     record = Record(times, samples, sun, model.record.sun_step, fired)
-    growing = found.index("growth") is not None
+    growing = fitted.index("growth") is not None
     imagined = Model(body, record, unequal=model.unequal, growing=growing)
-    values = {one.name: one.file for one in imagined.parameters}
+    values = {parameter.name: parameter.file for parameter in imagined.parameters}
     values |= {
-        name: value for name, value in found.named.items() if name in values and not name.startswith(("omega", "att"))
+        name: value for name, value in fitted.named.items() if name in values and not name.startswith(("omega", "att"))
     }
     thinned = math.sqrt(model.record.interval / interval)
-    noise = np.array([found.noise[model.signals.index(name)] * thinned for name in imagined.signals])
-    return estimated(imagined, np.array([values[one.name] for one in imagined.parameters]), noise)
+    noise = np.array([fitted.noise[model.signals.index(name)] * thinned for name in imagined.signals])
+    return estimated(imagined, np.array([values[parameter.name] for parameter in imagined.parameters]), noise)

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Model, Values, Vector, tilted
+from nutdamp.estimation.model import Model, Values, Vector
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, Record
 from nutdamp.physics import attitude
 
@@ -40,6 +40,15 @@ SMALL = 1e-3
 OTHER = 0.05
 """Part by which a spin by Sun pulses may differ from that of the file before both are tried."""
 
+MOST_TURNED = 2.1
+"""C/A at most, and a little more: 2 for a thin disc."""
+
+NARROW = 0.966
+"""Cosine of the nutation angle, 15 deg, from which on noise may decide in which plane a cone is, not its motion."""
+
+FLAT = 0.1
+"""Cosine of the nutation angle from which on its rate is sought."""
+
 TURNS = 8
 """Starting values of the angle by which the body is turned about its axis."""
 
@@ -54,20 +63,22 @@ def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
 
 
 def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float]]:
-    values = {one.name: one.file for one in model.parameters}
-    if "omega_3" in values:
-        values["omega_3"] = spin
+    of_file = {each.name: each.file for each in model.parameters}
+    cone = _cone(model, share)
+    if cone is not None and len(model.record.sun_pulses) and not model.record.has(GYROS[2]):
+        # The Sun goes round a sensor once a turn of the body about its axis and of the axis about H.
+        spin -= math.copysign(cone.rate * (1.0 - cone.cosine), spin)
+    if "omega_3" in of_file:
+        of_file["omega_3"] = spin
     rate = _peak(model, spin, share)
-    if rate is not None:
-        values |= _moments(model, rate, spin)
-    if model.record.has(*AXIS) and not model.record.has(*GYROS[:2]):
-        yield values | _cone(model, values)
-    values |= _towards(model, values)
-    if "attitude_3" not in values:
-        yield _linear(model, values)
-        return
-    for turn in range(TURNS):
-        yield _linear(model, values | {"attitude_3": values["attitude_3"] + 2.0 * math.pi * turn / TURNS})
+    linear = of_file | ({} if rate is None else _moments(model, rate, spin))
+    if model.record.has(*AXIS):
+        linear |= _towards(model, np.nanmean(_axes(model.record), axis=0))
+    for turn in range(TURNS) if "attitude_3" in of_file else (0,):
+        turned = {"attitude_3": 2.0 * math.pi * turn / TURNS} if "attitude_3" in of_file else {}
+        if cone is not None:
+            yield _on_cone(model, of_file | turned, spin, cone)
+        yield _linear(model, linear | turned)
 
 
 def _spin(model: Model) -> float:
@@ -98,7 +109,7 @@ def spin_of(pulses: Vector, step: float = 0.0) -> tuple[float, float]:
 
 
 def once_a_turn(record: Record) -> str:
-    """What Sun pulses tell by themselves, in words; nothing without them."""
+    """Words on what Sun pulses tell by themselves; empty without them."""
     if len(record.sun_pulses) < 3:
         return ""
     spin, sigma = np.degrees(spin_of(record.sun_pulses, record.sun_step))
@@ -116,22 +127,68 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
         return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
     for name in (*GYROS[:2], ACCELERATION):
         if name in signals:
-            found = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
-            return None if found is None else math.copysign(found, expected)
-    if record.has(*AXIS):
-        axis = np.column_stack([signals[name] for name in AXIS])
-        mean = np.nanmean(axis, axis=0)
-        mean /= np.linalg.norm(mean)
-        first = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
-        first /= np.linalg.norm(first)
-        # Seen along H the axis goes round with |H|/A, in the sense of H.
-        x, y = axis @ first, axis @ np.cross(mean, first)
-        turned = _strongest(times, x, y, body.inertia.C / body.inertia.A * abs(spin), 2.1 * abs(spin), 1.0)
-        if turned is None:
-            return None
-        cosine = math.sqrt(max(1.0 - float(np.nanvar(x) + np.nanvar(y)), 0.1))
-        return spin * (1.0 - abs(turned) * cosine / abs(spin))
-    return None
+            turning = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            return None if turning is None else math.copysign(turning, expected)
+    cone = _cone(model, share)
+    return None if cone is None else spin - math.copysign(cone.rate * cone.cosine, spin)
+
+
+class _Cone(NamedTuple):
+    """The axis goes round ``momentum``, a unit vector, at ``rate`` rad/s from ``begin``, a unit vector at the start."""
+
+    momentum: Vector
+    rate: float
+    begin: Vector
+
+    @property
+    def cosine(self) -> float:
+        """Of the nutation angle."""
+        return float(self.momentum @ self.begin)
+
+
+def _axes(record: Record) -> Vector:
+    """The measured axes, (n, 3)."""
+    return np.column_stack([record.signals[name] for name in AXIS])
+
+
+def _cone(model: Model, share: float) -> _Cone | None:
+    """The cone that the axis describes in space, of any angle; None where no axis is measured or shows none."""
+    record, body = model.record, model.spacecraft
+    if not record.has(*AXIS):
+        return None
+    count = min(max(int(share * len(record.times)), min(len(record.times), 16)), LONGEST_SPECTRUM)
+    times, axis = record.times[:count], _axes(record)[:count]
+    there = np.isfinite(axis).all(axis=1)
+    if there.sum() < 4:
+        return None
+    mean = np.mean(axis[there], axis=0)
+    # A cone meets the unit sphere in a plane across H: the axis varies least along it.
+    momentum = np.linalg.svd(axis[there] - mean, full_matrices=False)[2][-1]
+    momentum = momentum * math.copysign(1.0, float(momentum @ mean))
+    if np.linalg.norm(mean) > NARROW:
+        momentum = mean / np.linalg.norm(mean)
+    first = np.cross(np.eye(3)[np.argmin(np.abs(momentum))], momentum)
+    first /= np.linalg.norm(first)
+    second = np.cross(momentum, first)
+    x, y = axis @ first, axis @ second
+    # In the sense of H, with |H|/A = Cω3/(A cos θ).
+    height = float(momentum @ mean)
+    pace = abs(body.spin) / max(height, FLAT)
+    rate = _strongest(times, x, y, body.inertia.C / body.inertia.A * pace, MOST_TURNED * pace, 1.0)
+    if rate is None:
+        return None
+    begin = np.mean((x + 1j * y)[there] * np.exp(-1j * rate * (times[there] - model.start)))
+    along = begin.real * first + begin.imag * second + height * momentum
+    return _Cone(momentum, abs(rate), along / np.linalg.norm(along))
+
+
+def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str, float]:
+    """Values by which the axis describes a cone: ω is that of the axis about H, besides what is along the axis."""
+    moments = _moments(model, spin - math.copysign(cone.rate * cone.cosine, spin), spin)
+    values = {**values, **moments, **_towards(model, cone.begin)}
+    across = cone.rate * (cone.momentum - cone.cosine * cone.begin)
+    x, y, _ = attitude.rotate(attitude.conjugate(model.turned(values)), across)
+    return values | {"omega_1": float(x), "omega_2": float(y)}
 
 
 def _strongest(
@@ -182,48 +239,15 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     return {"A": A.file * (ratio.file / wanted) ** part, RATIO: wanted}
 
 
-def _towards(model: Model, values: Values) -> dict[str, float]:
-    """The attitude turned the shortest way so that the spin axis is along the mean of the axes measured."""
-    record = model.record
-    if not record.has(*AXIS):
-        return {}
-    return _tilted(model, values, np.nanmean(np.column_stack([record.signals[name] for name in AXIS]), axis=0))
-
-
-def _cone(model: Model, values: Values) -> dict[str, float]:
-    """Attitude and transverse rates from the circle on which the axis goes round H, as wide as it may be.
-
-    Its plane is square to H; with H = A ω_t + C ω3 e the transverse rate ω_t is along what H has across the axis e.
-    """
-    axis = np.column_stack([model.record.signals[name] for name in AXIS])
-    axis = axis[np.isfinite(axis).all(axis=1)]
-    momentum = np.linalg.svd(axis - axis.mean(axis=0), full_matrices=False)[2][2]
-    momentum *= math.copysign(1.0, float(momentum @ axis.mean(axis=0)))
-    cosine = float(np.clip(np.mean(axis @ momentum), 0.05, 1.0))
-    made = _tilted(model, values, axis[0])
-    across = momentum - float(momentum @ axis[0]) * axis[0]
-    size = float(np.linalg.norm(across))
-    if size == 0.0:
-        return made
-    spin = values.get("omega_3", model.spacecraft.spin)
-    rate = values[RATIO] * abs(spin) * math.sqrt(1.0 - cosine**2) / cosine
-    turned = attitude.multiply(model.reference.quaternion, tilted(made["attitude_1"], made["attitude_2"]))
-    in_body = attitude.rotate(attitude.conjugate(turned), rate / size * across)
-    return made | {"omega_1": float(in_body[0]), "omega_2": float(in_body[1])}
-
-
-def _tilted(model: Model, values: Values, axis: Vector) -> dict[str, float]:
+def _towards(model: Model, axis: Vector) -> dict[str, float]:
     """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any length."""
-    quaternion = model.reference.quaternion
     sense = math.copysign(1.0, model.spacecraft.spin)
-    wanted = sense * attitude.rotate(attitude.conjugate(quaternion), axis / np.linalg.norm(axis))
+    wanted = sense * attitude.rotate(attitude.conjugate(model.reference.quaternion), axis / np.linalg.norm(axis))
     across = np.cross([0.0, 0.0, 1.0], wanted)
     size = float(np.linalg.norm(across))
     angle = math.atan2(size, wanted[2])
     turn = angle * across / size if size > 0.0 else np.array([angle, 0.0, 0.0])
-    return {"attitude_1": float(turn[0]), "attitude_2": float(turn[1])} | (
-        {"attitude_3": 0.0} if "attitude_3" in values else {}
-    )
+    return {"attitude_1": float(turn[0]), "attitude_2": float(turn[1])}
 
 
 def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
@@ -273,12 +297,14 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
         ratios += [
             begin + k * step for k in range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1) if k != 0 or not itself
         ]
-    ratios = sorted((one for one in ratios if low < one < high), key=lambda one: abs(one - model.parameters[at].file))
-    made = []
+    ratios = sorted(
+        (ratio for ratio in ratios if low < ratio < high), key=lambda ratio: abs(ratio - model.parameters[at].file)
+    )
+    vectors = []
     for ratio in ratios[:MOST_ALIASES]:
-        made.append(values.copy())
-        made[-1][at] = ratio
-    return made
+        vectors.append(values.copy())
+        vectors[-1][at] = ratio
+    return vectors
 
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
@@ -289,9 +315,9 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     model = fits[0].model
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
-    costs = [2.0 * float(counts @ np.log(one.noise)) for one in fits]
-    alike = [one for one, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
-    left = [one for one in alike if low < one.values[at] < high]
+    costs = [2.0 * float(counts @ np.log(fitted.noise)) for fitted in fits]
+    alike = [fitted for fitted, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
+    left = [fitted for fitted in alike if low < fitted.values[at] < high]
     if not left and too_slow(model, alike[0].values):
         raise Infeasible(
             f"with a sample every {interval(model):.4g} s several nutation rates fit equally well, and none of their "
@@ -300,17 +326,17 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     left = left or alike[:1]
     if len(left) == 1:
         return left[0]
-    ratios = sorted(float(one.values[at]) for one in left)
-    fastest = max(abs(nutation_rate(model, one.values)) for one in left)
+    ratios = sorted(float(fitted.values[at]) for fitted in left)
+    fastest = max(abs(nutation_rate(model, fitted.values)) for fitted in left)
     raise Infeasible(
         f"with a sample every {interval(model):.4g} s several nutation rates fit equally well: C/A may be "
-        f"{', '.join(f'{one:.4f}' for one in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at uneven "
-        "intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
+        f"{', '.join(f'{ratio:.4f}' for ratio in ratios)}; samples less than {math.pi / fastest:.3g} s apart or at "
+        "uneven intervals, or smaller tolerances of A and C in the file, help (are the times in seconds?)"
     )
 
 
 def too_slow(model: Model, values: Vector) -> bool:
-    """Whether fewer than two samples fall in a nutation period."""
+    """True where fewer than two samples fall in a nutation period."""
     return abs(nutation_rate(model, values)) * interval(model) > math.pi
 
 
@@ -324,7 +350,7 @@ def interval(model: Model) -> float:
     """Usual time between the samples of the signal that is sampled fastest of those that show the nutation, s."""
     shown = [name in _transverse(model) or name == "axis" for name in model.signals]
     steps = [np.diff(model.times[model.signal == index]) for index in np.flatnonzero(shown)]
-    return min((float(np.median(one)) for one in steps if len(one)), default=model.record.interval)
+    return min((float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval)
 
 
 def _transverse(model: Model) -> list[str]:
@@ -332,12 +358,16 @@ def _transverse(model: Model) -> list[str]:
 
 
 def _spin_of(model: Model, values: Vector) -> float:
-    names = [one.name for one in model.parameters]
+    names = [parameter.name for parameter in model.parameters]
     return float(values[names.index("omega_3")]) if "omega_3" in names else model.spacecraft.spin
 
 
 def _range(model: Model) -> tuple[int, float, float]:
     """Position of C/A among the parameters, and the range that the file leaves it."""
-    at = next(index for index, one in enumerate(model.parameters) if one.name == RATIO)
-    one = model.parameters[at]
-    return at, max(one.file - WITHIN * one.prior, POSSIBLE[0]), min(one.file + WITHIN * one.prior, POSSIBLE[1])
+    at = next(index for index, parameter in enumerate(model.parameters) if parameter.name == RATIO)
+    parameter = model.parameters[at]
+    return (
+        at,
+        max(parameter.file - WITHIN * parameter.prior, POSSIBLE[0]),
+        min(parameter.file + WITHIN * parameter.prior, POSSIBLE[1]),
+    )

@@ -1,4 +1,4 @@
-"""What telemetry would read, for given parameters: closed forms for coasts, the flight where pulses were fired.
+"""Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were fired.
 
 A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
 pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What an accelerometer feels is
@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.control_loop.sensor import felt, is_blind
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
 from nutdamp.estimation.parameters import (
@@ -31,7 +32,7 @@ from nutdamp.estimation.parameters import (
     parameters,
     prior,
 )
-from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, flown, make_dynamics
+from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, Push, flown, make_dynamics
 from nutdamp.physics import attitude, energy_sink, sky, triaxial
 from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
@@ -41,6 +42,15 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Values = Mapping[str, float]
+
+PREDICTION, SHOWN, SAMPLE = 0.1, 2e-4, 1e-3
+"""Units of `work` of a prediction, of each sample, and of each time of a motion that is new, besides steps."""
+
+POLHODE = 0.8
+"""Units of a coast of three moments between pulses."""
+
+OF_SENSORS = ("bias", "misalignment", "wobble")
+"""Beginnings of the names of parameters that change nothing of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +67,12 @@ class Body:
 
     @property
     def symmetric(self) -> bool:
-        """Whether I1 = I2."""
+        """True where I1 = I2."""
         return self.moments[0] == self.moments[1]
 
 
 class Model:
-    """Predicts a record of a spacecraft.
+    """Predictor of a record of a spacecraft.
 
     ``parameters`` are estimated; ``measured`` (m,) are the samples that there are, signal by signal, ``signals`` their
     names and ``signal`` (m,) which of them each is; ``times`` (m,) s when. Raises BadRequest where the spacecraft
@@ -77,6 +87,7 @@ class Model:
         self.spacecraft, self.record = spacecraft, record
         self.unequal = not spacecraft.inertia.symmetric if unequal is None else unequal
         self.start = record.start
+        self._last: tuple[tuple[tuple[str, float], ...], tuple[Vector, Vector]] | None = None
         self.parameters = parameters(spacecraft, record, unequal=self.unequal, growing=growing)
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
@@ -99,20 +110,25 @@ class Model:
 
     def parameter(self, name: str) -> Parameter | None:
         """The one of that name, if it is estimated."""
-        return next((one for one in self.parameters if one.name == name), None)
+        return next((parameter for parameter in self.parameters if parameter.name == name), None)
+
+    def turned(self, values: Values) -> Vector:
+        """Attitude (4,) of the file's principal axes at the start of the record."""
+        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
+        turn = _turned(np.array([0.0, 0.0, values.get("attitude_3", 0.0)]))
+        return attitude.multiply(self.reference.quaternion, attitude.multiply(_tilted(values, "attitude"), turn))
 
     def body(self, values: Values) -> Body:
         """The body that parameters describe."""
         of_file, spacecraft = self.spacecraft.inertia, self.spacecraft
         A, C = in_moments(spacecraft, values)
         rates = np.array([values["omega_1"], values["omega_2"], values.get("omega_3", spacecraft.omega0[2])])
-        # The axis is tilted first, then the body turned about it, by any angle: no turn makes the tilts singular.
-        tilt = np.array([values.get("attitude_1", 0.0), values.get("attitude_2", 0.0), 0.0])
-        turn = np.array([0.0, 0.0, values.get("attitude_3", 0.0)])
-        quaternion = attitude.multiply(self.reference.quaternion, attitude.multiply(_turned(tilt), _turned(turn)))
+        quaternion = self.turned(values)
         growth = values.get("growth", spacecraft.growth)
         e1, e2 = values.get("unequal_1", 0.0), values.get("unequal_2", 0.0)
         size = math.hypot(e1, e2)
+        if not (A > 0.0 and C > 0.0 and size < 1.0):
+            raise Infeasible("no body has such moments of inertia")
         moments, axes = (A, A, C), of_file.axes
         if size > 0.0:
             half = 0.5 * math.atan2(e2, e1)
@@ -141,31 +157,39 @@ class Model:
         return body, self.moved(body, self._fired(values), time)
 
     def predicted(self, values: Values) -> Vector:
-        """What the samples of `measured` would be without noise, (m,)."""
-        times, back = self._all_times
-        if self._turned:
-            rates, quaternion = self.motion(values, times)
-            quaternion = quaternion[back]
-        else:
-            rates, quaternion = self._rates(values, times), np.empty((len(back), 0))
-        rates = rates[back]
+        """Samples of `measured` as they would be without noise, (m,)."""
+        work.spend(PREDICTION + SHOWN * len(self.measured))
+        _, back = self._all_times
+        rates, quaternion = (part[back] for part in self._remembered(values))
         parts = []
         for index, name in enumerate(self.signals):
             rows = self.signal == index
             parts.append(self._shown(name, values, rates[rows], quaternion[rows]))
         return np.concatenate(parts)
 
+    def _remembered(self, values: Values) -> tuple[Vector, Vector]:
+        """The motion at all times; once for values that differ in what only the sensors are off."""
+        key = tuple((name, value) for name, value in values.items() if not name.startswith(OF_SENSORS))
+        if self._last is None or self._last[0] != key:
+            times, _ = self._all_times
+            work.spend(SAMPLE * len(times))
+            bare = np.empty((len(times), 0))
+            self._last = key, self.motion(values, times) if self._turned else (self._rates(values, times), bare)
+        return self._last[1]
+
     @property
     def _turned(self) -> bool:
-        """Whether any signal shows the attitude."""
+        """True where any signal shows the attitude."""
         return "axis" in self.signals or SUN_PULSE in self.signals
 
     def _rates(self, values: Values, times: Vector) -> Vector:
         """The rates of `motion` alone."""
         body = self.body(values)
-        if self.pulses.pulses or self.spacecraft.disturbances or not body.symmetric:
+        if self.pulses.pulses or self.spacecraft.disturbances or not (body.symmetric or body.growth == 0.0):
             return self.motion(values, times)[0]
         state, (A, _, C) = body.state, body.moments
+        if not body.symmetric:
+            return triaxial.free_rates(body.moments, state.rates, times - self.start) @ body.axes.T
         omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, times - self.start)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
 
@@ -174,10 +198,15 @@ class Model:
         return np.unique(self.times, return_inverse=True)
 
     @cached_property
+    def axes(self) -> Vector:
+        """The axes that are measured, unit vectors (n, 3)."""
+        axis = np.column_stack([self.record.signals[name] for name in AXIS])
+        return np.asarray(axis[np.isfinite(axis).all(axis=1)])
+
+    @cached_property
     def _across(self) -> tuple[Vector, Vector]:
         """Two unit vectors (n, 3) across each measured axis."""
-        axis = np.column_stack([self.record.signals[name] for name in AXIS])
-        axis = axis[np.isfinite(axis).all(axis=1)]
+        axis = self.axes
         aside = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
         first = np.cross(axis, aside)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -202,9 +231,9 @@ class Model:
     def _shown(self, name: str, values: Values, rates: Vector, quaternion: Vector) -> Vector:
         """A signal at the motion of its samples."""
         if name in GYROS:
-            tilt = np.array([values.get("misalignment_1", 0.0), values.get("misalignment_2", 0.0), 0.0])
-            shown = attitude.rotate(_turned(-tilt), rates)[:, GYROS.index(name)]  # of gyros that are turned by it
-            return np.asarray(shown + values.get(f"bias_{name}", 0.0))
+            # Of gyros that are turned by a rotation vector across axis 3: ω seen in their axes.
+            along = attitude.rotate(_tilted(values, "misalignment"), np.eye(3)[GYROS.index(name)])
+            return np.asarray(rates @ along + values.get(f"bias_{name}", 0.0))
         if name == ACCELERATION:
             assert self.spacecraft.loop is not None
             of_file = self.spacecraft.inertia
@@ -216,10 +245,9 @@ class Model:
             return self._sun_late(rates, quaternion)
         half = len(rates) // 2
         sense = math.copysign(1.0, self.spacecraft.spin)
-        wobble = np.array([values.get("wobble_2", 0.0), -values.get("wobble_1", 0.0), 1.0])
-        axis = attitude.rotate(quaternion[:half], sense * self.spacecraft.inertia.axes @ wobble)
-        axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        return np.concatenate([np.sum(one * axis, axis=1) for one in self._across])
+        along = attitude.rotate(_tilted(values, "wobble"), np.array([0.0, 0.0, sense]))
+        axis = attitude.rotate(quaternion[:half], self.spacecraft.inertia.axes @ along)
+        return np.concatenate([np.sum(across * axis, axis=1) for across in self._across])
 
     def _moments(self, values: Values) -> tuple[float, float, float]:
         A, C = in_moments(self.spacecraft, values)
@@ -227,7 +255,7 @@ class Model:
         return A * (1.0 + e1), A * (1.0 - e1), C
 
     def _sun_late(self, rates: Vector, quaternion: Vector) -> Vector:
-        """By how much later than it came each Sun pulse should have come, s, (k,)."""
+        """Times by which Sun pulses should have come later than they came, s, (k,)."""
         body, sensor = self.spacecraft, self.spacecraft.sun_sensor
         assert sensor is not None
         assert body.sun is not None
@@ -251,13 +279,13 @@ class Model:
 
     def _fired(self, values: Values) -> Schedule:
         """The pulses with the thrust factors and delays of their channels."""
-        made = []
+        pulses = []
         for pulse in self.pulses:
             factor = values.get(f"thrust {pulse.channel}", 1.0)
             torque = None if pulse.torque is None else factor * pulse.torque
             late = max(values.get(f"delay {pulse.channel}", 0.0), -pulse.thrust[0])
-            made.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
-        return Schedule(tuple(made))
+            pulses.append(replace(pulse.moved(late), torque=torque, impulse=factor * pulse.impulse))
+        return Schedule(tuple(pulses))
 
     def _path(self, body: Body, fired: Schedule, until: float) -> Path:
         """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
@@ -269,8 +297,8 @@ class Model:
                 "backwards: name a later --at"
             )
         spacecraft = self._as_spacecraft(body)
-        made = make_dynamics(spacecraft)
-        dynamics = Dynamics(body.moments, made.constant, Forcing(made.forcing.turning, body.growth))
+        acting = make_dynamics(spacecraft)
+        dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth))
         pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
         return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
 
@@ -287,7 +315,10 @@ class Model:
         return replace(
             self.spacecraft,
             inertia=Inertia(body.moments, body.axes),
-            disturbances=tuple(replace(one, transverse=about * one.transverse) for one in self.spacecraft.disturbances),
+            disturbances=tuple(
+                replace(disturbance, transverse=about * disturbance.transverse)
+                for disturbance in self.spacecraft.disturbances
+            ),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
         )
@@ -297,21 +328,38 @@ def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation."""
     if body.symmetric:
         return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth)
-    return _Polhode(body)
+    return _Polhode(body.moments, body.state)
 
 
 @dataclass(frozen=True)
 class _Polhode:
-    """Coast of a body of three different moments."""
+    """Coast of a body of three different moments from ``state`` at ``start`` s."""
 
-    body: Body
+    moments: tuple[float, float, float]
+    state: SpinState
+    start: float = 0.0
     steps: int = 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        body = self.body
-        rates = body.state.rates
-        turned = triaxial.free_attitude(body.moments, rates, body.state.quaternion, times)
-        return triaxial.free_rates(body.moments, rates, times), turned
+        since, rates = times - self.start, self.state.rates
+        turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
+        return triaxial.free_rates(self.moments, rates, since), turned
+
+
+class _Closed(Dynamics):
+    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them.
+
+    A fit flies thousands of times, and most of a record is coast.
+    """
+
+    def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
+        acts = bool(push.torques) or push.falling is not None or self.constant.any() or self.forcing != Forcing()
+        if acts or end == start or self.moments[0] == self.moments[1]:
+            return super()._path(state, start, end, push, most)
+        work.spend(POLHODE)
+        coast = _Polhode(self.moments, state, start)
+        rates, quaternion = coast.motion(np.array([end]))
+        return coast, SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
 
 
 @dataclass(frozen=True)
@@ -335,11 +383,6 @@ def _sinking(momentum: Vector, growth: float) -> Vector:
     return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
 
 
-def tilted(first: float, second: float) -> Vector:
-    """Quaternion (4,) of the tilt of an attitude by two angles about axes 1 and 2, rad."""
-    return _turned(np.array([first, second, 0.0]))
-
-
 def _turned(angles: Vector) -> Vector:
     """Quaternion of the turn by a vector of angles (3,), rad."""
     size = float(np.linalg.norm(angles))
@@ -347,8 +390,13 @@ def _turned(angles: Vector) -> Vector:
     return np.array([math.cos(0.5 * size), *(share * angles)])
 
 
+def _tilted(values: Values, kind: str) -> Vector:
+    """Quaternion of the turn by the rotation vector across axis 3 that two parameters of a kind make."""
+    return _turned(np.array([values.get(f"{kind}_1", 0.0), values.get(f"{kind}_2", 0.0), 0.0]))
+
+
 def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
-    """Raises BadRequest where the file does not describe what a signal needs."""
+    """Raise BadRequest where the file does not describe what a signal needs."""
     if record.has(ACCELERATION):
         loop = spacecraft.loop
         if loop is None or loop.sensor.kind != ACCELEROMETER:

@@ -55,17 +55,17 @@ class Record:
 
     @property
     def start(self) -> float:
-        """When it begins, s."""
+        """Time at which it begins, s."""
         return float(min([*self.times[:1], *self.sun_pulses[:1]]))
 
     @property
     def end(self) -> float:
-        """When it ends, s."""
+        """Time at which it ends, s."""
         return float(max([*self.times[-1:], *self.sun_pulses[-1:]]))
 
     @property
     def length(self) -> float:
-        """How long it is, s."""
+        """Its length, s."""
         return self.end - self.start
 
     @property
@@ -77,10 +77,10 @@ class Record:
     @property
     def fired(self) -> tuple[Pulse, ...]:
         """The pulses of the schedule whose thrust falls in the record, wholly or in part."""
-        return tuple(one for one in self.schedule if one.over > self.start and one.thrust[0] < self.end)
+        return tuple(pulse for pulse in self.schedule if pulse.over > self.start and pulse.thrust[0] < self.end)
 
     def has(self, *names: str) -> bool:
-        """Whether all of these signals are there."""
+        """True where all of these signals are there."""
         return all(name in self.signals for name in names)
 
 
@@ -163,25 +163,25 @@ def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[flo
     return A, ratio * A
 
 
-def prior(spacecraft: Spacecraft, made: Sequence[Parameter]) -> tuple[Matrix, Vector]:
+def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, Vector]:
     """Rows (k, p) of what the file says of the parameters, over its sigmas, and their values (k,)."""
     rows, values = [], []
-    names = [one.name for one in made]
-    for index, one in enumerate(made):
-        row = np.zeros(len(made))
-        row[index] = 1.0 / one.prior
-        value = one.file / one.prior if math.isfinite(one.prior) else 0.0
-        if one.name == RATIO and "A" in names:
+    names = [parameter.name for parameter in chosen]
+    for index, parameter in enumerate(chosen):
+        row = np.zeros(len(chosen))
+        row[index] = 1.0 / parameter.prior
+        value = parameter.file / parameter.prior if math.isfinite(parameter.prior) else 0.0
+        if parameter.name == RATIO and "A" in names:
             # What of C = A·(C/A), to first order, A does not tell.
             (A, of_A), (C, of_C) = _of_moments(spacecraft)
             both = _together(spacecraft)
             left = of_C * math.sqrt(1.0 - both * both)
-            row[index], row[names.index("A")] = A / left, (one.file - both * of_C / of_A) / left
+            row[index], row[names.index("A")] = A / left, (parameter.file - both * of_C / of_A) / left
             value = (2.0 * C - both * of_C / of_A * A) / left
         if row.any():
             rows.append(row)
             values.append(value)
-    return np.array(rows).reshape(-1, len(made)), np.array(values)
+    return np.array(rows).reshape(-1, len(chosen)), np.array(values)
 
 
 def _together(spacecraft: Spacecraft) -> float:
@@ -203,7 +203,7 @@ def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -
     yield from moments(spacecraft)
     for number in (1, 2):
         yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, TINY * abs(spin))
-    if record.has(GYROS[2]) or len(record.sun_pulses):
+    if shows_spin(record):
         yield Parameter("omega_3", "rad/s", spin, math.inf, TINY * abs(spin))
     elif given is not None and given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
@@ -239,8 +239,13 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 
 def shows_turn(record: Record) -> bool:
-    """Whether a signal shows how the body is turned about its axis."""
+    """True where a signal shows how the body is turned about its axis."""
     return len(record.sun_pulses) > 0 or any(record.has(name) for name in (*GYROS[:2], ACCELERATION))
+
+
+def shows_spin(record: Record) -> bool:
+    """True where a signal shows ω3."""
+    return record.has(GYROS[2]) or len(record.sun_pulses) > 0
 
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -272,13 +277,13 @@ def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:
     """Thrust factor of a channel by the file, and its standard deviation; that is infinite without a tolerance."""
     given = spacecraft.dispersions
-    channel = next((one for one in spacecraft.channels if one.name == name), None)
+    channel = next((channel for channel in spacecraft.channels if channel.name == name), None)
     if given is None or channel is None:
         return 1.0, math.inf
-    sizes = [given.thrust.get(one.name) for one in channel.thrusters]
-    priors = [prior_of(one, 1.0) for one in sizes if one is not None]
-    mean = 1.0 + math.fsum(one - 1.0 for one, _ in priors) / len(sizes)
-    return mean, math.hypot(*(one for _, one in priors)) / len(sizes) or math.inf
+    sizes = [given.thrust.get(thruster.name) for thruster in channel.thrusters]
+    priors = [prior_of(size, 1.0) for size in sizes if size is not None]
+    mean = 1.0 + math.fsum(factor - 1.0 for factor, _ in priors) / len(sizes)
+    return mean, math.hypot(*(sigma for _, sigma in priors)) / len(sizes) or math.inf
 
 
 def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:
@@ -290,10 +295,10 @@ def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:
 
 
 def untold(record: Record) -> Iterator[str]:
-    """What signals of the kinds in a record cannot tell, whatever the file: in words."""
+    """Words on what signals of the kinds in a record cannot tell, whatever the file."""
     if not record.fired:
         yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
     if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
         yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
-    if not record.has(GYROS[2]) and not len(record.sun_pulses):
+    if not shows_spin(record):
         yield f"no signal shows the spin (omega_3 or {SUN_PULSE}): it is that of the file"

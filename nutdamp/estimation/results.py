@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.estimation import initial_guess
-from nutdamp.estimation.fit import KEPT, Fit, step
+from nutdamp.estimation.consistency import step
+from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import Body, Matrix, Values, Vector
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_turn, thrust_prior
-from nutdamp.physics import attitude
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_spin, shows_turn, thrust_prior
+from nutdamp.physics import attitude, triaxial
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -26,7 +27,7 @@ from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 DEG = math.pi / 180.0
 
 UNTOLD, SHARED, TOLD = "file", "both", "data"
-"""Where an estimate comes from: the file's tolerances, both, or the data."""
+"""Sources of an estimate: the file's tolerances, both, or the data."""
 
 FROM_DATA, FROM_FILE = 0.5, KEPT
 """Share of its prior that a sigma is below where the data tell a value, and above where they do not."""
@@ -61,7 +62,7 @@ class Estimate(NamedTuple):
 
     @property
     def source(self) -> str:
-        """Where it comes from."""
+        """Its source."""
         if math.isinf(self.sigma):
             return UNTOLD
         if self.prior is None or self.sigma <= FROM_DATA * self.prior:
@@ -70,7 +71,7 @@ class Estimate(NamedTuple):
 
     @property
     def change(self) -> float | None:
-        """By how many of the file's sigmas the value differs from that of the file."""
+        """Difference of the value from that of the file, in the file's sigmas."""
         return None if self.file is None or not self.prior else (self.value - self.file) / self.prior
 
 
@@ -115,15 +116,15 @@ class Carried:
         return np.asarray(self.covariance / np.outer(scale, scale))
 
 
-def carried(found: Fit, time: float) -> Carried:
+def carried(fitted: Fit, time: float) -> Carried:
     """The spacecraft as it is at ``time`` s, and how well that is known."""
-    model = found.model
+    model = fitted.model
     channels = {channel.name: channel for channel in model.spacecraft.channels}
     factors: dict[str, str] = {}
-    for one in model.parameters:
-        kind, _, name = one.name.partition(" ")
-        if kind == "thrust" and name in channels and _calibrated(found, name):
-            factors |= {f"thrust {member.name}": one.name for member in channels[name].thrusters}
+    for parameter in model.parameters:
+        kind, _, name = parameter.name.partition(" ")
+        if kind == "thrust" and name in channels and _calibrated(fitted, name):
+            factors |= {f"thrust {member.name}": parameter.name for member in channels[name].thrusters}
     names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *factors)
 
     def inputs(values: Values) -> Vector:
@@ -131,26 +132,26 @@ def carried(found: Fit, time: float) -> Carried:
         rates = body.axes @ state.rates
         return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in factors.values())])
 
-    slopes = derivatives(found, inputs)
-    body, state = model.at(found.named, time)
+    slopes = derivatives(fitted, inputs)
+    body, state = model.at(fitted.named, time)
     tilt = None
-    if found.index("attitude_1") is not None:
-        tilt = math.sqrt(0.5 * float(np.trace(_axis_covariance(found, time))))
-    elif found.index("attitude_3") is None:
+    if fitted.index("attitude_1") is not None:
+        tilt = math.sqrt(0.5 * float(np.trace(_axis_covariance(fitted, time))))
+    elif fitted.index("attitude_3") is None:
         # Rates say nothing of where the body points: at t = 0 it is as the file has it.
-        first, at_first = model.at(found.named, 0.0)
+        first, at_first = model.at(fitted.named, 0.0)
         of_file = attitude.multiply(
             model.spacecraft.initial.quaternion, attitude.from_matrix(model.spacecraft.inertia.axes.T)
         )
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
-    return Carried(time, names, inputs(found.named), slopes @ found.covariance @ slopes.T, body, state, tilt)
+    return Carried(time, names, inputs(fitted.named), slopes @ fitted.covariance @ slopes.T, body, state, tilt)
 
 
-def _calibrated(found: Fit, channel: str) -> bool:
-    """Whether a channel fired, and the data tell its thrust better than the file."""
-    value, sigma = _at(found, f"thrust {channel}")
-    return value > LEAST_THRUST and sigma < thrust_prior(found.model.spacecraft, channel)[1]
+def _calibrated(fitted: Fit, channel: str) -> bool:
+    """True where a channel fired, and the data tell its thrust better than the file."""
+    value, sigma = _at(fitted, f"thrust {channel}")
+    return value > LEAST_THRUST and sigma < thrust_prior(fitted.model.spacecraft, channel)[1]
 
 
 def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
@@ -168,15 +169,15 @@ def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
     sigmas = dict(zip(known.names, known.sigmas.tolist(), strict=True))
     of_A, of_C = (Tolerance("normal", sigmas[name]) if sigmas[name] > 0.0 else None for name in ("A", "C"))
     first, second, third = (Tolerance("normal", sigmas[f"omega0_{number}"]) for number in (1, 2, 3))
-    made = given or Dispersions()
+    of_file = given or Dispersions()
     thrust = {name: Tolerance("normal", sigma / factor, True) for name, (factor, sigma) in known.factors.items()}
     return replace(
-        made,
+        of_file,
         A=of_A,
         C=of_C,
         omega0=(first, second, third),
-        thrust={**made.thrust, **thrust},
-        attitude=made.attitude if known.tilt is None else Tolerance("normal", known.tilt),
+        thrust={**of_file.thrust, **thrust},
+        attitude=of_file.attitude if known.tilt is None else Tolerance("normal", known.tilt),
         correlation=correlations(known, given),
     )
 
@@ -190,49 +191,52 @@ def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, 
     there = [index for index, sigma in enumerate(known.sigmas) if sigma > 0.0]
     rounded = np.round(np.where(np.abs(matrix) < CORRELATED, 0.0, matrix), DIGITS)[np.ix_(there, there)]
     apart = rounded - np.diag(np.diag(rounded))
-    made = np.eye(len(there))
+    possible = np.eye(len(there))
     for shrunk in (0.0, *(10.0**power for power in range(-DIGITS, 0))):
         # What is rounded may be impossible by a hair: then all correlations are taken a hair smaller.
-        made = np.eye(len(there)) + np.round(apart * (1.0 - shrunk), DIGITS)
-        if np.linalg.eigvalsh(made)[0] > 0.5 * 10.0**-DIGITS:
+        possible = np.eye(len(there)) + np.round(apart * (1.0 - shrunk), DIGITS)
+        if np.linalg.eigvalsh(possible)[0] > 0.5 * 10.0**-DIGITS:
             break
     names = [known.names[index] for index in there]
-    pairs = [(names[i], names[j], float(made[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
+    pairs = [(names[i], names[j], float(possible[i, j])) for i in range(len(names)) for j in range(i + 1, len(names))]
     others = () if given is None else given.correlation
-    kept = [one for one in others if one[0] not in known.names and one[1] not in known.names]
-    return (*(one for one in pairs if one[2] != 0.0), *kept)
+    kept = [pair for pair in others if pair[0] not in known.names and pair[1] not in known.names]
+    return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
 
 
-def derivatives(found: Fit, function: Callable[[Values], Vector]) -> Matrix:
+def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
     """Derivatives (k, p) of what a function makes of the parameters, by central differences."""
     columns = []
-    for one in found.model.parameters:
-        ends = [function(found.named | {one.name: found.named[one.name] + sign * one.step}) for sign in (1.0, -1.0)]
-        columns.append((ends[0] - ends[1]) / (2.0 * one.step))
+    for parameter in fitted.model.parameters:
+        ends = [
+            function(fitted.named | {parameter.name: fitted.named[parameter.name] + sign * parameter.step})
+            for sign in (1.0, -1.0)
+        ]
+        columns.append((ends[0] - ends[1]) / (2.0 * parameter.step))
     return np.column_stack(columns)
 
 
-def _axis_covariance(found: Fit, time: float) -> Matrix:
+def _axis_covariance(fitted: Fit, time: float) -> Matrix:
     """Covariance (3, 3) of the inertial unit vector along the spin axis."""
-    sense = math.copysign(1.0, found.model.spacecraft.spin)
+    sense = math.copysign(1.0, fitted.model.spacecraft.spin)
 
     def axis(values: Values) -> Vector:
-        _, state = found.model.at(values, time)
+        _, state = fitted.model.at(values, time)
         return attitude.rotate(state.quaternion, sense * np.array([0.0, 0.0, 1.0]))
 
-    slopes = derivatives(found, axis)
-    return np.asarray(slopes @ found.covariance @ slopes.T)
+    slopes = derivatives(fitted, axis)
+    return np.asarray(slopes @ fitted.covariance @ slopes.T)
 
 
-def estimates(found: Fit, time: float) -> tuple[Estimate, ...]:
-    """What there is to know: the motion at ``time`` s, the body, and the sensors and thrusters."""
-    return (*_of_motion(found, time), *_of_body(found), *_of_others(found))
+def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
+    """All that is estimated: the motion at ``time`` s, the body, and the sensors and thrusters."""
+    return (*_of_motion(fitted, time), *_of_body(fitted), *_of_others(fitted))
 
 
-def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
-    model = found.model
+def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
+    model = fitted.model
     spacecraft = model.spacecraft
-    phase0 = math.atan2(*_transverse(model.at(found.named, time))[::-1])
+    phase0 = math.atan2(*_transverse(model.at(fitted.named, time))[::-1])
 
     def motion(values: Values) -> Vector:
         body, state = model.at(values, time)
@@ -241,8 +245,8 @@ def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
         nutation = arc_cones(body.moments, state.rates, math.copysign(1.0, state.spin)).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
-    slopes = derivatives(found, motion)
-    values, sigmas = motion(found.named), np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    slopes = derivatives(fitted, motion)
+    values, sigmas = motion(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
     if not shows_turn(model.record):
         sigmas[3] = math.inf
     omega = complex(*spacecraft.rates[:2])
@@ -251,7 +255,7 @@ def _of_motion(found: Fit, time: float) -> Iterator[Estimate]:
     spin_prior = None if given is None or given.omega0[2] is None else prior_of(given.omega0[2], spacecraft.spin)[1]
     rows = (
         ("spin", "spin ω3", "deg/s"),
-        ("nutation", "nutation" if model.body(found.named).symmetric else "largest nutation", "deg"),
+        ("nutation", "nutation" if model.body(fitted.named).symmetric else "largest nutation", "deg"),
         ("omega", "transverse rate |ω|", "deg/s"),
         ("phase", "phase arg(ω1 + iω2)", "deg"),
     )
@@ -269,15 +273,15 @@ def _transverse(now: tuple[Body, SpinState]) -> tuple[float, float]:
     return float(rates[0]), float(rates[1])
 
 
-def _of_body(found: Fit) -> Iterator[Estimate]:
-    spacecraft, inertia = found.model.spacecraft, found.model.spacecraft.inertia
+def _of_body(fitted: Fit) -> Iterator[Estimate]:
+    spacecraft, inertia = fitted.model.spacecraft, fitted.model.spacecraft.inertia
 
     def body(values: Values) -> Vector:
         A, C = in_moments(spacecraft, values)
         return np.array([values[RATIO], 1.0 - values[RATIO], A, C])
 
-    slopes = derivatives(found, body)
-    values, sigmas = body(found.named), np.sqrt(np.diag(slopes @ found.covariance @ slopes.T))
+    slopes = derivatives(fitted, body)
+    values, sigmas = body(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
     given = spacecraft.dispersions
     of_A = None if given is None or given.A is None else prior_of(given.A, inertia.A)[1]
     of_C = None if given is None or given.C is None else prior_of(given.C, inertia.C)[1]
@@ -292,14 +296,30 @@ def _of_body(found: Fit) -> Iterator[Estimate]:
     for (key, label, unit, file, prior), value, sigma in zip(rows, values, sigmas, strict=True):
         if sigma > 0.0:
             yield Estimate(key, label, unit, 1.0, float(value), float(sigma), file, prior)
-    if found.index("growth") is not None:
-        value, sigma = _at(found, "growth")
+    if shows_turn(fitted.model.record) and not shows_spin(fitted.model.record):
+        yield _rate(fitted)
+    if fitted.index("growth") is not None:
+        value, sigma = _at(fitted, "growth")
         yield Estimate("growth", "growth 1/τ", "1/s", 1.0, value, sigma, spacecraft.growth, None)
     for number, label in ((1, "(I1 - I2)/(I1 + I2)"), (2, "I12/A")):
-        if found.index(f"unequal_{number}") is not None:
-            value, sigma = _at(found, f"unequal_{number}")
-            one = found.model.parameters[found.index(f"unequal_{number}") or 0]
-            yield Estimate(f"unequal_{number}", label, "", 1.0, value, sigma, one.file, None)
+        if fitted.index(f"unequal_{number}") is not None:
+            value, sigma = _at(fitted, f"unequal_{number}")
+            parameter = fitted.model.parameters[fitted.index(f"unequal_{number}") or 0]
+            yield Estimate(f"unequal_{number}", label, "", 1.0, value, sigma, parameter.file, None)
+
+
+def _rate(fitted: Fit) -> Estimate:
+    """The rate of a small nutation in the body: told much better than C/A and ω3, where the file alone tells ω3."""
+
+    def rate(values: Values) -> Vector:
+        body = fitted.model.body(values)
+        return np.array([triaxial.body_nutation_rate(body.moments, body.state.spin)])
+
+    slopes = derivatives(fitted, rate)
+    value, sigma = float(rate(fitted.named)[0]), math.sqrt(float((slopes @ fitted.covariance @ slopes.T)[0, 0]))
+    inertia, spin = fitted.model.spacecraft.inertia, fitted.model.spacecraft.spin
+    file = triaxial.body_nutation_rate(inertia.moments, spin)
+    return Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, value, sigma, file, None)
 
 
 LABELS = {
@@ -311,34 +331,34 @@ LABELS = {
 }
 
 
-def _of_others(found: Fit) -> Iterator[Estimate]:
+def _of_others(fitted: Fit) -> Iterator[Estimate]:
     """Sensors and thrusters."""
-    for one in found.model.parameters:
-        kind, _, which = one.name.partition(" " if " " in one.name else "_")
+    for parameter in fitted.model.parameters:
+        kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
         if kind not in LABELS:
             continue
         label, unit, factor = LABELS[kind]
         if which == "acceleration":
             unit, factor = "m/s²", 1.0
-        value, sigma = _at(found, one.name)
-        known = thrust_prior(found.model.spacecraft, which)[1] if kind == "thrust" else one.prior
+        value, sigma = _at(fitted, parameter.name)
+        known = thrust_prior(fitted.model.spacecraft, which)[1] if kind == "thrust" else parameter.prior
         prior = known if math.isfinite(known) else None
-        yield Estimate(one.name, label.format(which), unit, factor, value, sigma, one.file, prior)
+        yield Estimate(parameter.name, label.format(which), unit, factor, value, sigma, parameter.file, prior)
 
 
-def _at(found: Fit, name: str) -> tuple[float, float]:
-    index = found.index(name)
+def _at(fitted: Fit, name: str) -> tuple[float, float]:
+    index = fitted.index(name)
     assert index is not None
-    return float(found.values[index]), float(found.sigmas[index])
+    return float(fitted.values[index]), float(fitted.sigmas[index])
 
 
-def correlated(found: Fit) -> tuple[tuple[str, str, float], ...]:
+def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     """Pairs of parameters that are known together much better than apart, and their correlations."""
-    scale = found.sigmas
-    matrix = found.covariance / np.outer(scale, scale)
-    names = [one.name for one in found.model.parameters]
+    scale = fitted.sigmas
+    matrix = fitted.covariance / np.outer(scale, scale)
+    names = [pair.name for pair in fitted.model.parameters]
     pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
-    return tuple(sorted((one for one in pairs if abs(one[2]) > WORTH_NAMING), key=lambda one: -abs(one[2])))
+    return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
 
 
 LATE = 0.1
@@ -348,50 +368,58 @@ SURE = 3.0
 """Standard deviations from which on a doubt is said."""
 
 
-def doubts(found: Fit) -> Iterator[str]:
+def doubts(fitted: Fit) -> Iterator[str]:
     """Remarks on a fit: what it rests on besides the data, and where record, schedule and file disagree."""
-    if initial_guess.too_slow(found.model, found.values):
+    if not fitted.finished:
+        yield "the search ended with its budget of work, perhaps before the best fit: the sigmas may be too small"
+    if initial_guess.too_slow(fitted.model, fitted.values):
         yield (
-            f"sampled below the nutation rate, every {initial_guess.interval(found.model):.4g} s: which C/A it is "
+            f"sampled below the nutation rate, every {initial_guess.interval(fitted.model):.4g} s: which C/A it is "
             "rests on the tolerance of the file (are the times in seconds?)"
         )
-    spin = found.model.spacecraft.spin
-    if found.named.get("omega_3", spin) * spin < 0.0:
+    spin = fitted.model.spacecraft.spin
+    if fitted.named.get("omega_3", spin) * spin < 0.0:
         yield "the body spins the other way than the file has it: is omega_3 reversed, or state.spin?"
-    if not shows_turn(found.model.record):
+    if fitted.model.unequal and fitted.model.spacecraft.inertia.symmetric:
+        apart = 200.0 * math.hypot(fitted.named["unequal_1"], fitted.named["unequal_2"])
+        yield (
+            f"the transverse moments of inertia differ by {apart:.2g} %, and in the file they are equal: all else is "
+            "estimated with what they are; give the tensor"
+        )
+    if not shows_turn(fitted.model.record):
         yield (
             "the axis alone does not show how the body is turned about it: the phase, and so the firing times of a "
             "plan, rest on the attitude of the file; omega_1 or omega_2, an acceleration or Sun pulses would show it"
         )
-    yield from _of_residuals(found)
-    yield from _of_schedule(found)
+    yield from _of_residuals(fitted)
+    yield from _of_schedule(fitted)
 
 
-def _of_residuals(found: Fit) -> Iterator[str]:
-    """What residuals that are not white may come from, and what helps."""
-    left = [index for index in range(len(found.model.signals)) if found.resolved[index] and not found.white(index)]
+def _of_residuals(fitted: Fit) -> Iterator[str]:
+    """Words on where residuals that are not white may come from, and what helps."""
+    left = [index for index in range(len(fitted.model.signals)) if fitted.resolved[index] and not fitted.white(index)]
     if not left:
         return
-    says = f"the residuals of {', '.join(found.model.signals[index] for index in left)} are not white"
-    time = step(found, left, small=True)
+    says = f"the residuals of {', '.join(fitted.model.signals[index] for index in left)} are not white"
+    time = step(fitted, left, small=True)
     if time is None:
         yield f"{says}: the noise of neighbouring samples is correlated, or a small motion is not in the model"
         return
-    what = "check --schedule" if found.model.record.fired else "give the pulses fired with --schedule"
+    what = "check --schedule" if fitted.model.record.fired else "give the pulses fired with --schedule"
     yield f"{says}: the nutation steps at about {time:.3g} s, as by a small pulse; {what}, or end the record before it"
 
 
-def _of_schedule(found: Fit) -> Iterator[str]:
-    """Where the schedule is not what was fired in the record."""
-    record = found.model.record
+def _of_schedule(fitted: Fit) -> Iterator[str]:
+    """Words on where the schedule is not what was fired in the record."""
+    record = fitted.model.record
     outside = len(record.schedule) - len(record.fired)
     if outside:
         span = f"the record, {record.start:g} s to {record.end:g} s"
         count = f"{outside} of {len(record.schedule)} pulses of the schedule" if record.fired else "the whole schedule"
         yield f"{count} is outside {span}: of its channels the record tells nothing"
-    for index, one in enumerate(found.model.parameters):
-        kind, _, channel = one.name.partition(" ")
-        value, sigma = float(found.values[index]), float(found.sigmas[index])
+    for index, parameter in enumerate(fitted.model.parameters):
+        kind, _, channel = parameter.name.partition(" ")
+        value, sigma = float(fitted.values[index]), float(fitted.sigmas[index])
         if kind == "delay" and abs(value) > max(LATE, SURE * sigma):
             way = "late" if value < 0.0 else "early"
             yield (

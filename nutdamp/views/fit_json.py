@@ -43,7 +43,7 @@ def fit_json(fit: Fit, carried: Carried, ahead: Outlook | None = None, warnings:
         "information": fit.information.tolist(),
         "parameters": [parameter.name for parameter in model.parameters],
         "values_SI": fit.values.tolist(),
-        "covariance_SI": fit.covariance.tolist(),
+        "covariance_SI": fit.region.tolist(),
         "dispersed": {
             "inputs": list(carried.names),
             "values_SI": carried.values.tolist(),

@@ -73,7 +73,7 @@ def gyro_case(seed: int) -> Case:
     times = np.sort(draw.uniform(0.0, length, count)) if draw.uniform() < 0.3 else np.linspace(0.0, length, count)
     times -= times[0]
     rates_ = motion((truth["A"], truth["A"], truth["C"]), rates, times, truth["growth"])
-    tilt = math.radians(0.2) * draw.normal(size=2)
+    tilt = math.radians(1.0) * draw.normal(size=2)
     bias = GYRO_BIAS * draw.normal(size=3)
     truth |= {"misalignment_1": float(tilt[0]), "misalignment_2": float(tilt[1])}
     truth |= {f"bias_{name}": float(one) for name, one in zip(GYROS, bias, strict=True)}

@@ -196,6 +196,16 @@ class _Flight:
             )
         return found
 
+    def change(self, rates: Array) -> Array:
+        """dω/dt (n, 3) on a coast: H stands still in space, and the body turns with ω and what dissipation adds.
+
+        Not by differences of the motion, whose errors are as large as the noise of an accelerometer.
+        """
+        momentum = rates * np.array(self.moments)
+        along = momentum / np.linalg.norm(momentum, axis=1, keepdims=True)
+        slip = self.growth * along[:, 2:] * np.cross(along, np.array([0.0, 0.0, 1.0]))
+        return np.asarray(-np.cross(rates + slip, momentum) / np.array(self.moments))
+
     def sun(self, body: Spacecraft, length: float) -> Array:
         """When the Sun passes the azimuth of the sensor, s."""
         assert body.sun is not None
@@ -235,18 +245,15 @@ def _columns(
             values = _spoilt(draw, shown[:, int(number) - 1], noise)
             made[f"omega_{number}_{unit}"] = values * factor
     if "acceleration" in kind:
-        step, arm = 1e-5, np.array([0.8, 0.0, 0.0])
-        near = np.array([one.rates for one in flight.at(np.sort(np.concatenate([times + 0.0, times + 2.0 * step])))])
-        middle = 0.5 * (near[1::2] + near[::2])
-        change = (near[1::2] - near[::2]) / (2.0 * step)
+        arm, change = np.array([0.8, 0.0, 0.0]), flight.change(rates)
         truth["bias_acceleration"] = 0.002
-        felt = (np.cross(change, arm) + np.cross(middle, np.cross(middle, arm)))[:, 2] + 0.002
+        felt = (np.cross(change, arm) + np.cross(rates, np.cross(rates, arm)))[:, 2] + 0.002
         made["acceleration_m_s2"] = _spoilt(draw, felt, 0.3 * noise)
     if "radec" in kind or "axis" in kind:
         wobble = TILT * draw.normal(size=2)
         truth |= {"wobble_1": float(wobble[0]), "wobble_2": float(wobble[1])}
-        along = np.array([wobble[1], -wobble[0], 1.0])
-        axis = sense * np.array([one.rotation @ along / np.linalg.norm(along) for one in motions])
+        along = Rotation.from_rotvec([*wobble, 0.0]).apply(np.array([0.0, 0.0, 1.0]))
+        axis = sense * np.array([one.rotation @ along for one in motions])
         axis = axis + noise * draw.normal(size=axis.shape)
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
         axis[draw.uniform(size=len(axis)) < draw.choice([0.0, 0.1, 0.3])] = math.nan
