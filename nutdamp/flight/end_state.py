@@ -1,11 +1,4 @@
-"""End state of a flight, differences between models, extreme angles to exclusion cones.
-
-How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included.
-
-What has become of a body by a given time, and how far two models of the same flight are apart.
-
-What pulses add to the velocity: the integral of their forces as the body turns.
-"""
+"""End state of a flight, differences between models, extreme angles to exclusion cones."""
 
 from __future__ import annotations
 

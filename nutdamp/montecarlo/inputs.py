@@ -1,21 +1,16 @@
-"""Dispersed inputs, random draws, correlation.
+"""Dispersed inputs of a study: selection, correlation, random draws.
 
-Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
+The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `Input`; a
+tolerance without effect becomes an `Unused` with its reason.
 
-Every drawn quantity is one `Input` with a name of its own. A tolerance that cannot touch the outcome is not dropped
-in silence: it becomes an `Unused` with its reason.
+Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
+correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
+ones theirs is (6/π) asin(ρ/2).
 
-Inputs that vary together: a Gaussian copula over the draws of each.
-
-Each input of a group is a monotonic function of a standard normal number, and the correlation given is that of these
-numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform ones theirs is (6/π) asin(ρ/2).
-
-Draws: the same numbers for the same seed, whatever the number of threads or of cases.
-
-Cases come in fixed blocks of `BLOCK`. Every input has a stream of its own in every block: the counter-based Philox
-generator with the seed and the input's name in the key, the block in the counter. So case 1234 is the same in a study
-of any size, and a tolerance that is tightened or dropped leaves the draws of all others as they were. Inputs that are
-correlated are mixed of the streams of their group.
+Draws do not depend on the number of threads or cases. Cases come in fixed blocks of `BLOCK`. Every input has a stream
+of its own in every block: the counter-based Philox generator with the seed and the input's name in the key, the block
+in the counter. So case 1234 is the same in a study of any size, and a tolerance that is tightened or dropped leaves
+the draws of all others as they were. Correlated inputs mix the streams of their group.
 """
 
 from __future__ import annotations
@@ -48,7 +43,7 @@ SCHEDULE_IDLE = "the schedule does not fire"
 
 
 class Input(NamedTuple):
-    """One drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
+    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
 
     ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
     `nutdamp.spacecraft.tolerances.KINDS`, in ``unit`` (a bare number for factors).
@@ -75,14 +70,14 @@ class Unused(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What a study draws, in a fixed order, and what it leaves."""
+    """Inputs of a study in a fixed order, and unused tolerances."""
 
     drawn: tuple[Input, ...]
     unused: tuple[Unused, ...]
 
 
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
-    """The inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
+    """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
     drawn: list[Input] = []
     unused: list[Unused] = []
     for entry in _entries(spacecraft, schedule):
@@ -96,7 +91,7 @@ def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
 
 
 def reachable(spacecraft: Spacecraft) -> Inputs:
-    """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
+    """Inputs of any schedule: those of one that fires each channel and the torquer once.
 
     What each pulse draws is there once.
     """
@@ -117,7 +112,7 @@ def reachable(spacecraft: Spacecraft) -> Inputs:
 
 
 def of_sensor(spacecraft: Spacecraft) -> Inputs:
-    """What a loop draws of its sensor: bias and scale of each gyro on its own; nothing for a spacecraft without one."""
+    """Inputs of the sensor of a loop: bias and scale of each gyro; none for a spacecraft without sensor."""
     requested, loop = spacecraft.dispersions, spacecraft.loop
     if requested is None or loop is None:
         return Inputs((), ())
@@ -193,13 +188,13 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
 
 
 def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:
-    """Sizes of relative tolerances become absolute; a factor (nominal one) stays what it is."""
+    """Input of a tolerance: relative sizes become absolute; a factor (nominal one) stays."""
     size = tolerance.size * (nominal if tolerance.relative else 1.0)
     return Input(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
 
 
 def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
-    """The thrusters that the schedule fires, by name; the steerable torquer has None."""
+    """Thrusters fired by the schedule, by name; the steerable torquer has None."""
     channels = {channel.name: channel for channel in spacecraft.channels}
     members: dict[str, Thruster | None] = {}
     for pulse in schedule:
@@ -235,7 +230,7 @@ def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Ite
 
 
 def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
-    """Tolerances of cold nozzles and of the tank; ``fires``: whether any thruster does."""
+    """Tolerances of cold nozzles and of the tank; ``fires``: some thruster fires."""
     cold, tank = spacecraft.cold, spacecraft.tank
     first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
     of_cold = {"cold": (first, ""), "cold_pulses": (count, "")}
@@ -283,22 +278,22 @@ Pair = tuple[str, str, float]
 """Names of two inputs, and their correlation."""
 
 NODES = 96
-"""Of the quadrature by which the correlation of values that are not normal is worked out."""
+"""Nodes of the quadrature for the correlation of values that are not normal."""
 
 
 class Group(NamedTuple):
-    """Inputs that are correlated with one another, directly or through others: ``matrix`` (m, m) of their normals."""
+    """Group of directly or indirectly correlated inputs: ``matrix`` (m, m) of their normals."""
 
     names: tuple[str, ...]
     matrix: Array
 
     @property
     def factor(self) -> Array:
-        """L (m, m), lower: L times independent standard normals has this correlation. The first stays as it is."""
+        """Cholesky factor L (m, m), lower: L times independent standard normals has this correlation."""
         return np.asarray(np.linalg.cholesky(self.matrix))
 
     def among(self, names: Iterable[str]) -> Group:
-        """Those of them that are among ``names``."""
+        """Subgroup of the inputs among ``names``."""
         rows = [row for row, name in enumerate(self.names) if name in set(names)]
         return Group(tuple(self.names[row] for row in rows), self.matrix[np.ix_(rows, rows)])
 
@@ -311,7 +306,7 @@ class Group(NamedTuple):
 
 
 def positive_definite(group: Group) -> bool:
-    """Whether there are numbers with these correlations, none of which follows from the others."""
+    """True if numbers with these correlations exist, none of which follows from the others."""
     try:
         return bool(np.all(np.isfinite(group.factor)))
     except np.linalg.LinAlgError:
@@ -319,13 +314,13 @@ def positive_definite(group: Group) -> bool:
 
 
 def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
-    """The groups that ``pairs`` connect, names in the order of their first pair."""
+    """Groups connected by ``pairs``, names in the order of their first pair."""
     pairs = list(pairs)
     members: list[list[str]] = []
     for first, second, _ in pairs:
-        touched = [one for one in members if first in one or second in one]
-        members = [one for one in members if one not in touched]
-        members.append(list(dict.fromkeys([*(name for one in touched for name in one), first, second])))
+        touched = [member for member in members if first in member or second in member]
+        members = [member for member in members if member not in touched]
+        members.append(list(dict.fromkeys([*(name for member in touched for name in member), first, second])))
     groups = []
     for names in members:
         matrix = np.eye(len(names))
@@ -338,16 +333,16 @@ def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
 
 
 def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
-    """The same; raises BadRequest where they are not positive definite."""
-    found = grouped(pairs)
-    for group in found:
+    """`grouped`; raises BadRequest for groups that are not positive definite."""
+    groups = grouped(pairs)
+    for group in groups:
         if not positive_definite(group):
             raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
-    return found
+    return groups
 
 
 def value_of(entry: Input, normal: Array) -> Array:
-    """The deviation that belongs to a standard ``normal`` number, at the same level of its distribution."""
+    """Deviation of a standard ``normal`` number, at the same level of its distribution."""
     if entry.kind == "normal":
         return entry.size * normal
     from scipy.special import ndtr  # few files have correlated inputs that are not normal
@@ -358,7 +353,7 @@ def value_of(entry: Input, normal: Array) -> Array:
 
 
 def normal_of(entry: Input, value: Array) -> Array:
-    """The inverse of `value_of`."""
+    """Inverse of `value_of`."""
     if entry.kind == "normal":
         return value / entry.size
     from scipy.special import ndtri  # as above
@@ -373,39 +368,41 @@ def mixing(inputs: Sequence[Input], groups: Iterable[Group]) -> Array:
 
     In a group, column k is what input k adds to those before it.
     """
-    found, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
+    mixed, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     for group in groups:
         present = group.among(rows)
         members = [inputs[rows[name]] for name in present.names]
         if len(members) < 2:
             continue
         matrix = [
-            [_of_values(one, other, rho) for other, rho in zip(members, line, strict=True)]
-            for one, line in zip(members, present.matrix.tolist(), strict=True)
+            [_of_values(member, other, rho) for other, rho in zip(members, line, strict=True)]
+            for member, line in zip(members, present.matrix.tolist(), strict=True)
         ]
         at = [rows[name] for name in present.names]
-        found[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
-    return found
+        mixed[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
+    return mixed
 
 
 def independent(draws: Mapping[str, Array], inputs: Iterable[Input], groups: Iterable[Group]) -> dict[str, Array]:
-    """The draws, where those of a group are the independent normals behind them: what each adds to those before it."""
-    named, found = {entry.name: entry for entry in inputs}, dict(draws)
+    """Draws with those of a group replaced by the independent normals behind them."""
+    named, normals_of = {entry.name: entry for entry in inputs}, dict(draws)
     for group in groups:
         present = group.among(draws)
         if len(present.names) < 2:
             continue
         normals = np.array([normal_of(named[name], draws[name]) for name in present.names])
-        found.update(zip(present.names, np.linalg.solve(present.factor, normals), strict=True))
-    return found
+        normals_of.update(zip(present.names, np.linalg.solve(present.factor, normals), strict=True))
+    return normals_of
 
 
 def together(inputs: Sequence[Input], groups: Iterable[Group]) -> list[list[int]]:
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
-    found = [[rows[name] for name in group.among(rows).names] for group in groups]
-    taken = {row for one in found for row in one}
-    return sorted([one for one in found if one] + [[row] for row in range(len(inputs)) if row not in taken], key=min)
+    rows_of = [[rows[name] for name in group.among(rows).names] for group in groups]
+    taken = {row for block in rows_of for row in block}
+    return sorted(
+        [block for block in rows_of if block] + [[row] for row in range(len(inputs)) if row not in taken], key=min
+    )
 
 
 def _of_values(first: Input, second: Input, rho: float) -> float:
@@ -424,7 +421,7 @@ def _of_values(first: Input, second: Input, rho: float) -> float:
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    """Of the standard normal distribution."""
+    """Quadrature nodes of the standard normal distribution."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     return nodes, weights / math.sqrt(2.0 * math.pi)
 
@@ -436,7 +433,7 @@ BLOCK = 16_384
 """Cases that share a substream of each input."""
 
 MOST_ATTEMPTS = 1_000
-"""How often a case may be drawn again before the dispersions count as impossible."""
+"""Largest number of redraws of a case; beyond it the dispersions count as impossible."""
 
 
 class Source:
@@ -469,7 +466,7 @@ class Source:
         self._physical = physical
 
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
-        """Deviations of the cases of block ``number`` (from 0), and which rows were drawn again (as often as it was).
+        """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per redraw).
 
         The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
         """
@@ -495,7 +492,7 @@ class Source:
         return {**self._fixed, **{entry.name: row for entry, row in rows}}
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
-        """Deviations of one block into ``table`` (inputs, cases); each ``attempt`` has a stream of its own."""
+        """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
         for entry in self._alone:
             row, generator = table[self._rows[entry.name]], self._stream(entry.name, block, attempt)
             if entry.kind == "normal":
@@ -518,7 +515,7 @@ class Source:
                     table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
 
     def _stream(self, name: str, block: int, attempt: int) -> np.random.Generator:
-        """The generator, at the begin of what one input draws."""
+        """Generator at the start of the draws of one input."""
         self._bits.state = {
             "bit_generator": "Philox",
             "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": self._keys[name]},

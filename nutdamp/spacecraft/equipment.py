@@ -45,7 +45,7 @@ class SunSensor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
-    """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most …
+    """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
     ``max_count`` pulses, one in ``every`` so many spins.
     """
 
