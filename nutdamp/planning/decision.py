@@ -463,7 +463,7 @@ def strays(aspect: Aspect) -> str:
     return f"the spin axis comes to {seen} from {keep.name} at {at:.4g} s ({bound})"
 
 
-def said(plan: Plan) -> tuple[str, ...]:
+def notes_on(plan: Plan) -> tuple[str, ...]:
     """Reason for the lack of a schedule, or the `remarks` on it."""
     return remarks(plan) if plan.feasible else (infeasibility(plan),)
 

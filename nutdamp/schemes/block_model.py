@@ -74,18 +74,18 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
-    found = times[index] + ahead[index] * turn / (2.0 * math.pi)
+    times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
     for _ in range(ITERATIONS):
-        off = (to_sun_pulse(flown, np.minimum(found, until)) + math.pi) % (2.0 * math.pi) - math.pi
-        found += off * turn / (2.0 * math.pi)
-        if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
+        off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
+        times_of += off * turn / (2.0 * math.pi)
+        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
-    found = found[(found >= 0.0) & (found <= until)]
-    angles = attitude.angle_between(flown.axis(found), body.sun)
+    times_of = times_of[(times_of >= 0.0) & (times_of <= until)]
+    angles = attitude.angle_between(flown.axis(times_of), body.sun)
     seen = np.array([sensor.sees(angle) for angle in angles.tolist()], dtype=bool)
-    if len(found) and not seen.any():
-        _expect_seen(sensor, float(found[0]), float(angles[0]))
-    return np.asarray(found[seen])
+    if len(times_of) and not seen.any():
+        _expect_seen(sensor, float(times_of[0]), float(angles[0]))
+    return np.asarray(times_of[seen])
 
 
 def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
@@ -125,25 +125,25 @@ class SunPulses:
 
         Raises Infeasible where there is none: the axis is too near to the Sun, or the sensor sees it no more.
         """
-        found, sensor = self.clock.here, self._sensor
+        motion, sensor = self.clock.here, self._sensor
         if sensor.sees_all:
             before = float(self.clock.time[0])
             self.seen += [True] * (number - len(self.seen))
-            found = self.clock.sun_pulse(number)
+            motion = self.clock.sun_pulse(number)
             self._expect_found(before)
-            return found
+            return motion
         unseen: list[tuple[float, float]] = []
         while self._count < number:
             before = float(self.clock.time[0])
-            found = self.clock.sun_pulse(len(self.seen) + 1)
+            motion = self.clock.sun_pulse(len(self.seen) + 1)
             self._expect_found(before)
-            angle = float(self.clock.angle(found)[0])
+            angle = float(self.clock.angle(motion)[0])
             self.seen.append(bool(sensor.sees(angle)))
             self._count += self.seen[-1]
-            unseen = [] if self.seen[-1] else [*unseen, (float(found.since[0]), angle)]
+            unseen = [] if self.seen[-1] else [*unseen, (float(motion.since[0]), angle)]
             if len(unseen) > BLIND:
                 _expect_seen(sensor, *unseen[0])
-        return found
+        return motion
 
     def _expect_found(self, before: float) -> None:
         if self.clock.lost[0]:
@@ -166,7 +166,7 @@ def pushes(pulse: Pulse, torque: Vector) -> list[Push]:
     if pulse.command is None:
         return [Push(0.0, pulse.on_time, torque, torque)]
     back, ramps = pulse.command.start, pulse.command.ramps
-    return [Push(one.begin - back, one.end - back, torque * one.first, torque * one.last) for one in ramps]
+    return [Push(ramp.begin - back, ramp.end - back, torque * ramp.first, torque * ramp.last) for ramp in ramps]
 
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
@@ -197,15 +197,15 @@ def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = Non
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
         for number in block.sun_pulses:
             work.spend(FIRED if spacecraft.inertia.symmetric and not spacecraft.disturbances else INTEGRATED)
-            found, over = sun_pulses.next(number), clock.over[0]
-            delay = found.since * 0.0 + jitter * errors.standard_normal() + block.delay
-            due = float(found.since[0] + delay[0])
+            motion, over = sun_pulses.next(number), clock.over[0]
+            delay = motion.since * 0.0 + jitter * errors.standard_normal() + block.delay
+            due = float(motion.since[0] + delay[0])
             if due < over - 1e-9:
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
             given = supply.fire(on_command(channel, 0.0, block.width), channel)
             sheds = None if per_kg is None else (per_kg * (given.propellant or 0.0))[:, None]
             torque = np.zeros(3) if given.torque is None else given.torque
-            start = float(clock.fire(found, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
+            start = float(clock.fire(motion, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
             pulses.append(given.moved(start))
     supply.expect_to_last()
     return Schedule(tuple(pulses), blocks=tuple(blocks)), sun_pulses.seen
@@ -243,8 +243,8 @@ def acts(channel: Channel, widths: Any) -> Acts:
     """What commands of ``widths`` s of a channel give."""
     if channel.valve is None:
         return Acts(widths, 0.5 * widths, widths, widths)
-    found, index = np.unique(widths, return_inverse=True)
-    rows = np.array([_acts(channel.valve, width) for width in found.tolist()])
+    distinct, index = np.unique(widths, return_inverse=True)
+    rows = np.array([_acts(channel.valve, width) for width in distinct.tolist()])
     return Acts(*(row[index].reshape(np.shape(widths)) for row in rows.T))
 
 

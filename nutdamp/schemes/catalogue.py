@@ -323,7 +323,7 @@ PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
 COMPARED = (*CLASSIC, OPTIMAL.name)
 """What is planned where none is named and there is no target."""
-POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda one: one.slow) if scheme.points)
+POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
 """In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)

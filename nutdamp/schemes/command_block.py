@@ -49,7 +49,7 @@ def searched(compared: str, form: Left, flown: Left, *, first: bool) -> str:
 
     ``first``: what was flown is the best in closed form.
     """
-    nutation, end = (math.degrees(abs(float(one) - other)) for one, other in zip(form[:2], flown[:2], strict=True))
+    nutation, end = (math.degrees(abs(float(term) - other)) for term, other in zip(form[:2], flown[:2], strict=True))
     scope = f"{compared} does better in closed form" if first else "of those flown none does better"
     return (
         f"{scope}; flown from the Sun pulses of the nutating body, nutation differs by {nutation:.2g}° and the end "
@@ -70,10 +70,10 @@ def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
 
 
 def cures(
-    model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float], made: Schedule, more: list[str]
+    model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float], schedule: Schedule, more: list[str]
 ) -> str:
-    """What of the file keeps the blocks ``made`` from leaving less, besides ``more``; ``missed``: bounds, rad."""
-    named = [*more, *too_coarse(model, channels, missed), *used_up(model.body, made)]
+    """What of the file keeps the blocks ``schedule`` from leaving less, besides ``more``; ``missed``: bounds, rad."""
+    named = [*more, *too_coarse(model, channels, missed), *used_up(model.body, schedule)]
     if shed(model.body) is not None:  # with other blocks the moments fall otherwise: no cure is sure to help
         return "what limits these blocks, if the moments of inertia did not fall: " + listed(named or [ANY])
     return "to leave less: " + listed(named or [ANY])
@@ -86,7 +86,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
     way, half = body.to_turn if body.goal.axis is not None else 0.0, 0.5 * commands.delay_step
     spin, damped = abs(body.spin), abs(model.rate * body.spin)
     aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
-    steps = [step for one in channels for step in _steps(model, one)]
+    steps = [step for channel in channels for step in _steps(model, channel)]
     along = 0.5 * min(steps, default=0.0)
     for part, what in ((Part.DISTANCE, "the end of H"), (Part.NUTATION, "the nutation")):
         most = missed.get(part, math.inf)
@@ -106,15 +106,15 @@ def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
         yield float(np.diff(turned, prepend=0.0).min())
 
 
-def used_up(body: Spacecraft, made: Schedule) -> Iterator[str]:
+def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[str]:
     """Limits that the blocks of a schedule use up."""
     commands, limits = body.commands, body.limits
     assert commands is not None
-    if body.horizon - made.end < 2.0 * spin_turn(body):
-        yield f"a longer limits.horizon (the blocks end at {made.end:.4g} s of {body.horizon:.4g} s)"
-    if limits.max_pulses is not None and len(made) >= limits.max_pulses:
+    if body.horizon - schedule.end < 2.0 * spin_turn(body):
+        yield f"a longer limits.horizon (the blocks end at {schedule.end:.4g} s of {body.horizon:.4g} s)"
+    if limits.max_pulses is not None and len(schedule) >= limits.max_pulses:
         yield f"more limits.max_pulses ({limits.max_pulses})"
-    if any(block.count == commands.max_count for block in made.blocks):
+    if any(block.count == commands.max_count for block in schedule.blocks):
         yield f"a larger commands.max_count ({commands.max_count})"
 
 
@@ -208,39 +208,47 @@ class BlockSearch:
     def best(self, most: int) -> list[Found]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
         start = Found((), self.model.start, (math.inf, math.inf, math.inf))
-        found = self._single(start)
+        sequences = self._single(start)
         firsts: list[Found] = []
         for number in range(2, most + 1):
-            self.most = min((one.rank[1] for one in found if one.rank[0] <= 0.0), default=math.inf)
+            self.most = min((sequence.rank[1] for sequence in sequences if sequence.rank[0] <= 0.0), default=math.inf)
             if work.exhausted() or (self.most < math.inf and not self.small):
                 break
             if number == 2:
                 small = self.behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
-                firsts = [*_promising(found, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
+                firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
                 firsts += self._all_firsts(start) if self.small else []
             else:
                 firsts = _promising(firsts, FIRST // 2)
-            firsts = [one for one in firsts if one.rank[1] < self.most]
+            firsts = [sequence for sequence in firsts if sequence.rank[1] < self.most]
             firsts = [more for first in firsts for more in self.behind(first, self._rest(first), few=4)]
-            found += firsts
+            sequences += firsts
         self.most = math.inf
-        self.doubtful = sorted((one for one in found if one.share <= DOUBTFUL), key=lambda one: one.rank[1:])
+        self.doubtful = sorted(
+            (sequence for sequence in sequences if sequence.share <= DOUBTFUL), key=lambda sequence: sequence.rank[1:]
+        )
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
-        clear = sorted(ranked, key=lambda one: one.share)[: FLOWN // 2]
-        each = {len(one.blocks): one for one in reversed(ranked)}.values()
-        first = {one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}
+        ranked = list(
+            {sequence.blocks: sequence for sequence in sorted(sequences, key=lambda sequence: sequence.rank)}.values()
+        )
+        clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
+        each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
+        first = {sequence.blocks: sequence for sequence in (*ranked[: FLOWN // 2], *clear, *each)}
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
-        gentle = sorted(sorted(ranked, key=lambda one: one.share)[: GENTLE * FLOWN], key=self._largest_pulse)
-        more = {one.blocks: one for one in (*of_each_kind(ranked)[:FLOWN], *gentle) if one.blocks not in first}
+        gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
+        more = {
+            sequence.blocks: sequence
+            for sequence in (*of_each_kind(ranked)[:FLOWN], *gentle)
+            if sequence.blocks not in first
+        }
         return [*first.values(), *islice(more.values(), 2 * FLOWN)]
 
-    def _largest_pulse(self, found: Found) -> float:
+    def _largest_pulse(self, sequence: Found) -> float:
         """The most by which one of its pulses turns H, rad."""
-        named = {one.name: one for one in self.channels}
+        named = {channel.name: channel for channel in self.channels}
         spin = self.body.spin
-        return max(float(self.model.turned_by(named[one.channel], one.width, spin)) for one in found.blocks)
+        return max(float(self.model.turned_by(named[block.channel], block.width, spin)) for block in sequence.blocks)
 
     def behind(
         self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN, off: State | None = None
@@ -304,7 +312,7 @@ class BlockSearch:
             for channel in self.channels
             for every in self.commands.every
         ]
-        most = max((one.max() for _, _, one in short if one.size), default=0.0)
+        most = max((shares.max() for _, _, shares in short if shares.size), default=0.0)
         within = SURELY
         while True:
             trials = (
@@ -312,10 +320,10 @@ class BlockSearch:
                 for channel, every, lacks in short
                 for trial in self._chosen(start.state, channel, every, np.argwhere(lacks <= within))
             )
-            found = sorted(self.behind(start, trials), key=lambda one: one.rank)
-            enough = SURELY * max(found[0].rank[0], 1.0) if found else math.inf
+            sequences = sorted(self.behind(start, trials), key=lambda sequence: sequence.rank)
+            enough = SURELY * max(sequences[0].rank[0], 1.0) if sequences else math.inf
             if enough <= within or within >= most or work.exhausted():
-                return found
+                return sequences
             within = min(enough, 10.0 * within, most)
 
     def _short_by(self, state: State, channel: Channel, every: int) -> Array:
@@ -373,7 +381,7 @@ class BlockSearch:
     def _parts(self, start: Found) -> Iterator[Found]:
         """First blocks that go a part of the way to the target."""
         heading, way = self.model.course(start.state)
-        every = next((one for one in self.commands.every if self._spaced(one)), None)
+        every = next((interval for interval in self.commands.every if self._spaced(interval)), None)
         if self.body.goal.axis is None or every is None:
             return
         for channel in self.channels:
@@ -392,7 +400,7 @@ class BlockSearch:
     @cached_property
     def small(self) -> bool:
         """Whether there are so few blocks that all are looked at."""
-        widths = sum(len(commandable_widths(self.commands, one)) for one in self.channels)
+        widths = sum(len(commandable_widths(self.commands, channel)) for channel in self.channels)
         return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
 
     @property
@@ -418,8 +426,8 @@ class BlockSearch:
 
     def _all_firsts(self, start: Found) -> list[Found]:
         """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
-        found = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
-        return sorted(found, key=lambda one: one.rank[1])[:ALL_FIRSTS]
+        sequences = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
+        return sorted(sequences, key=lambda sequence: sequence.rank[1])[:ALL_FIRSTS]
 
     def _waits(self, state: State, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
@@ -436,10 +444,10 @@ class BlockSearch:
     def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
         """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
-        found = np.zeros(shape, dtype=bool)
+        dark = np.zeros(shape, dtype=bool)
         if not len(self.dark[0]):
-            return found
-        work.spend(LOOKED * found.size * len(self.dark[0]))
+            return dark
+        work.spend(LOOKED * dark.size * len(self.dark[0]))
         turn = self.model.turn
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
@@ -448,8 +456,8 @@ class BlockSearch:
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
-            found |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
-        return found
+            dark |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
+        return dark
 
     def _at_delays(
         self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
@@ -482,18 +490,18 @@ class BlockSearch:
 def of_each_kind(ranked: Iterable[Found]) -> list[Found]:
     """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
     kinds: dict[tuple[tuple[str, int], ...], Found] = {}
-    for one in ranked:
-        kinds.setdefault(tuple((block.channel, block.every) for block in one.blocks), one)
+    for sequence in ranked:
+        kinds.setdefault(tuple((block.channel, block.every) for block in sequence.blocks), sequence)
     return list(kinds.values())
 
 
-def _promising(found: Iterable[Found], most: int) -> list[Found]:
+def _promising(sequences: Iterable[Found], most: int) -> list[Found]:
     """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
-    ranked, front = sorted(found, key=lambda one: one.rank), list[Found]()
-    for one in ranked:
-        if not front or one.rank[1] < front[-1].rank[1]:
-            front.append(one)
-    return list({one.blocks: one for one in (*ranked[:most], *front[:most])}.values())
+    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[Found]()
+    for sequence in ranked:
+        if not front or sequence.rank[1] < front[-1].rank[1]:
+            front.append(sequence)
+    return list({sequence.blocks: sequence for sequence in (*ranked[:most], *front[:most])}.values())
 
 
 FLOWN_PULSES = 1000
@@ -530,7 +538,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if spun and spacecraft.goal.axis is not None:
         raise Infeasible("sets the spin or turns H, not both; optimal does")
     able = at_hand(spacecraft, usable(spacecraft, axial=spun))
-    channels = [one for one in able if commandable_widths(commands, one).size]
+    channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = Search(spacecraft, channels, commands)
@@ -539,13 +547,13 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
     for round_ in range(ROUNDS + 1):
-        for number, found in enumerate(best if round_ == 0 else search.nearer(flights)):
-            met = any(one.rank[:2] == (False, 0.0) for one in flights)
-            pulses = sum(len(one.made) for one in flights)
+        for number, sequence in enumerate(best if round_ == 0 else search.nearer(flights)):
+            met = any(flight.rank[:2] == (False, 0.0) for flight in flights)
+            pulses = sum(len(flight.made) for flight in flights)
             if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or (met and number >= FLOWN * (round_ == 0)):
                 break
             try:
-                flights.append(search.flown(found))
+                flights.append(search.flown(sequence))
             except Infeasible as reason:
                 why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
     search.doubted(flights)
@@ -561,35 +569,39 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
 
 def _cheapest(flights: Sequence[Flown]) -> Flown:
     """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
-    best = min(flights, key=lambda one: one.rank)
+    best = min(flights, key=lambda flight: flight.rank)
     broken, missed, cost, _ = best.rank
-    equal = [one for one in flights if one.rank[:2] == (broken, missed) and one.rank[2] <= cost * (1.0 + SAME_COST)]
-    return min(equal, key=lambda one: (len(one.made), one.made.end, one.rank))
+    equal = [
+        flight
+        for flight in flights
+        if flight.rank[:2] == (broken, missed) and flight.rank[2] <= cost * (1.0 + SAME_COST)
+    ]
+    return min(equal, key=lambda flight: (len(flight.made), flight.made.end, flight.rank))
 
 
 class Search(BlockSearch):
     """The same, flown."""
 
-    def flown(self, found: Found) -> Flown:
+    def flown(self, sequence: Found) -> Flown:
         """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
-        made = fired(self.body, found.blocks)
-        left = left_by(propagation.flown(self.body, made))
+        schedule = fired(self.body, sequence.blocks)
+        left = left_by(propagation.flown(self.body, schedule))
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
-        rank = not keeps_limits(self.body, made), missed, made.cost, made.end
-        return Flown(rank, made, found)
+        rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
+        return Flown(rank, schedule, sequence)
 
     def doubted(self, flights: list[Flown]) -> None:
         """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
-        best = min((one.rank for one in flights if not one.rank[0]), default=None)
+        best = min((flight.rank for flight in flights if not flight.rank[0]), default=None)
         most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
-        known = {one.found.blocks for one in flights}
-        cheaper = (one for one in self.doubtful if one.rank[1] < most and one.blocks not in known)
-        for found in islice(cheaper, DOUBTS if self.small else FLOWN):
+        known = {flight.found.blocks for flight in flights}
+        cheaper = (sequence for sequence in self.doubtful if sequence.rank[1] < most and sequence.blocks not in known)
+        for sequence in islice(cheaper, DOUBTS if self.small else FLOWN):
             if work.exhausted():
                 return
             with suppress(Infeasible):
-                flights.append(self.flown(found))
+                flights.append(self.flown(sequence))
                 if flights[-1].rank[:2] == (False, 0.0):
                     return
 
@@ -598,30 +610,34 @@ class Search(BlockSearch):
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
-        named, found = {one.name: one for one in self.channels}, list[Found]()
-        made = {one.found.blocks: one for one in sorted(flights, key=lambda one: one.rank)}
-        best = of_each_kind([one.found for one in made.values()])
-        for one in (made[each.blocks] for each in best[:CORRECTED]):
-            *earlier, last = one.found.blocks
+        named, sequences = {channel.name: channel for channel in self.channels}, list[Found]()
+        by_blocks = {flight.found.blocks: flight for flight in sorted(flights, key=lambda flight: flight.rank)}
+        best = of_each_kind([flight.found for flight in by_blocks.values()])
+        for flight in (by_blocks[each.blocks] for each in best[:CORRECTED]):
+            *earlier, last = flight.found.blocks
             state, number, channel = self.model.start, 1, named[last.channel]
             for block in earlier:
                 trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
                 state = self.model.after(state, named[block.channel], trial)
                 number = block.first + (block.count - 1) * block.every + 1
             before = Found(tuple(earlier), state, (math.inf, math.inf, math.inf))
-            off = self.model.apart(one.found.state, propagation.flown(self.body, one.made))
+            off = self.model.apart(flight.found.state, propagation.flown(self.body, flight.made))
             trials = iter([(channel, self._around(before, channel, last, number))])
-            found += self.behind(before, trials, off=off)
-        known = {one.found.blocks for one in flights}
-        ranked = {one.blocks: one for one in sorted(found, key=lambda one: one.rank) if one.blocks not in known}
+            sequences += self.behind(before, trials, off=off)
+        known = {flight.found.blocks for flight in flights}
+        ranked = {
+            sequence.blocks: sequence
+            for sequence in sorted(sequences, key=lambda sequence: sequence.rank)
+            if sequence.blocks not in known
+        }
         chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
-        return [self._in_form(one) for one in {one.blocks: one for one in chosen}.values()]
+        return [self._in_form(sequence) for sequence in {sequence.blocks: sequence for sequence in chosen}.values()]
 
-    def _in_form(self, found: Found) -> Found:
+    def _in_form(self, sequence: Found) -> Found:
         """The same, ranked by the closed form alone."""
-        left = self.model.left(found.state)
+        left = self.model.left(sequence.state)
         share = max(float(self.share(bound, left)) for bound in self.bounds)
-        return found._replace(rank=(share if share > 1.0 else 0.0, *found.rank[1:]), share=share)
+        return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
 
     def _around(self, before: Found, channel: Channel, last: Block, number: int) -> Trial:
         """Blocks about as long and as late as the ``last`` one, from the Sun pulse of that ``number`` on."""
@@ -649,8 +665,8 @@ class Search(BlockSearch):
 
     def note(self, chosen: Flown, *, first: bool) -> str:
         """What was looked at, and how far flight and closed form are apart; ``first``: it is the best in that form."""
-        made, form = chosen.made, self.model.left(chosen.found.state)
+        schedule, form = chosen.made, self.model.left(chosen.found.state)
         compared = (
-            f"none of the {self.looked:,} sequences compared" if len(made.blocks) > 1 else "no other single block"
+            f"none of the {self.looked:,} sequences compared" if len(schedule.blocks) > 1 else "no other single block"
         )
-        return searched(compared, form, left_by(propagation.flown(self.body, made)), first=first)
+        return searched(compared, form, left_by(propagation.flown(self.body, schedule)), first=first)

@@ -83,11 +83,11 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
     """
     best: tuple[float, Schedule] | None = None
     broken: Schedule | None = None
-    for made, left in tried:
-        if not keeps_limits(spacecraft, made.pulses):
-            broken = broken or made
+    for schedule, left in tried:
+        if not keeps_limits(spacecraft, schedule.pulses):
+            broken = broken or schedule
         elif best is None or left < CLEARLY * best[0]:
-            best = left, made
+            best = left, schedule
             if left <= EXACT:
                 break
     return None if best is None else best[1], broken
@@ -125,7 +125,7 @@ def _across(axis: Vector, vector: Vector) -> Vector:
 
 def correct(
     spacecraft: Spacecraft,
-    made: Schedule,
+    schedule: Schedule,
     *,
     chosen: Sequence[int],
     momentum: bool,
@@ -133,35 +133,35 @@ def correct(
     equal: bool = False,
     resizable: bool = True,
 ) -> Schedule:
-    """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
+    """``schedule`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses, those
     as large as the last one, the sizes stay as they are, or all change alike where they are ``resizable`` and commands
     have no ticks. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
     taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
     """
-    if not made.pulses:
-        return made
-    chosen = sorted({index % len(made) for index in chosen})
-    kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
-    moving = [made.pulses[index] for index in chosen]
-    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(made, pulse))) for pulse in moving]
-    ends = np.cumsum([len(one.start) for one in pulses])
-    together = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
-    common = [_Common(spacecraft, made)] if together else []
+    if not schedule.pulses:
+        return schedule
+    chosen = sorted({index % len(schedule) for index in chosen})
+    kept = tuple(pulse for index, pulse in enumerate(schedule) if index not in chosen)
+    moving = [schedule.pulses[index] for index in chosen]
+    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(schedule, pulse))) for pulse in moving]
+    ends = np.cumsum([len(part.start) for part in pulses])
+    together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
+    common = [_Common(spacecraft, schedule)] if together else []
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)
         factor = float(parts[-1][0]) if common else 1.0
         others = common[0].resized(kept, factor) if common else kept
         moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
-        return Schedule(supplied(spacecraft, (*others, *moved)), made.notes, made.bounds)
+        return Schedule(supplied(spacecraft, (*others, *moved)), schedule.notes, schedule.bounds)
 
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
-    def left(made: Schedule) -> Vector:
+    def left(schedule: Schedule) -> Vector:
         nonlocal steps
-        flown = propagation.flown(spacecraft, made, dynamics=dynamics)
+        flown = propagation.flown(spacecraft, schedule, dynamics=dynamics)
         steps += flown.steps
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
@@ -169,9 +169,9 @@ def correct(
     freedom = _stacked(*pulses, *common)
     x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
-    corrected = Schedule(rounded, made.notes, made.bounds)
-    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
-    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
+    corrected = Schedule(rounded, schedule.notes, schedule.bounds)
+    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
+    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else schedule
 
 
 MOST_CORRECTED = 1_000
@@ -195,37 +195,40 @@ class Correction:
         """Whether the pulses are planned to be equal."""
         return self.options.equal
 
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:
-        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        if self.options.uncorrected or not made.pulses or len(made) > MOST_CORRECTED or work.exhausted():
-            return made
+    def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        if self.options.uncorrected or not schedule.pulses or len(schedule) > MOST_CORRECTED or work.exhausted():
+            return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable
         last = free if not (whole and self.options.equal) else AFTER if given else MOVED
-        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
+        chosen = tuple(range(-min(len(schedule), last), 0)) if self.momentum else (-1,)
         if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
-            damping = [index for index, pulse in enumerate(made) if not alike(made, pulse)]
+            damping = [index for index, pulse in enumerate(schedule) if not alike(schedule, pulse)]
             chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and whole:  # and the pulse that gives most to the spin
-            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+            chosen = (
+                *chosen,
+                max(range(len(schedule)), key=lambda number: abs(float(schedule.pulses[number].impulse[2]))),
+            )
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
-        return correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
+        return correct(spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
 
 
 def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
     """Start, scale, lower and upper bound of all that is free."""
     start, scale, lower, upper = (
-        np.concatenate([getattr(one, name) for one in parts]) for name in ("start", "scale", "lower", "upper")
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "scale", "lower", "upper")
     )
     return start, scale, lower, upper
 
 
-def alike(made: Schedule, pulse: Pulse) -> bool:
+def alike(schedule: Schedule, pulse: Pulse) -> bool:
     """Whether a pulse is as large as the last one of a schedule."""
-    last = made.pulses[-1]
-    one, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
-    return abs(one - other) <= ALIKE * other
+    last = schedule.pulses[-1]
+    size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
+    return abs(size - other) <= ALIKE * other
 
 
 class _Movable:
@@ -267,14 +270,14 @@ class _Common:
 
     start = scale = np.ones(1)
 
-    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
-        self.spacecraft, self.made, last = spacecraft, made, made.pulses[-1]
-        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if alike(made, pulse)]) / _size(last)
+    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
+        self.spacecraft, self.made, last = spacecraft, schedule, schedule.pulses[-1]
+        bounds = np.array([_bounds(spacecraft, pulse) for pulse in schedule if alike(schedule, pulse)]) / _size(last)
         self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """The ``pulses`` about their centres, those alike ``factor`` times as large."""
-        return [self._resized(one, factor) if alike(self.made, one) else one for one in pulses]
+        return [self._resized(pulse, factor) if alike(self.made, pulse) else pulse for pulse in pulses]
 
     def _resized(self, pulse: Pulse, factor: float) -> Pulse:
         moved = _Movable(self.spacecraft, pulse, sized=False)
@@ -453,8 +456,8 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
         omega0=settled.rates,
         attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
         disturbances=tuple(
-            replace(one, transverse=one.transverse * cmath.exp(1j * one.rate * since))
-            for one in spacecraft.disturbances
+            replace(disturbance, transverse=disturbance.transverse * cmath.exp(1j * disturbance.rate * since))
+            for disturbance in spacecraft.disturbances
         ),
         limits=replace(
             limits,
@@ -498,17 +501,17 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
         if number > 0 and earliest > IN_REACH * here.horizon:
             break
         try:
-            made = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+            damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
         except Infeasible as why:
             reason = why
             continue
         builder = start.fork()
         try:
-            builder.fire(made, bounded=True)
+            builder.fire(damping, bounded=True)
         except Infeasible as why:
             reason = why
             break
-        cost = made.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        cost = damping.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps

@@ -90,15 +90,15 @@ def _shares(channels: list[Channel], target: complex) -> list[tuple[Channel, flo
     """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else the nearest."""
     best: list[tuple[Channel, float]] = []
     least = math.inf
-    for one, two in itertools.combinations(channels, 2):
-        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (one, two))
+    for left, right in itertools.combinations(channels, 2):
+        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (left, right))
         area = (d1.conjugate() * d2).imag
         if abs(area) < 1e-9:
             continue
         first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
         if min(first, second) >= -1e-12 * abs(target) and first + second < least:
             least = first + second
-            best = [(one, first), (two, second)]
+            best = [(left, first), (right, second)]
     if not best:
         along = {
             channel.name: (target * channel.transverse.conjugate()).real / abs(channel.transverse)

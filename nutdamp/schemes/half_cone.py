@@ -77,15 +77,15 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     failed = 0
     for cones in _counts(_fewest(here), _most(here)):
         try:
-            made = _row(builder.fork(), cones)
+            row = _row(builder.fork(), cones)
         except Infeasible as why:
             reason, failed = why, failed + 1
             if best is not None or failed > PATIENCE or work.exhausted():
                 break
             continue
-        if best is not None and made.cost > (1.0 - WORTH_A_CONE) * best.cost:
+        if best is not None and row.cost > (1.0 - WORTH_A_CONE) * best.cost:
             break
-        best = made
+        best = row
         if work.exhausted():
             break
     if best is None:
@@ -111,7 +111,8 @@ def _reach(spacecraft: Spacecraft) -> float:
     if torquer is not None:
         return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
     return max(
-        (precession.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0
+        (precession.reach(abs(channel.transverse), spin, channel.max_on_time) for channel in usable(spacecraft)),
+        default=0.0,
     )
 
 
@@ -161,12 +162,12 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     builder.fire(pulse_pairs.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
     ideal = precession.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
-    made = builder.schedule()
+    schedule = builder.schedule()
     note = f"{cones} half cone{'s' if cones > 1 else ''}"
     if damped:
         note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
-    elif len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
-        note += f"; {made.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
+    elif len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
+        note += f"; {schedule.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
     return builder.schedule(note)
 
 

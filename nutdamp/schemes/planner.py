@@ -129,14 +129,16 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     if spacecraft.thrust_laws:
         from nutdamp.schemes import valve_commands
 
-        found = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
-        return [as_commands(name, spacecraft, made, chosen) for made in found]
+        schedules = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
+        return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
-    return [_corrected(scheme, model, made, chosen) for made in _loaded(scheme).alternatives(model.body, chosen)]
+    return [
+        _corrected(scheme, model, schedule, chosen) for schedule in _loaded(scheme).alternatives(model.body, chosen)
+    ]
 
 
-def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
-    """A schedule ``made`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None) -> Schedule:
+    """A schedule ``schedule`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
 
     Raises KeyError for a name not in `NAMES`.
     """
@@ -144,7 +146,7 @@ def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choi
 
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
-    return valve_commands.as_commands(spacecraft, made, correction.Correction(scheme, chosen))
+    return valve_commands.as_commands(spacecraft, schedule, correction.Correction(scheme, chosen))
 
 
 def _loaded(scheme: Scheme) -> ModuleType:
@@ -152,15 +154,17 @@ def _loaded(scheme: Scheme) -> ModuleType:
     return import_module(scheme.module)
 
 
-def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
+def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions) -> Schedule:
     """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
-    made = model.translate(made)
+    schedule = model.translate(schedule)
     if not model.exact:
-        made = made.without_proof
-    if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
-        made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
+        schedule = schedule.without_proof
+    if model.spacecraft.goal.axis is not None and not scheme.points and schedule.pulses:
+        schedule = replace(
+            schedule, notes=(*schedule.notes, f"does not point: the target is left to {', '.join(POINTING)}")
+        )
     if model.exact:
-        return made
+        return schedule
     from nutdamp.schemes import correction
 
-    return correction.Correction(scheme, options)(model.spacecraft, made)
+    return correction.Correction(scheme, options)(model.spacecraft, schedule)

@@ -199,14 +199,14 @@ class Train:
         free = self.here.limits.tick is None
         tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
         if free:
-            tried.sort(key=lambda one: float(left[one.pulses - 1]))
+            tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]))
         else:
-            tried.sort(key=lambda one: one.pulses * one.size)
+            tried.sort(key=lambda attempt: attempt.pulses * attempt.size)
         tried = tried[:TRIES]
-        for count in [one.pulses for one in tried[:2]]:
+        for count in [attempt.pulses for attempt in tried[:2]]:
             tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
         widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
-        possible = list({one[:2]: one for one in reversed(tried) if one.size <= widest}.values())[::-1]
+        possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
         if not possible:
             raise self._too_few(most + 1, len(left))
         return possible
@@ -238,8 +238,8 @@ class Train:
         sizes = {self.size(count, self._spare(count, left)) for count in closing}
         if self.here.limits.tick is not None:
             sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
-        possible = [one for one in sizes if self.shortest <= one <= self.widest and one > 0.0]
-        return sorted(possible, key=lambda one: abs(one - given))
+        possible = [size for size in sizes if self.shortest <= size <= self.widest and size > 0.0]
+        return sorted(possible, key=lambda size: abs(size - given))
 
     @property
     def widest(self) -> float:
@@ -261,7 +261,9 @@ class Train:
     def left_by(self, shots: list[Shot]) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
         start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
-        pushes = np.array([_in_body(self.here, self.ahead, t) if one is None else one.transverse for t, one in shots])
+        pushes = np.array(
+            [_in_body(self.here, self.ahead, t) if channel is None else channel.transverse for t, channel in shots]
+        )
         turned = a * spin * np.array([shot.t for shot in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
         counts = np.arange(1, len(shots) + 1)
@@ -269,13 +271,13 @@ class Train:
 
     def shots(self) -> list[Shot]:
         """Moments of right phase, one pulse after the other as the limits allow them."""
-        found: list[Shot] = []
+        shots: list[Shot] = []
         ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
         firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
         for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
-            if start is None or len(found) == MOST_PULSES:
+            if start is None or len(shots) == MOST_PULSES:
                 break
             centre = start + 0.5 * on_time
             if firsts:
@@ -293,11 +295,11 @@ class Train:
             if free is not None:
                 ready = max(free, ready + 0.25 * self.turn)
                 continue
-            found.append(shot)
+            shots.append(shot)
             ready = shot.t + 0.5 * on_time + gap
             if not firsts:
                 ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
-        return found
+        return shots
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
@@ -330,7 +332,7 @@ class Train:
         """The first firing of a channel as it passes the phase that the limits allow."""
         for _ in range(MOST_PULSES):
             moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
-            t, channel = min(moments, key=lambda one: one[0])
+            t, channel = min(moments, key=lambda passage: passage[0])
             start = windows.nearest_tick(t - 0.5 * on_time)
             free = windows.blocked_until(start, on_time)
             if start + on_time > windows.horizon + 1e-9:
@@ -387,11 +389,11 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
     """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
     if not channels:
         raise Infeasible("once the nutation is taken out no time is left for the turn")
-    chosen = [min(channels, key=lambda one: (one.price, -abs(one.transverse)))]
+    chosen = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
     while len(chosen) < count:
 
         def apart(channel: Channel) -> float:
-            return min(abs(cmath.phase(channel.transverse * one.transverse.conjugate())) for one in chosen)
+            return min(abs(cmath.phase(channel.transverse * other.transverse.conjugate())) for other in chosen)
 
         farthest = max(channels, key=apart)
         if apart(farthest) < 0.2:
@@ -472,12 +474,12 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
         digits = 3 - math.floor(math.log10(length))
         rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
         try:
-            made = _train(spacecraft, replace(options, on_time=rounded))
+            train = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
-        if float(np.linalg.norm(correction.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
+        if float(np.linalg.norm(correction.misses(spacecraft, train))) > max(10.0 * EXACT, exact):
             continue
-        return f"--on-time {rounded:.4g}s works, with {len(made)} pulses in all"
+        return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
     return "no other length was found that works"
 
 
@@ -492,10 +494,10 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         nothing = max(EXACT, train.rounding(attempt.size))
         if best is not None and best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
-        made, left = _flown(builder.fork(), train, attempt)
+        schedule, left = _flown(builder.fork(), train, attempt)
         left = max(left, nothing)
-        if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
-            best = left, made
+        if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(schedule, best[1], before)):
+            best = left, schedule
         cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
         # Of pulses of a given length the trains come in the order of their cost.
         if work.exhausted() or (left <= nothing and (cheap or train.options.on_time is not None)):
@@ -505,9 +507,9 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     return best[1]
 
 
-def _cheaper(made: Schedule, other: Schedule, before: float) -> bool:
+def _cheaper(schedule: Schedule, other: Schedule, before: float) -> bool:
     """Whether a train costs clearly less than another, ``before`` N m s that came before them apart."""
-    return made.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
+    return schedule.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:

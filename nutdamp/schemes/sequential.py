@@ -101,8 +101,8 @@ class ImpulseBuilder:
         since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
         omega, spin, turned = self.omega, self.spin, since
         if growth != 0.0:
-            found = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
-            omega, spin, turned = omega * found.transverse, spin * found.axial, found.turned
+            effect = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
+            omega, spin, turned = omega * effect.transverse, spin * effect.axial, effect.turned
         angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
         return omega * cmath.exp(-1j * angle), spin + drift * since
 
@@ -273,7 +273,7 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     """The limits that a schedule of its channels has to keep, by name: the horizon, and those that the file sets."""
     limits, channels = spacecraft.limits, spacecraft.channels
     there = {
-        "on-times": any(one.min_on_time > 0.0 or math.isfinite(one.max_on_time) for one in channels),
+        "on-times": any(channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels),
         "gap": limits.gap > 0.0,
         "ticks": limits.tick is not None,
         "blackout windows": bool(limits.blackout),
@@ -376,20 +376,20 @@ class SymmetricModel:
         """Whether the model moves as the spacecraft does, so that nothing has to be corrected."""
         return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
-    def translate(self, made: Schedule) -> Schedule:
+    def translate(self, schedule: Schedule) -> Schedule:
         """The schedule with the true actuators."""
         if self.spacecraft.inertia.symmetric:
-            return made
+            return schedule
         channels = {channel.name: channel for channel in self.spacecraft.channels}
         windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
-        for pulse in made:
+        for pulse in schedule:
             channel = channels.get(pulse.channel)
             if channel is None:
                 pulses.append(self._steered(pulse, windows, ready))
             else:
                 pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
             ready = pulses[-1].end + self.spacecraft.limits.gap
-        return Schedule(tuple(pulses), made.notes, made.bounds)
+        return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
     def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
         """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
@@ -446,7 +446,7 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
     given = spacecraft.attitude or Attitude(quaternion)
     in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
     held = replace(body, attitude=replace(given, quaternion=in_file_axes))
-    before, after = (one / float(np.linalg.norm(one)) for one in (spacecraft.momentum, held.momentum))
+    before, after = (momentum / float(np.linalg.norm(momentum)) for momentum in (spacecraft.momentum, held.momentum))
     # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
     middle = (before + after) / float(np.linalg.norm(before + after))
     axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
@@ -454,8 +454,8 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
 
 
 def _stretched(channel: Channel, stretch: Vector) -> Channel:
-    def thruster(one: Thruster) -> Thruster:
-        return replace(one, torque=one.torque * np.array([*stretch, 1.0]))
+    def thruster(thruster: Thruster) -> Thruster:
+        return replace(thruster, torque=thruster.torque * np.array([*stretch, 1.0]))
 
     return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters), spends=channel.strength)
 
@@ -476,10 +476,15 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
     left = tuple(
-        replace(one, transverse=0.0 + 0.0j) if settles(spacecraft, one) else one for one in spacecraft.disturbances
+        replace(disturbance, transverse=0.0 + 0.0j) if settles(spacecraft, disturbance) else disturbance
+        for disturbance in spacecraft.disturbances
     )
     omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
-    return replace(spacecraft, omega0=omega0, disturbances=tuple(one for one in left if one.axial or one.transverse))
+    return replace(
+        spacecraft,
+        omega0=omega0,
+        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
+    )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
@@ -493,10 +498,10 @@ def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     inertia = spacecraft.inertia
     return sum(
         (
-            response.steady_response(inertia.A, inertia.C, spacecraft.spin, one.transverse, one.rate)
-            * complex(math.cos(one.rate * time), math.sin(one.rate * time))
-            for one in spacecraft.disturbances
-            if one.transverse and settles(spacecraft, one)
+            response.steady_response(inertia.A, inertia.C, spacecraft.spin, disturbance.transverse, disturbance.rate)
+            * complex(math.cos(disturbance.rate * time), math.sin(disturbance.rate * time))
+            for disturbance in spacecraft.disturbances
+            if disturbance.transverse and settles(spacecraft, disturbance)
         ),
         0.0 + 0.0j,
     )

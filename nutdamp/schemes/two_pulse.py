@@ -57,10 +57,10 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
             return pulse_pairs.schedule(spacecraft)
         except Infeasible:
-            made = _wide(spacecraft)
-            if made is None:
+            damping = _wide(spacecraft)
+            if damping is None:
                 raise
-            return made
+            return damping
     return _damping(spacecraft, options)
 
 
@@ -73,10 +73,10 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
     if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
         return None
     try:
-        made = _damping(spacecraft, TwoPulseOptions())
+        schedule = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
-    return made if float(np.linalg.norm(correction.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+    return schedule if float(np.linalg.norm(correction.misses(spacecraft, schedule))) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
@@ -189,9 +189,9 @@ def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[S
     None either where there is no nutation: these damp, and nothing else.
     """
     if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
-        for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
-            if keeps_limits(spacecraft, made.pulses):
-                yield made
+        for schedule, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
+            if keeps_limits(spacecraft, schedule.pulses):
+                yield schedule
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
@@ -200,10 +200,10 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
     Where every one breaks a limit, the first of them: the judge says which.
     """
     best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
-    made = best or broken
-    if made is None:
+    schedule = best or broken
+    if schedule is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
-    return made
+    return schedule
 
 
 def _shortlist(
@@ -211,15 +211,15 @@ def _shortlist(
 ) -> Iterator[tuple[Schedule, float]]:
     """The most promising candidates, corrected, with the residual (rad) that each leaves when flown."""
     candidates = sorted(
-        (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
-        key=lambda found: (found.short, found.cost),
+        (candidate for a in channels for b in channels for candidate in _candidates(spacecraft, a, b, options.literal)),
+        key=lambda candidate: (candidate.short, candidate.cost),
     )
     if not candidates:
         return
     cheapest = candidates[0]
     short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
     near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
-    near.sort(key=lambda found: found.end)
+    near.sort(key=lambda candidate: candidate.end)
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
         yield _corrected(spacecraft, candidate, options.literal)
@@ -227,17 +227,17 @@ def _shortlist(
 
 def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    made = correction.fired(spacecraft, candidate.channels, candidate.timing)
+    schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
     if not literal:
-        made = correction.correct(spacecraft, made, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(correction.misses(spacecraft, made)))
-    return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
+        schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+    left = float(np.linalg.norm(correction.misses(spacecraft, schedule)))
+    return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tuple[str, ...]:
+def _remark(spacecraft: Spacecraft, candidate: Candidate, schedule: Schedule) -> tuple[str, ...]:
     inertia = spacecraft.inertia
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
-    first, second = made.pulses
+    first, second = schedule.pulses
     turns = (second.t - first.t) / halves.wait
     text = (
         f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half turns of the nutation "
@@ -345,9 +345,11 @@ def _place(
         )
         if delay == 0.0:
             pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-            made = Schedule(pulses)
+            schedule = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
+            return Candidate(
+                short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
+            )
         first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 
@@ -374,8 +376,8 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
     if spacecraft.growth == 0.0:
         return 1.0
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
-    found = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
-    return float(found.transverse)
+    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
+    return float(effect.transverse)
 
 
 def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:

@@ -136,10 +136,12 @@ class ChanceModel:
 
     def effects(self, kind: int) -> tuple[Complex, Complex]:
         """Of the channels, N m: what they do (K,), and by what inputs change it but for the rate, (K, d)."""
-        one = self.uncertain
+        inputs = self.uncertain
         if kind == 2:
-            return one.axial.astype(complex), one.axial_torque.astype(complex)
-        return one.effect, one.torque + (1j * self.pace[kind] * one.late - one.less) * one.effect[:, None]
+            return inputs.axial.astype(complex), inputs.axial_torque.astype(complex)
+        return inputs.effect, inputs.torque + (1j * self.pace[kind] * inputs.late - inputs.less) * inputs.effect[
+            :, None
+        ]
 
     def rates(self, kind: int) -> Vector:
         """By what inputs change the rate at which effects turn, (d,) rad/s."""
@@ -147,8 +149,8 @@ class ChanceModel:
 
     def start(self, kind: int) -> Complex:
         """By what inputs change what is left without any firing, (d,) N m s."""
-        one = self.uncertain
-        return one.spin.astype(complex) if kind == 2 else one.begin[kind] + one.less * self.goal[kind]
+        inputs = self.uncertain
+        return inputs.spin.astype(complex) if kind == 2 else inputs.begin[kind] + inputs.less * self.goal[kind]
 
     def plain(self, limit: Limit, u: complex) -> Tangent:
         """The tangent in a direction that knows of no dispersion."""
@@ -200,15 +202,15 @@ class ChanceModel:
         effects, changes = (part[channel] for part in self.effects(kind))
         fixed = rate = 0j
         own = np.zeros(self.count, dtype=complex)
-        for one, price in priced:
-            if one.limit.kind != kind:
+        for tangent, price in priced:
+            if tangent.limit.kind != kind:
                 continue
-            weight = price * np.conj(one.u)
-            fixed += weight * (effects + margin * changes @ one.shared)
-            rate += weight * margin * 1j * (self.rates(kind) @ one.shared) * effects
-            pulses = one.own[:, 0].astype(int)
+            weight = price * np.conj(tangent.u)
+            fixed += weight * (effects + margin * changes @ tangent.shared)
+            rate += weight * margin * 1j * (self.rates(kind) @ tangent.shared) * effects
+            pulses = tangent.own[:, 0].astype(int)
             mine = pulses // TURNS == channel
-            own[pulses[mine] % TURNS] += weight * margin * (one.own[mine, 1:] @ changes)
+            own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
         return Weights(complex(fixed), complex(rate), own)
 
 
@@ -254,7 +256,7 @@ class ChanceProgram:
     def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[Limit, ...], goal: Vector) -> None:
         self.program, self.limits = program, limits
         self.model = ChanceModel(program, uncertain, limits, goal)
-        self.scale = max(float(np.linalg.norm(goal)), max(one.most for one in limits))
+        self.scale = max(float(np.linalg.norm(goal)), max(limit.most for limit in limits))
         self.unit = self.scale / np.hypot(np.abs(uncertain.effect), uncertain.axial)
         self.cost = program.costs * self.unit
         self.dearest = float(self.cost.max())
@@ -265,37 +267,37 @@ class ChanceProgram:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
         tangents = [self.model.plain(limit, u) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
-        rights = np.array([self.model.right(one, margin) for one in tangents]) / self.scale
+        rights = np.array([self.model.right(tangent, margin) for tangent in tangents]) / self.scale
         master = highs.GrowingProgram(np.zeros(0), rights, np.zeros(0))
-        excess = np.array([[-one.limit.most / self.scale] for one in tangents])
+        excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
-        found, taken = None, columns
+        best, taken = None, columns
         for _ in range(ROUNDS):
             work.spend(SOLVED + COLUMN * len(columns.t))
             better = master.optimum()
             if better is None or work.exhausted():
                 break
-            found, taken = better, columns
-            on_times = self._on_times(columns, found.x[1:])
-            new = self._broken(columns, on_times, margin, float(found.x[0]))
-            for one in new:
-                row = np.concatenate([[-one.limit.most / self.scale], self._coefficients(one, columns, margin)])
-                master.limit(row, self.model.right(one, margin) / self.scale)
-            priced = self._priced(tangents, found.shadows, columns, margin)
+            best, taken = better, columns
+            on_times = self._on_times(columns, best.x[1:])
+            new = self._broken(columns, on_times, margin, float(best.x[0]))
+            for tangent in new:
+                row = np.concatenate([[-tangent.limit.most / self.scale], self._coefficients(tangent, columns, margin)])
+                master.limit(row, self.model.right(tangent, margin) / self.scale)
+            priced = self._priced(tangents, best.shadows, columns, margin)
             tangents += new
             if not len(priced.t) and not new:
                 break
             if len(priced.t):
                 self._add(master, tangents, priced, margin)
                 columns = columns.joined(priced)
-        if found is None:
+        if best is None:
             return Sure((), np.inf, np.zeros(5))
-        on_times = self._on_times(taken, found.x[1:])
+        on_times = self._on_times(taken, best.x[1:])
         used, left = on_times > 0.0, self.model.left(taken, on_times)
         return Sure(
             burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
-            float(found.x[0]),
+            float(best.x[0]),
             np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
         )
 
@@ -311,7 +313,7 @@ class ChanceProgram:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
-        left, found = self.model.left(columns, on_times), []
+        left, tangents = self.model.left(columns, on_times), []
         for limit in self.limits:
             spread = self.model.spread(limit.kind, columns, on_times)
 
@@ -326,8 +328,8 @@ class ChanceProgram:
                 u = complex(directions[index])
                 length = max(float(spread.within(directions[[index]])[0]), 1e-300)
                 own = np.column_stack([spread.pulses, (np.conj(u) * spread.own).real / length])
-                found.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
-        return found
+                tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
+        return tangents
 
     def _begin(self) -> Columns:
         """Columns to begin with: those that pull along the goal, or back."""
@@ -349,13 +351,13 @@ class ChanceProgram:
 
     def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: Columns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
-        rows = np.array([self._coefficients(one, new, margin) for one in tangents]).reshape(len(tangents), -1)
+        rows = np.array([self._coefficients(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
 
     def _priced(self, tangents: list[Tangent], shadows: Vector, taken: Columns, margin: float) -> Columns:
         """Slots that would lower the cost, the best; of channels that act at once the best moments too."""
         cost = self.cost / self.dearest
-        active = [(one, price) for one, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
+        active = [(tangent, price) for tangent, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
         worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
         worth[self.program.forbidden] = -np.inf
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf

@@ -140,14 +140,14 @@ class Task:
     def bounds(self, sequences: Sequences) -> tuple[Vector, Vector]:
         """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and ``off``."""
         count, n = sequences.which.shape
-        one, none = np.eye(n), np.zeros((n, n))
-        after = one - np.eye(n, k=-1)
+        identity, zero = np.eye(n), np.zeros((n, n))
+        after = identity - np.eye(n, k=-1)
         rows = [
             np.hstack([after, -np.eye(n, k=-1)])[1:],
-            np.hstack([one, none]),
-            np.hstack([-one, -one]),
-            np.hstack([none, one]),
-            np.hstack([none, -one]),
+            np.hstack([identity, zero]),
+            np.hstack([-identity, -identity]),
+            np.hstack([zero, identity]),
+            np.hstack([zero, -identity]),
         ]
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
@@ -383,13 +383,13 @@ def _newton(slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, p
     system[:, v:, v:] = -PROXIMAL * np.eye(m)
     right = np.concatenate([-uphill, -misses - PROXIMAL * prices], axis=1)
     try:
-        found = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+        step = np.linalg.solve(system, right[:, :, None])[:, :, 0]
     except np.linalg.LinAlgError:  # some are singular: those are lost, not all
-        found = np.full(right.shape, np.nan)
+        step = np.full(right.shape, np.nan)
         for row in range(count):
             with suppress(np.linalg.LinAlgError):
-                found[row] = np.linalg.solve(system[row], right[row])
-    return found[:, :v], found[:, v:]
+                step[row] = np.linalg.solve(system[row], right[row])
+    return step[:, :v], step[:, v:]
 
 
 def _to_bound(value: Vector, change: Vector, barrier: Vector) -> Vector:

@@ -74,15 +74,15 @@ class Burn:
 
 def burns(channels: Sequence[Channel], columns: Columns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
     """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
-    found: list[Burn] = []
+    result: list[Burn] = []
     for index in np.flatnonzero(np.bincount(columns.channel)).tolist():
         mine = np.flatnonzero(columns.channel == index)
         mine = mine[np.argsort(columns.t[mine], kind="stable")]
         cut = (np.diff(columns.t[mine]) > apart) | (np.diff(columns.burn[mine]) != 0)
         for group in np.split(mine, np.flatnonzero(cut) + 1):
             total = float(on_times[group].sum())
-            found.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
-    return tuple(sorted(found, key=lambda burn: burn.t))
+            result.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+    return tuple(sorted(result, key=lambda burn: burn.t))
 
 
 def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
@@ -220,37 +220,37 @@ class Program:
         generate = columns is None
         chosen = self._first() if columns is None else columns
         master = self._master(chosen, self._reach() if columns is None else None)
-        found = master.optimum()
-        if found is None:
+        optimum = master.optimum()
+        if optimum is None:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            unmet = self._unmet(found)
-            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(found.prices))):
+            unmet = self._unmet(optimum)
+            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
                 break
-            new = self._priced(found.prices, chosen, unmet)
+            new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
                 break
             self._add(master, new)
             better = master.optimum()
             if better is None:  # what would lower the cost is lost on the solver
                 break
-            chosen, found = chosen.joined(new), better
+            chosen, optimum = chosen.joined(new), better
         if generate:
             self._pool = chosen
-        free, amounts = np.split(found.x, [len(found.x) - len(chosen.t)])
+        free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             burns(self.channels, chosen.of(used), on_times, 1.01 * self.width),
             float(self.costs[chosen.channel[used]] @ on_times),
-            self._unmet(found),
+            self._unmet(optimum),
             self._off_by(free[2 * len(nothing) :]),
-            found.prices * self._dearest / self._scale,
+            optimum.prices * self._dearest / self._scale,
         )
 
-    def _unmet(self, found: highs.Optimum) -> float:
+    def _unmet(self, optimum: highs.Optimum) -> float:
         """What slacks have to supply, over all there is to do."""
-        return float(found.x[: 2 * len(self.influence.goal)].sum())
+        return float(optimum.x[: 2 * len(self.influence.goal)].sum())
 
     def _master(self, columns: Columns, reach: Vector | None) -> highs.GrowingProgram:
         """The program of these columns, in units of all there is to do, after slacks and the ring.
@@ -400,8 +400,8 @@ class Program:
         if len(slot) > most:
             best = np.argpartition(weak[channel, slot], -most)[-most:]
             channel, slot = channel[best], slot[best]
-        found = self._slots(channel, slot)
-        return found.joined(self._peaks(gains, duals)) if self.strong.any() else found
+        columns = self._slots(channel, slot)
+        return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 
     def _peaks(self, gains: Vector, duals: Vector) -> Columns:
         """Moments within slots at which a strong channel is worth most."""
