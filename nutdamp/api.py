@@ -237,7 +237,7 @@ class Verified:
 class Budget:
     """What it takes to hold the nutation against energy dissipation; ``core`` holds a row for each two thresholds."""
 
-    core: limit_cycle.Budget
+    core: limit_cycle.HoldingBudget
 
     def to_dict(self) -> dict[str, Any]:
         """What ``budget --json`` gives."""

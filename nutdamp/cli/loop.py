@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.control_loop.evaluation import LoopPlan
-    from nutdamp.control_loop.limit_cycle import Budget
+    from nutdamp.control_loop.limit_cycle import HoldingBudget
 
 
 @click.command("loop")
@@ -153,7 +153,7 @@ def budget_command(
     leave(infeasible=not found.feasible, missed=found.meets_requirement is False)
 
 
-def _budget_picture(found: Budget) -> Figure:
+def _budget_picture(found: HoldingBudget) -> Figure:
     from nutdamp.figures.budget import budget_figure
 
     return budget_figure(found)

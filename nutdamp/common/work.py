@@ -27,13 +27,13 @@ FRONTS = 30_000.0
 
 
 @dataclass(eq=False)
-class Budget:
+class WorkBudget:
     """Budget of ``most`` units for the task ``what``, of which ``done`` are spent."""
 
     what: str
     most: float
     done: float = 0.0
-    around: Budget | None = None
+    around: WorkBudget | None = None
 
     @property
     def exhausted(self) -> bool:
@@ -49,18 +49,18 @@ class Budget:
 class BudgetMonitor:
     """Handle by which another thread sees the budget being spent."""
 
-    budget: Budget | None = None
+    budget: WorkBudget | None = None
 
 
-_budget: ContextVar[Budget | None] = ContextVar("budget", default=None)
+_budget: ContextVar[WorkBudget | None] = ContextVar("budget", default=None)
 _watch: ContextVar[BudgetMonitor | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
-def budget(what: str, most: float) -> Iterator[Budget]:
+def budget(what: str, most: float) -> Iterator[WorkBudget]:
     """Open a budget of ``most`` units, but no more than is left of the enclosing one."""
     around, watch = _budget.get(), _watch.get()
-    inner = Budget(what, most if around is None else min(most, max(around.most - around.done, 0.0)), around=around)
+    inner = WorkBudget(what, most if around is None else min(most, max(around.most - around.done, 0.0)), around=around)
     token = _budget.set(inner)
     if watch is not None:
         watch.budget = inner

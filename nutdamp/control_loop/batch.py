@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.control_loop.controller import SAMPLED, Course, Pilot, Scatter, Seen, Watch
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Noise, felt, stepped
 from nutdamp.control_loop.simulation import Alone, largest_since
 from nutdamp.errors import Infeasible
@@ -48,7 +48,7 @@ class Case(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
+class FlownLoops:
     """End of the loops of ``cases``: firings and judgements of the ``pilots``, and the motion at the end.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) from the body axes of t = 0. ``quiet`` (n,) rad is the nutation as a
@@ -100,7 +100,9 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
     return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
 
 
-def fly_together(law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None) -> Flown:
+def fly_together(
+    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
+) -> FlownLoops:
     """Loops of ``cases``, flown to ``until`` s; ``watch`` is called with the number of finished ones.
 
     Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
@@ -108,7 +110,9 @@ def fly_together(law: Law, cases: Sequence[Case], until: float, watch: Callable[
     return _Fleet(law, cases, until).fly(watch)
 
 
-def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None) -> Flown:
+def fly_alone(
+    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
+) -> FlownLoops:
     """`fly_together`, each loop by itself, for any disturbance and sensor."""
     count = len(cases)
     rates, quaternion = np.empty((3, count)), np.empty((4, count))
@@ -130,7 +134,7 @@ def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[in
             seen = (aspect for aspect in end_state.aspects(run.flight, run.until) if aspect.keep in law.spacecraft.keep)
             aspects[:, :, row] = [(aspect.least, aspect.largest) for aspect in seen]
         watch(row + 1)
-    return Flown(cases, pilots, rates, quaternion, quiet, largest, aspects)
+    return FlownLoops(cases, pilots, rates, quaternion, quiet, largest, aspects)
 
 
 class _Fleet:
@@ -160,7 +164,7 @@ class _Fleet:
         self.settled = np.full(len(cases), math.inf)
         self.quiet, self.largest = np.full(len(cases), math.nan), np.full(len(cases), -math.inf)
 
-    def fly(self, watch: Callable[[int], None]) -> Flown:
+    def fly(self, watch: Callable[[int], None]) -> FlownLoops:
         """Fly all loops to their ends."""
         groups, over = [self._begun(np.arange(len(self.pilots)))], 0
         while groups:
@@ -181,7 +185,7 @@ class _Fleet:
         unsettled = np.isinf(self.settled)
         self.largest[unsettled] = self._nutation(rows)[unsettled]
         ends = self.rates, self.quaternion, self.quiet, self.largest
-        return Flown(self.cases, self.pilots, *ends, self.watch.angles)
+        return FlownLoops(self.cases, self.pilots, *ends, self.watch.angles)
 
     def _begun(self, rows: Rows) -> _Group:
         """Coasts of cases that begin now."""
@@ -218,7 +222,7 @@ class _Fleet:
         try:
             return pilot.step(lane, seen)
         except Infeasible:
-            pilot.ending = Stop.FULL, ""
+            pilot.ending = Ending.FULL, ""
             return Course.OVER
 
     def _look(self, group: _Group) -> Iterator[Seen | None]:
@@ -282,7 +286,7 @@ class _Fleet:
 
     def _advance(self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
-        here = batch.Stretch(self.bodies.some(rows), *motion, torque, slope)
+        here = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
         if self.law.spacecraft.keep:
             self.watch.some(rows).motion(here, lasts)
         batch.advance(here, lasts)

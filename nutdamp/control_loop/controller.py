@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Firing, Glimpse, Law, Stop
+from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.propagation import Dynamics, Path, shed
@@ -301,7 +301,7 @@ class Pilot:
         self.fired: list[Fired] = []
         self.quiet: list[float] = []
         self.active, self.looked_at = False, 0
-        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
+        self.ready, self.ending = truth.limits.earliest, (Ending.END, "")
         self._found: Decided | None = None
         self._pending: tuple[Pulse, Firing, Glimpse] | None = None
         self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
@@ -330,7 +330,7 @@ class Pilot:
     @property
     def lost(self) -> bool:
         """True if the loop fails whatever it leaves: stopped, or fires and was never down to stop."""
-        return self.ending[0] is not Stop.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
+        return self.ending[0] is not Ending.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
 
     def _pulse(self, decision: Decided) -> Pulse | None:
         """True response of the channel to its command; None where not allowed, or not before the end."""
@@ -345,13 +345,13 @@ class Pilot:
         if pulse.over > self.until:
             return None
         if len(self.fired) == self.most:
-            self.ending = Stop.FULL, ""
+            self.ending = Ending.FULL, ""
             if self.most == MOST_FIRINGS:
                 raise Infeasible(f"more than {MOST_FIRINGS} firings by {pulse.start:.6g} s; an earlier end helps")
             return None
         pulse = self.supply.fire(pulse, channel)
         if self.supply.shortage is not None:
-            self.ending = Stop.EMPTY, ""
+            self.ending = Ending.EMPTY, ""
         sense = -factor if channel.name in self.loop.reversed else factor
         return pulse if sense == 1.0 else weakened(pulse, sense)
 

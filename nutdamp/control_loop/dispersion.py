@@ -17,22 +17,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.batch import Case, Flown, expects_alone, fly_alone, fly_together
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.batch import Case, FlownLoops, expects_alone, fly_alone, fly_together
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.simulation import until_default
 from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.montecarlo.cases import Model, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple
 from nutdamp.montecarlo.closed_form import carried
 from nutdamp.montecarlo.inputs import (
     BLOCK,
     BY_VALVE,
     SCHEDULE_IDLE,
+    DispersedInput,
     Draws,
+    DrawSource,
     Group,
-    Input,
     Inputs,
-    Source,
     independent,
     list_inputs,
     of_sensor,
@@ -88,15 +88,15 @@ class LoopModel:
 
     law: Law
     inputs: Inputs = field(init=False)
-    of_firings: tuple[Input, ...] = field(init=False)
-    _body: Model = field(init=False)
+    of_firings: tuple[DispersedInput, ...] = field(init=False)
+    _body: DispersedModel = field(init=False)
 
     def __post_init__(self) -> None:
         body = self.law.spacecraft
         fired = Schedule(
             tuple(channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0) for actuator in self.law.actuators)
         )
-        object.__setattr__(self, "_body", Model(body, fired))
+        object.__setattr__(self, "_body", DispersedModel(body, fired))
         drawn, unused = list_inputs(body, fired)
         sensor, idle = of_sensor(body)
         kept = [entry for entry in drawn if entry.tolerance not in OF_FIRINGS]
@@ -299,7 +299,7 @@ FEW = 100
 """Least number of settled cases for sensitivities."""
 
 
-CollectLoops = Callable[[int, Array, list[Stop], Array], None]
+CollectLoops = Callable[[int, Array, list[Ending], Array], None]
 """Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
 least and largest angle (m, 2, n) rad to the direction of each cone."""
 
@@ -333,9 +333,9 @@ class LoopStudy:
         """Nutation that the loop is designed to leave."""
         return dead_band(self.spacecraft, self.law.loop)
 
-    def source(self) -> Source:
+    def source(self) -> DrawSource:
         """Source of the draws."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case, by input."""
@@ -367,7 +367,7 @@ class LoopStudy:
         return self._nominal_flown.aspects[:, :, 0]
 
     @cached_property
-    def _nominal_flown(self) -> Flown:
+    def _nominal_flown(self) -> FlownLoops:
         return self.fly(self.nominal_case)
 
     @property
@@ -394,11 +394,11 @@ class LoopStudy:
         seconds = samples * (time.perf_counter() - begin)
         return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
 
-    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> Flown:
+    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
         """Fly the loops of ``cases``."""
         return (fly_alone if self.alone else fly_together)(self.law, cases, self.until, watch)
 
-    def measured(self, flown: Flown) -> tuple[Array, Array]:
+    def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
         """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
         moments = np.array([case.truth.inertia.moments for case in cases]).T
@@ -453,7 +453,7 @@ class LoopResults(Counted):
     done: int = 0
     redrawn: int = 0
     met: int = 0
-    stops: Counter[Stop] = field(default_factory=Counter)
+    stops: Counter[Ending] = field(default_factory=Counter)
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     values: Array = field(init=False)
     angles: Array = field(init=False)
@@ -500,7 +500,7 @@ class LoopResults(Counted):
         """Cases that fall quiet with no more nutation than the dead band of the file."""
         return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
 
-    def take(self, values: Array, severity: Array, angles: Array, stops: list[Stop]) -> None:
+    def take(self, values: Array, severity: Array, angles: Array, stops: list[Ending]) -> None:
         """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
         first, last = self.done, self.done + values.shape[1]
         self.values[:, first:last], self.angles[:, :, first:last] = values, angles

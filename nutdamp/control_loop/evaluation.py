@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from nutdamp.control_loop.simulation import SEED, Run, fly, largest_since
+from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
 from nutdamp.flight.propagation import Dynamics, Flight, Path, Push
-from nutdamp.flight.verification import Equations
+from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -34,7 +34,7 @@ EVALUATIONS = 1_000_000
 class _Solved:
     """A stretch that was integrated, by its interpolant."""
 
-    equations: Equations
+    equations: EulerEquations
     solution: Any
     steps: int
 
@@ -47,7 +47,7 @@ class _Solved:
 class _Independent(Dynamics):
     """Moves a body by DOP853 on Euler's equations with the full tensor; evaluations of these are counted, not steps."""
 
-    equations: Equations = field(kw_only=True)
+    equations: EulerEquations = field(kw_only=True)
 
     @property
     def free(self) -> bool:
@@ -78,8 +78,8 @@ class _Independent(Dynamics):
 class LoopVerification:
     """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
 
-    run: Run
-    other: Run | None
+    run: LoopRun
+    other: LoopRun | None
     missing: str = ""
     evaluations: int = 0
     pairs: tuple[tuple[float, float, float], ...] = field(default=())
@@ -107,7 +107,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     loop = spacecraft.loop
     assert loop is not None
     run = fly(spacecraft, loop, until, seed=seed)
-    equations, inertia = Equations(spacecraft, EVALUATIONS), spacecraft.inertia
+    equations, inertia = EulerEquations(spacecraft, EVALUATIONS), spacecraft.inertia
     mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
     try:
         other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
@@ -136,11 +136,11 @@ class LoopPlan(Plan):
     With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
     """
 
-    run: Run | None = None
+    run: LoopRun | None = None
     known: Spacecraft | None = None
 
     @property
-    def flown_run(self) -> Run:
+    def flown_run(self) -> LoopRun:
         """Run of the loop."""
         assert self.run is not None
         return self.run

@@ -200,7 +200,7 @@ ALIKE = 1e-9
 """Share of the samples below which their information on the bias is rounding."""
 
 
-class Stop(Enum):
+class Ending(Enum):
     """Reason for the end of the flight of a loop."""
 
     END = "the end of the time"
@@ -216,7 +216,7 @@ class Stop(Enum):
     @property
     def fault(self) -> bool:
         """True if the loop was stopped before it could feed the nutation, or has nothing left to fire."""
-        return self not in (Stop.END, Stop.FULL)
+        return self not in (Ending.END, Ending.FULL)
 
 
 class Doubt(NamedTuple):
@@ -267,7 +267,7 @@ class Glimpse:
         return cls(z, count, total.conjugate() / power, rest, information, abs(float(times.mean()) - centre))
 
 
-class Change(NamedTuple):
+class RateChange(NamedTuple):
     """Values z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
 
     ``bound``: by how much it may be off beside that, in every firing alike.
@@ -279,7 +279,7 @@ class Change(NamedTuple):
     bound: float
 
     @classmethod
-    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> Change:
+    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> RateChange:
         """Change between two coasts of the same bias, which is estimated too where its limits are wider.
 
         What of it stays open counts by how unlike the coasts are.
@@ -303,7 +303,7 @@ class Effect:
     noise: float = 0.0
     bound: float = 0.0
 
-    def add(self, change: Change, expected: complex, phase: float) -> None:
+    def add(self, change: RateChange, expected: complex, phase: float) -> None:
         """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a ``phase`` (rad).
 
         Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies between |z + e| of
@@ -357,13 +357,13 @@ class Diagnosis:
 
     def judge(
         self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
-    ) -> tuple[Stop, str] | None:
+    ) -> tuple[Ending, str] | None:
         """Reason to stop after a firing of ``channel`` expected to add ``expected``, and the channel to name; else
         None.
 
         Another may be fired from ``now`` s on.
         """
-        change, effect = Change.of(before, after, doubt), self.effects.setdefault(channel, Effect())
+        change, effect = RateChange.of(before, after, doubt), self.effects.setdefault(channel, Effect())
         size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
         falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
         half = math.pi * doubt.turn  # by which z may have turned from the middle of a period to its ends
@@ -375,8 +375,8 @@ class Diagnosis:
         return cause or self._fed(channel, now, change, doubt)
 
     def _cause(
-        self, channel: str, now: float, change: Change, expected: complex, doubt: Doubt
-    ) -> tuple[Stop, str] | None:
+        self, channel: str, now: float, change: RateChange, expected: complex, doubt: Doubt
+    ) -> tuple[Ending, str] | None:
         """Fault shown by the effects of firings, with the channel to name; None where there is none or not yet."""
         effect = self.effects[channel]
         if self.suspect is None and effect.backwards():
@@ -384,21 +384,21 @@ class Diagnosis:
         if self.suspect is not None:
             others = [effect for name, effect in self.effects.items() if name != self.suspect]
             if any(other.backwards(WHICH) for other in others):
-                return Stop.SENSOR, channel
-            return (Stop.CHANNEL, self.suspect) if any(other.works(WHICH) for other in others) else None
+                return Ending.SENSOR, channel
+            return (Ending.CHANNEL, self.suspect) if any(other.works(WHICH) for other in others) else None
         if effect.open() >= WORKS:
             return None
         if abs(effect.factor) < WORKS:
-            return Stop.IDLE, channel
+            return Ending.IDLE, channel
         size = abs(change.before)
         lowers = size - abs(size - abs(expected)) > 0.5 * abs(expected)  # by a firing that comes at its moment
         grown = abs(change.after) - size
         seen_wrong = SIGMAS * doubt.noise + doubt.steps + doubt.bias  # the law fired at what it saw, not at what was
         if lowers and grown > SIGMAS * change.sigma + change.bound + 2.0 * seen_wrong + 1e-9 * size:
-            return Stop.FEEDS, channel
+            return Ending.FEEDS, channel
         return None
 
-    def _fed(self, channel: str, now: float, change: Change, doubt: Doubt) -> tuple[Stop, str] | None:
+    def _fed(self, channel: str, now: float, change: RateChange, doubt: Doubt) -> tuple[Ending, str] | None:
         """True if the nutation has grown under fire by more than observation errors explain."""
         if self.first is None:
             self.first = abs(change.before), now
@@ -408,15 +408,15 @@ class Diagnosis:
         size, since = self.first
         most = (1.0 + FED) * size * math.exp(min(self.growth * (now - since), LARGE))
         most += SIGMAS * (change.sigma + doubt.noise) + 2.0 * (doubt.steps + doubt.bias)
-        return (Stop.FED, channel) if abs(change.after) > most else None
+        return (Ending.FED, channel) if abs(change.after) > most else None
 
     def rest(self) -> None:
         """Reset at rest: the growth of the nutation counts from here."""
         self.first = None
 
-    def overdue(self, now: float) -> tuple[Stop, str] | None:
+    def overdue(self, now: float) -> tuple[Ending, str] | None:
         """True if no other channel has fired in time to tell which of the two is faulty."""
-        return None if self.suspect is None or now <= self.deadline else (Stop.UNCLEAR, self.suspect)
+        return None if self.suspect is None or now <= self.deadline else (Ending.UNCLEAR, self.suspect)
 
 
 def known_to(spacecraft: Spacecraft) -> tuple[float, float]:

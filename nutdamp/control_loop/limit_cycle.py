@@ -663,7 +663,7 @@ class Thresholds(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldNutation:
     """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
 
     It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
@@ -698,7 +698,7 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class Budget:
+class HoldingBudget:
     """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``.
 
     ``largest``: θ_max, rad, of which `until_largest` tells when it is reached; None where none is named.
@@ -706,7 +706,7 @@ class Budget:
 
     spacecraft: Spacecraft
     largest: float | None
-    held: tuple[Held, ...]
+    held: tuple[HeldNutation, ...]
 
     @property
     def until_largest(self) -> float | None:
@@ -741,7 +741,7 @@ def budget(
     *,
     seed: int = 1,
     progress: Callable[[int], None] = lambda _: None,
-) -> Budget:
+) -> HoldingBudget:
     """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
 
     ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
@@ -753,18 +753,18 @@ def budget(
         largest = required.nutation
     loop = spacecraft.loop
     if loop is None or spacecraft.growth <= 0.0:
-        return Budget(spacecraft, largest, ())
+        return HoldingBudget(spacecraft, largest, ())
     held = []
     for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
         held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
-    return Budget(spacecraft, largest, tuple(held))
+    return HoldingBudget(spacecraft, largest, tuple(held))
 
 
-def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
+def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     body = replace(spacecraft, loop=loop)
     pair = Thresholds(loop.start, loop.stop)
-    result = Held(body, pair, requirements.reached(body, loop.start))
+    result = HeldNutation(body, pair, requirements.reached(body, loop.start))
     try:
         result = replace(result, band=dead_band(body, loop))
         _expect_damping(body, loop)

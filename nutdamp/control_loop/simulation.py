@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Pilot, Scatter
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.flight.propagation import Dynamics, Flight, Leg, Path, make_dynamics
@@ -37,7 +37,7 @@ ROWS = 2000
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class LoopRun:
     """Loop flown to ``until`` s: its firings, the reason of its end, and the channel to blame.
 
     ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
@@ -50,7 +50,7 @@ class Run:
     until: float
     key: tuple[int, ...]
     fired: tuple[Fired, ...]
-    stop: Stop
+    stop: Ending
     channel: str | None
     quiet: tuple[float, ...]
     lost: bool
@@ -102,7 +102,7 @@ def fly(
     law: Law | None = None,
     scatter: Scatter | None = None,
     dynamics: Dynamics | None = None,
-) -> Run:
+) -> LoopRun:
     """Fly the loop of a ``spacecraft`` to ``until`` s; ``dynamics`` flies it by another integrator.
 
     ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and ``scatter`` what
@@ -113,7 +113,7 @@ def fly(
     return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
 
 
-def largest_since(run: Run) -> tuple[float, float]:
+def largest_since(run: LoopRun) -> tuple[float, float]:
     """Largest nutation since a loop first settled, rad, and its time, s; at the end where it never did."""
     flight = run.flight
     if run.settled is None:
@@ -150,7 +150,7 @@ class Alone:
         pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
         return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
 
-    def fly(self) -> Run:
+    def fly(self) -> LoopRun:
         """Coast and fire until the end, or until something is wrong."""
         pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
         coast = self._coast(state, now)
@@ -186,14 +186,14 @@ class Alone:
         done = len(self.pilot.fired) - firing
         self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
 
-    def _run(self, settled: SpinState) -> Run:
+    def _run(self, settled: SpinState) -> LoopRun:
         """Run that ends its firings with the motion ``settled``."""
         pilot = self.pilot
         schedule = Schedule(tuple(firing.pulse for firing in pilot.fired))
         spans = tuple(pulse.thrust for pulse in schedule)
         moments = self.dynamics.moments
         flight = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
-        return Run(
+        return LoopRun(
             pilot.truth,
             pilot.loop,
             pilot.until,

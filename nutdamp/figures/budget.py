@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, Budget, Held
+from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.figures import style
 from nutdamp.figures.legends import heading, legend
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
@@ -32,7 +32,7 @@ ROWS = 600
 
 
 @style.styled
-def budget_figure(found: Budget) -> Figure:
+def budget_figure(found: HoldingBudget) -> Figure:
     """Nutation without and with firings; below, pulses a day and propellant a year."""
     held = [one for one in found.held if one.cycle is not None]
     figure = style.sheet(7.4, 3.4 + (1.1 + 0.22 * len(held)) * bool(held))
@@ -59,11 +59,11 @@ def budget_figure(found: Budget) -> Figure:
     return figure
 
 
-def _named(one: Held) -> str:
+def _named(one: HeldNutation) -> str:
     return f"{math.degrees(one.thresholds.start):.3g} to {math.degrees(one.thresholds.stop):.3g} deg"
 
 
-def _courses(axes: Axes, found: Budget, held: list[Held]) -> None:
+def _courses(axes: Axes, found: HoldingBudget, held: list[HeldNutation]) -> None:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
     body = found.spacecraft
     size = max([PERIODS / _pace(one) + _begins(one) for one in held], default=0.0)
@@ -93,18 +93,18 @@ def _courses(axes: Axes, found: Budget, held: list[Held]) -> None:
     axes.grid()
 
 
-def _begins(one: Held) -> float:
+def _begins(one: HeldNutation) -> float:
     """When it first fires, s; with no nutation that could grow at once."""
     return one.begins if math.isfinite(one.begins) else 0.0
 
 
-def _pace(one: Held) -> float:
+def _pace(one: HeldNutation) -> float:
     """Cycles, or pulses of a loop that never pauses, 1/s."""
     assert one.cycle is not None
     return one.cycle.cycles or one.cycle.pulses
 
 
-def _sawtooth(growth: float, one: Held, size: float) -> tuple[np.ndarray, np.ndarray]:
+def _sawtooth(growth: float, one: HeldNutation, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Times (s) and nutation (deg) of a limit cycle, by its means, from when it first fires."""
     assert one.cycle is not None
     period, low, high = 1.0 / _pace(one), math.degrees(one.cycle.low), math.degrees(one.cycle.high)

@@ -22,7 +22,7 @@ from nutdamp.common import work
 from nutdamp.common.results import Tabled
 from nutdamp.flight.track import PIECE, Track, even_times, in_file_axes, make_track, widest
 from nutdamp.physics import attitude, energy_sink, response, taylor
-from nutdamp.physics.taylor import Falling, Forcing, Piece
+from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -83,7 +83,7 @@ class Arc:
 class Integrated:
     """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[TaylorPiece, ...]
 
     @property
     def steps(self) -> int:

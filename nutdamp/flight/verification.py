@@ -31,7 +31,7 @@ Push = tuple[Vector, Vector | None]
 """Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
 
 
-class Equations:
+class EulerEquations:
     """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
 
     A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
@@ -141,7 +141,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
 
     Raises Infeasible where that takes more than `EVALUATIONS`.
     """
-    equations = Equations(spacecraft)
+    equations = EulerEquations(spacecraft)
     state = equations.state(spacecraft.initial)
     edges = {0.0, float(times[-1]), *times.tolist()}
     edges |= {edge for pulse in schedule for edge in pulse.edges}

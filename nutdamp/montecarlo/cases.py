@@ -269,7 +269,7 @@ class _Fired(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class DispersedModel:
     """Spacecraft and schedule, ready to be dispersed."""
 
     spacecraft: Spacecraft
@@ -526,7 +526,7 @@ def _not_before(start: Cases) -> Cases:
 Tilt = tuple[Any, Any]
 
 
-def watch_of(model: Model, cases: DispersedCases) -> AxisWatch:
+def watch_of(model: DispersedModel, cases: DispersedCases) -> AxisWatch:
     """Observer of the angles from the spin axis to the directions of the cones, in each of the ``cases``."""
     return watch_over(model.spacecraft, cases.tilt, number_of(cases))
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre
-from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, plus, rotated, times
+from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, plus, rotated, times
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.energy_sink import TINY
@@ -63,7 +63,7 @@ class ClosedForm:
     Dissipation acts as the estimate has it, whatever the moments of a case are.
     """
 
-    model: Model
+    model: DispersedModel
 
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``, whose pulses all come in the order of the first of them."""
@@ -153,7 +153,7 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
 
 def _slipped(
     turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
-) -> tuple[energy_sink.Course, tuple[Cases, ...]]:
+) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
     """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
     x, y, z = momentum
     across = x * x + y * y

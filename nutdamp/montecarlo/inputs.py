@@ -1,7 +1,7 @@
 """Dispersed inputs of a study: selection, correlation, random draws.
 
-The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `Input`; a
-tolerance without effect becomes an `Unused` with its reason.
+The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `DispersedInput`;
+a tolerance without effect becomes an `Unused` with its reason.
 
 Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
 correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
@@ -42,7 +42,7 @@ KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force
 SCHEDULE_IDLE = "the schedule does not fire"
 
 
-class Input(NamedTuple):
+class DispersedInput(NamedTuple):
     """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
 
     ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
@@ -72,13 +72,13 @@ class Unused(NamedTuple):
 class Inputs(NamedTuple):
     """Inputs of a study in a fixed order, and unused tolerances."""
 
-    drawn: tuple[Input, ...]
+    drawn: tuple[DispersedInput, ...]
     unused: tuple[Unused, ...]
 
 
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
     """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
-    drawn: list[Input] = []
+    drawn: list[DispersedInput] = []
     unused: list[Unused] = []
     for entry in _entries(spacecraft, schedule):
         if isinstance(entry, Unused):
@@ -138,13 +138,13 @@ def of_sensor(spacecraft: Spacecraft) -> Inputs:
     return Inputs(tuple(drawn), tuple(unused))
 
 
-def _no_size(entry: Input) -> str:
+def _no_size(entry: DispersedInput) -> str:
     if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
         return "given in % of a value that is zero"
     return "its size is zero"
 
 
-def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unused]:
+def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedInput | Unused]:
     requested = spacecraft.dispersions
     if requested is None:
         return
@@ -178,7 +178,7 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
         for number in pulses:
-            yield Input(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
+            yield DispersedInput(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
     if requested.attitude is not None:
         for axis in "xy":
             yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
@@ -187,10 +187,10 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
             yield Unused(key.replace("_", " "), "a schedule is fired whatever a sensor shows: --loop flies the loop")
 
 
-def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:
+def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> DispersedInput:
     """Input of a tolerance: relative sizes become absolute; a factor (nominal one) stays."""
     size = tolerance.size * (nominal if tolerance.relative else 1.0)
-    return Input(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
+    return DispersedInput(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
 
 
 def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
@@ -205,11 +205,11 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
     return members
 
 
-def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[Input | Unused]:
-    yield Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
+def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[DispersedInput | Unused]:
+    yield DispersedInput(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
 
 
-def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     if thruster is None:
         yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
     elif thruster.force is None or thruster.position is None:
@@ -219,7 +219,7 @@ def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> It
             yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
 
 
-def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     if thruster is None:
         yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
     elif thruster.force is None:
@@ -229,7 +229,7 @@ def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Ite
             yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
 
 
-def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
+def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[DispersedInput | Unused]:
     """Tolerances of cold nozzles and of the tank; ``fires``: some thruster fires."""
     cold, tank = spacecraft.cold, spacecraft.tank
     first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
@@ -251,12 +251,12 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterat
             yield _input(name, key, tolerance, nominal, unit)
 
 
-def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     """A tolerance of a valve, or of a table in its place."""
     called, valve = f"{key} {name}", None if thruster is None else thruster.valve
     delay = getattr(valve, key, None)
     if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
-        yield Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
+        yield DispersedInput(called, key, tolerance.kind, tolerance.size, 1.0, "")
     elif key == "impulse_bit" or delay is None:
         yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
     else:
@@ -265,12 +265,12 @@ def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None)
 
 def _of_pulses(
     key: str, names: Iterable[str], tolerance: Tolerance, nominal: float, unit: str
-) -> Iterator[Input | Unused]:
+) -> Iterator[DispersedInput | Unused]:
     named = list(names)
     if not named:
         yield Unused(key.replace("_", " "), "the schedule has no pulses")
     for name in named:
-        yield Input(name, key, tolerance.kind, tolerance.size, nominal, unit)
+        yield DispersedInput(name, key, tolerance.kind, tolerance.size, nominal, unit)
 
 
 Array = NDArray[np.float64]
@@ -341,7 +341,7 @@ def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
     return groups
 
 
-def value_of(entry: Input, normal: Array) -> Array:
+def value_of(entry: DispersedInput, normal: Array) -> Array:
     """Deviation of a standard ``normal`` number, at the same level of its distribution."""
     if entry.kind == "normal":
         return entry.size * normal
@@ -352,7 +352,7 @@ def value_of(entry: Input, normal: Array) -> Array:
     return np.asarray(entry.size * np.sign(normal) * (1.0 - np.sqrt(2.0 * ndtr(-np.abs(normal)))))
 
 
-def normal_of(entry: Input, value: Array) -> Array:
+def normal_of(entry: DispersedInput, value: Array) -> Array:
     """Inverse of `value_of`."""
     if entry.kind == "normal":
         return value / entry.size
@@ -363,7 +363,7 @@ def normal_of(entry: Input, value: Array) -> Array:
     return np.asarray(-np.sign(share) * ndtri(np.maximum(below, np.finfo(float).tiny)))
 
 
-def mixing(inputs: Sequence[Input], groups: Iterable[Group]) -> Array:
+def mixing(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> Array:
     """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; the unit matrix where none is correlated.
 
     In a group, column k is what input k adds to those before it.
@@ -383,7 +383,9 @@ def mixing(inputs: Sequence[Input], groups: Iterable[Group]) -> Array:
     return mixed
 
 
-def independent(draws: Mapping[str, Array], inputs: Iterable[Input], groups: Iterable[Group]) -> dict[str, Array]:
+def independent(
+    draws: Mapping[str, Array], inputs: Iterable[DispersedInput], groups: Iterable[Group]
+) -> dict[str, Array]:
     """Draws with those of a group replaced by the independent normals behind them."""
     named, normals_of = {entry.name: entry for entry in inputs}, dict(draws)
     for group in groups:
@@ -395,7 +397,7 @@ def independent(draws: Mapping[str, Array], inputs: Iterable[Input], groups: Ite
     return normals_of
 
 
-def together(inputs: Sequence[Input], groups: Iterable[Group]) -> list[list[int]]:
+def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[list[int]]:
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     rows_of = [[rows[name] for name in group.among(rows).names] for group in groups]
@@ -405,7 +407,7 @@ def together(inputs: Sequence[Input], groups: Iterable[Group]) -> list[list[int]
     )
 
 
-def _of_values(first: Input, second: Input, rho: float) -> float:
+def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> float:
     """Correlation of the values of two inputs whose normals have ``rho``, by Gauss-Hermite quadrature."""
     if first.name == second.name:
         return 1.0
@@ -436,7 +438,7 @@ MOST_ATTEMPTS = 1_000
 """Largest number of redraws of a case; beyond it the dispersions count as impossible."""
 
 
-class Source:
+class DrawSource:
     """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
 
     ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
@@ -445,7 +447,7 @@ class Source:
 
     def __init__(
         self,
-        inputs: Sequence[Input],
+        inputs: Sequence[DispersedInput],
         seed: int,
         physical: Callable[[Draws], NDArray[np.bool_] | bool],
         groups: Iterable[Group] = (),

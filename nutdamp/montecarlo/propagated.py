@@ -20,7 +20,7 @@ from nutdamp.flight.propagation import Dynamics, make_dynamics
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,
-    Model,
+    DispersedModel,
     Thrusting,
     Triple,
     in_body,
@@ -31,8 +31,8 @@ from nutdamp.montecarlo.cases import (
 )
 from nutdamp.montecarlo.closed_form import Ends, carried
 from nutdamp.physics import batch, sky
-from nutdamp.physics.batch import Bodies, Stretch
-from nutdamp.physics.sky import AxisWatch, Push, SunClock
+from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.schemes.block_model import fire, pushes
@@ -40,7 +40,7 @@ from nutdamp.schemes.block_model import fire, pushes
 Array = NDArray[np.float64]
 
 
-class Fired(NamedTuple):
+class FiredBlocks(NamedTuple):
     """Motion of cases at the end of their last pulse, and the fired pulses.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n); ``starts`` (k, n) s of the pulses; ``seen`` (k, n): whether they
@@ -56,14 +56,14 @@ class Fired(NamedTuple):
 
 
 def fly(
-    model: Model,
+    model: DispersedModel,
     bodies: Bodies,
     rates: Array,
     quaternion: Array,
     cases: DispersedCases,
     nominal: Sequence[bool],
     watch: AxisWatch | None = None,
-) -> Fired:
+) -> FiredBlocks:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
     ``nominal``: `seen_nominally`. A pulse that is due while the one before is on begins as that ends.
@@ -83,9 +83,9 @@ def fly(
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
 
-        start = Stretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
+        start = MotionStretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
         sense = math.copysign(1.0, body.spin)
-        clock = SunClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
+        clock = SunPulseClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
         sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
@@ -110,10 +110,10 @@ def fly(
                 for here, end in clock.passed:
                     watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
-    return Fired(rates, quaternion, starts, seen, over)
+    return FiredBlocks(rates, quaternion, starts, seen, over)
 
 
-def seen_nominally(model: Model) -> list[bool]:
+def seen_nominally(model: DispersedModel) -> list[bool]:
     """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
     sensor, blocks = model.spacecraft.sun_sensor, model.schedule.blocks
     if sensor is not None and sensor.sees_all:
@@ -124,7 +124,7 @@ def seen_nominally(model: Model) -> list[bool]:
         return [False]
 
 
-def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:
+def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
     """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
     torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
     opened = [
@@ -138,11 +138,11 @@ def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable
         for each, torque in zip(opened, torques, strict=True):
             first = first + torque * each.within(middle, begin)
             last = last + torque * each.within(middle, end)
-        pushes.append(Push(begin, end, first, last))
+        pushes.append(TorqueRamp(begin, end, first, last))
     return pushes
 
 
-def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:
+def sun_seen(model: DispersedModel, cases: DispersedCases, count: int) -> Array:
     """Direction to the Sun in the true body axes of t = 0, (3, n)."""
     assert model.spacecraft.sun is not None
     return in_body(model.spacecraft, cases.tilt, count, model.spacecraft.sun)
@@ -159,7 +159,7 @@ class RealWidths:
     Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
     """
 
-    model: Model
+    model: DispersedModel
 
     @cached_property
     def _dynamics(self) -> Dynamics:
@@ -202,7 +202,7 @@ class RealWidths:
         shed = _sheds(cases, count)
         last = moments if shed is None else moments - shed.sum(axis=0)
         if watch is not None:
-            watch.turn(batch.Stretch(self._bodies(last), over, settled, turned))
+            watch.turn(batch.MotionStretch(self._bodies(last), over, settled, turned))
         momentum = triple(last * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)

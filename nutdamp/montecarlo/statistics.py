@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, parts_of
+from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
 from nutdamp.montecarlo.closed_form import ClosedForm, Ends
-from nutdamp.montecarlo.inputs import Input, mixing
+from nutdamp.montecarlo.inputs import DispersedInput, mixing
 
 STEPS = 200
 """Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly."""
@@ -134,7 +134,7 @@ ROWS = 10
 """Rows of `vectors`."""
 
 
-def measure(model: Model, ends: Ends, out: Array) -> None:
+def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
     """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
     x, y, z = ends.momentum
     sense = math.copysign(1.0, model.spacecraft.spin)
@@ -145,7 +145,7 @@ def measure(model: Model, ends: Ends, out: Array) -> None:
     out[4] = np.nan if ends.propellant is None else ends.propellant
 
 
-def vectors(model: Model, ends: Ends, out: NDArray[Any]) -> None:
+def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
     """Write quantities that are linear for small dispersions into ``out`` (10, n); `VECTORS` names the rows.
 
     Nutation is the length of the transverse momentum over the axial one, the shift of H that of the change of its
@@ -327,7 +327,7 @@ class FirstOrder:
     correlation; None where they are independent.
     """
 
-    inputs: tuple[Input, ...]
+    inputs: tuple[DispersedInput, ...]
     jacobian: Array
     mixing: Array | None = None
 
@@ -369,7 +369,7 @@ ALIKE = 0.01
 """Relative difference up to which derivatives of the closed form may replace those of the flight."""
 
 
-def as_flown(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
     """Derivatives of the model that ``fly`` flies: those of the closed form, which have no rounding, where they agree.
 
     By output and input; else central differences.
@@ -385,7 +385,7 @@ def as_flown(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
     return FirstOrder(flown.inputs, jacobian, flown.mixing)
 
 
-def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
     """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun pulses."""
     inputs = model.inputs.drawn
     steps = np.array([SHARE * abs(entry.size) for entry in inputs])
@@ -400,7 +400,7 @@ def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> First
     return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
 
 
-def first_order(model: Model) -> FirstOrder:
+def first_order(model: DispersedModel) -> FirstOrder:
     """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
     inputs = model.inputs.drawn
     jacobian = np.zeros((ROWS, len(inputs)))
@@ -416,7 +416,7 @@ def first_order(model: Model) -> FirstOrder:
     return FirstOrder(inputs, jacobian, _mixing(model))
 
 
-def _mixing(model: Model) -> Array | None:
+def _mixing(model: DispersedModel) -> Array | None:
     return mixing(model.inputs.drawn, model.groups) if model.groups else None
 
 

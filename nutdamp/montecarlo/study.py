@@ -24,9 +24,9 @@ from nutdamp.errors import BadRequest
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight, shed
-from nutdamp.montecarlo.cases import Model, cones_used
+from nutdamp.montecarlo.cases import DispersedModel, cones_used
 from nutdamp.montecarlo.closed_form import Ends
-from nutdamp.montecarlo.inputs import BLOCK, Draws, Source, independent
+from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import (
     EXACT_CASES,
@@ -181,7 +181,7 @@ class Study:
     Cases count from 0 here; people see them count from 1.
     """
 
-    model: Model
+    model: DispersedModel
     seed: int = 1
 
     @cached_property
@@ -194,9 +194,9 @@ class Study:
         """Sensitivities of the flight."""
         return as_flown(self.model, self.flies)
 
-    def source(self) -> Source:
+    def source(self) -> DrawSource:
         """Draws for one thread."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
@@ -432,4 +432,4 @@ def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) ->
     """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
     if spacecraft.dispersions is None:
         raise BadRequest("the spacecraft has no dispersions")
-    return Study(Model(spacecraft, schedule), seed)
+    return Study(DispersedModel(spacecraft, schedule), seed)

@@ -241,7 +241,7 @@ def _edgewise(begins: Array, ends: Array) -> Array:
     return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
 
 
-class Stretch(NamedTuple):
+class MotionStretch(NamedTuple):
     """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
 
     ``rates`` (3, n) rad/s and ``quaternion`` (4, n) at ``since``; the torque changes by ``slope`` (3, n) N m/s or None.
@@ -254,13 +254,13 @@ class Stretch(NamedTuple):
     torque: Array | None = None
     slope: Array | None = None
 
-    def some(self, cases: Any) -> Stretch:
+    def some(self, cases: Any) -> MotionStretch:
         """Subset of ``cases`` (an index of arrays)."""
         torque, slope = (None if vector is None else vector[:, cases] for vector in self[4:])
         motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
-        return Stretch(self.bodies.some(cases), *motion, torque, slope)
+        return MotionStretch(self.bodies.some(cases), *motion, torque, slope)
 
-    def moved(self, times: Array) -> Stretch:
+    def moved(self, times: Array) -> MotionStretch:
         """Copy propagated to ``times`` (n,) s."""
         gone, torque = times - self.since, self.torque
         if torque is not None and self.slope is not None:
@@ -276,7 +276,7 @@ class Observer(Protocol):
     def some(self, cases: Any) -> Observer:
         """Observer of a subset of ``cases`` (an index of arrays)."""
 
-    def motion(self, here: Stretch, duration: Array) -> None:
+    def motion(self, here: MotionStretch, duration: Array) -> None:
         """Receive the motion that `advance` is about to make with the same arguments."""
 
 
@@ -338,7 +338,7 @@ def _fly_alike(
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
             torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
-        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
+        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
@@ -366,7 +366,7 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
-        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
+        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
         if bends is not None:
@@ -375,14 +375,14 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
         rates += kick / bodies.moments
 
 
-def _pass(here: Stretch, duration: Array, watch: Observer | None) -> None:
+def _pass(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
     """`advance`, with a call of ``watch`` before it."""
     if watch is not None:
         watch.motion(here, duration)
     advance(here, duration)
 
 
-def advance(here: Stretch, duration: Array) -> None:
+def advance(here: MotionStretch, duration: Array) -> None:
     """Propagate rates and quaternion by ``duration`` (n,) s, in place."""
     bodies, torque, slope = here.bodies, here.torque, here.slope
     if not duration.any():
@@ -446,7 +446,7 @@ def _slip(
     rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * effect.axial
 
 
-def _integrate(here: Stretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
+def _integrate(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
     """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
 
     With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start.
@@ -479,7 +479,7 @@ def _expect_short(span: float) -> None:
         )
 
 
-def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) -> None:
+def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Array) -> None:
     """`_integrate` for I1 = I2 without dissipation: many steps at once, see `taylor.steps`."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
@@ -500,7 +500,7 @@ def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) ->
     quaternion[:] = first.real, second.real, second.imag, first.imag
 
 
-def _step(here: Stretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
+def _step(here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
     """One step of ``step`` (n,) s, in place; halved where the series does not converge."""
     bodies, now, rates, quaternion = here[:4]
     series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Rate = TypeVar("Rate", float, Array)
 
 
-class Cones(NamedTuple):
+class ConeAngles(NamedTuple):
     """Cone angles at one instant, rad: ``nutation`` θ and ``body`` cone μ."""
 
     nutation: float
@@ -32,7 +32,7 @@ class Cones(NamedTuple):
         return self.nutation - self.body
 
 
-def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> Cones:
+def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> ConeAngles:
     """Instantaneous cones of any body: angles of H and of ω from the spin axis ``sense``·e3, up to π.
 
     ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
@@ -40,7 +40,7 @@ def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> Cones:
     w = np.asarray(rates, dtype=float)
     first, second, third = (np.asarray(moments, dtype=float) * w).tolist()
     across, along = math.hypot(w[0], w[1]), sense * float(w[2])
-    return Cones(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
+    return ConeAngles(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
 
 
 def nutation_angle(A: float, C: float, omega: Rate, spin: Rate) -> Rate:

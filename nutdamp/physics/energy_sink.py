@@ -47,7 +47,7 @@ SMALLEST = 1e-150
 """Least cosine of a nutation angle that is distinguished from zero: its square is still a number."""
 
 
-class Course(NamedTuple):
+class SinkEffect(NamedTuple):
     """Effect of the sink on an arc: factors and terms on the free arc of the same body.
 
     ``transverse`` and ``axial``: factors on |ω| and on ω3. ``turned``: s, the time in which the spin at the start turns
@@ -74,19 +74,19 @@ _OF_NUMBERS = _Functions(math.exp, math.expm1, math.sinh, math.asinh, math.sqrt)
 _OF_ARRAYS = _Functions(np.exp, np.expm1, np.sinh, np.arcsinh, np.sqrt)
 
 
-def course(growth: float, cosine: float, sine_squared: float, time: float) -> Course:
+def course(growth: float, cosine: float, sine_squared: float, time: float) -> SinkEffect:
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
     exponent = growth * time
     return _course(_OF_NUMBERS, cosine, sine_squared, time, exponent, max(-FOR_EVER, min(exponent, FOR_EVER)))
 
 
-def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> Course:
+def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> SinkEffect:
     """`course` for arrays that broadcast, real or complex (a complex step gives derivatives)."""
     exponent = growth * np.asarray(times)
     return _course(_OF_ARRAYS, cosine, sine_squared, times, exponent, np.clip(exponent, -FOR_EVER, FOR_EVER))
 
 
-def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> Course:
+def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> SinkEffect:
     """`course` by elementary functions ``of`` a kind of number; ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`."""
     growing, squared = of.exp(x), cosine * cosine
     size = of.sqrt(squared + sine_squared * growing * growing)
@@ -94,7 +94,7 @@ def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent:
     moving = time * ((x + TINY) / (exponent + TINY))
     stretched = moving * (of.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)  # asinh(c κ stretched)/(c κ)
     swing = cosine * 2.0 * of.sinh(x) / (1.0 + size) + TINY
-    return Course(
+    return SinkEffect(
         transverse=growing / size,
         axial=1.0 / size,
         turned=stretched * of.asinh(swing) / swing + (time - moving) / size,
@@ -104,7 +104,7 @@ def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent:
 
 
 def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: float) -> float:
-    """Time in s after which `Course.turned` is ``turned`` s: its inverse; infinite where it is never reached.
+    """Time in s after which `SinkEffect.turned` is ``turned`` s: its inverse; infinite where it is never reached.
 
     With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))); flat spin turns
     no further.
@@ -117,13 +117,13 @@ def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: floa
     return (z - math.log1p(-slowed)) / growth if growth != 0.0 else turned
 
 
-def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> Course:
+def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> SinkEffect:
     """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start, rad/s."""
     first, second, third = _direction(A, C, omega, spin)
     return course(growth, third, first * first + second * second, time)
 
 
-def slip(effect: Course, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
+def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
     """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
 
     ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aω3(turned - t) rad,

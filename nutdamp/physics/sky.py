@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.batch import Stretch
+from nutdamp.physics.batch import MotionStretch
 
 OBLIQUITY = math.radians(23.43928)
 """Obliquity of the ecliptic at J2000.0."""
@@ -95,7 +95,7 @@ class AxisWatch:
         rows = np.arange(self.least.shape[1])[self.rows][cases]
         return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
 
-    def motion(self, here: Stretch, duration: Array) -> None:
+    def motion(self, here: MotionStretch, duration: Array) -> None:
         """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
         bodies = here.bodies
         if here.torque is not None or not bodies.free:
@@ -105,7 +105,7 @@ class AxisWatch:
         else:
             self._slow(here, duration)
 
-    def turn(self, here: Stretch) -> None:
+    def turn(self, here: MotionStretch) -> None:
         """Record one turn of the axis about H in a motion free of pulses."""
         first, second, _ = here.bodies.moments
         self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
@@ -130,7 +130,7 @@ class AxisWatch:
             least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
-    def _slow(self, here: Stretch, duration: Array) -> None:
+    def _slow(self, here: MotionStretch, duration: Array) -> None:
         """Record arcs with dissipation, of which the first turn and the last are followed in steps.
 
         H stays and θ changes monotonically: between those turns so do |β - θ| and β + θ, unless θ passes β or π - β,
@@ -147,7 +147,7 @@ class AxisWatch:
             if cases.any():
                 self.some(cases)._steps(begins.some(cases), lasts[cases])
 
-    def _steps(self, here: Stretch, duration: Array) -> None:
+    def _steps(self, here: MotionStretch, duration: Array) -> None:
         """Record start and end of each step, and extremes between them."""
         first, second, _ = here.bodies.moments
         pace = _momentum(here) / np.minimum(first, second)
@@ -163,7 +163,7 @@ class AxisWatch:
                 if len(cases):
                     self._between(then.some(cases), step[cases], (rise[cases], fall[cases]), number, cases)
 
-    def _between(self, then: Stretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
+    def _between(self, then: MotionStretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
         """Record extremes within a step, by `SECANTS` from the ``rates`` (nearer, farther) at its ends."""
         begin, end, (rise, fall) = np.zeros_like(step), step, rates
         for _ in range(SECANTS):
@@ -173,7 +173,7 @@ class AxisWatch:
             begin, rise = np.where(before, way, begin), np.where(before, here, rise)
             end, fall = np.where(before, end, way), np.where(before, fall, here)
 
-    def _look(self, here: Stretch, cases: Any) -> list[Array]:
+    def _look(self, here: MotionStretch, cases: Any) -> list[Array]:
         """Record the angles at one instant; returns the rate at which the axis comes nearer, in cosines per s."""
         bodies, quaternion = here.bodies, here.quaternion
         axis, (first, second, _) = self._axis(quaternion), here.rates
@@ -196,7 +196,7 @@ class AxisWatch:
         return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
-def _momentum(here: Stretch) -> Array:
+def _momentum(here: MotionStretch) -> Array:
     """Size (n,) of H, N m s."""
     return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
 
@@ -224,7 +224,7 @@ AHEAD = 8
 """Largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next."""
 
 
-class Push(NamedTuple):
+class TorqueRamp(NamedTuple):
     """Torque that runs linearly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
 
     begin: Any
@@ -233,7 +233,7 @@ class Push(NamedTuple):
     last: Array
 
 
-class SunClock:
+class SunPulseClock:
     """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
@@ -242,7 +242,7 @@ class SunClock:
     thrust.
     """
 
-    def __init__(self, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
+    def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
         self.sun, self.sense, self.azimuth = sun, sense, azimuth
         self._stretches, self.over = [start], start.since
         ahead, _ = self._ahead(start, sun)
@@ -250,17 +250,22 @@ class SunClock:
         self.lost = np.zeros(len(start.since), dtype=bool)
 
     @property
-    def here(self) -> Stretch:
+    def here(self) -> MotionStretch:
         """Motion since the end of the last pulse."""
         return self._stretches[-1]
 
     @property
-    def passed(self) -> Iterator[tuple[Stretch, Array]]:
+    def passed(self) -> Iterator[tuple[MotionStretch, Array]]:
         """Stretches from the end of the last pulse but one to that of the last, each with its end."""
         return zip(self._stretches, (stretch.since for stretch in self._stretches[1:]), strict=False)
 
     def fire(
-        self, sun_pulse: Stretch, delay: Array, width: float, pushes: Sequence[Push], sheds: Array | None = None
+        self,
+        sun_pulse: MotionStretch,
+        delay: Array,
+        width: float,
+        pushes: Sequence[TorqueRamp],
+        sheds: Array | None = None,
     ) -> Array:
         """Fire a command of ``width`` s, ``delay`` (n,) s after the last Sun pulse, ``sun_pulse``.
 
@@ -291,7 +296,7 @@ class SunClock:
         self._stretches.append(begun._replace(bodies=begun.bodies.lighter(half)))
         return starts
 
-    def sun_pulse(self, number: int) -> Stretch:
+    def sun_pulse(self, number: int) -> MotionStretch:
         """Motion at the Sun pulse of this ``number``, if nothing is fired before; numbers must not decrease."""
         stretch = self.here
         while self._number < number:
@@ -307,7 +312,7 @@ class SunClock:
             self._number, self.time = self._number + step, stretch.since
         return stretch
 
-    def angle(self, here: Stretch) -> Array:
+    def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
         w, x, y, z = here.quaternion
         axis = self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
@@ -325,7 +330,7 @@ class SunClock:
         size = np.sqrt(np.sum((self.here.bodies.moments * self.here.rates) ** 2, axis=0))
         return np.asarray(np.abs(self.sense * size / A + (1.0 - C / A) * spin))
 
-    def _look_back(self, sun_pulse: Stretch, expected: Array, pace: Array) -> None:
+    def _look_back(self, sun_pulse: MotionStretch, expected: Array, pace: Array) -> None:
         """Recompute in place the Sun pulses that came before the end of the last pulse."""
         for stretch, over in zip(self._stretches[-2::-1], self._stretches[:0:-1], strict=True):
             cases = np.flatnonzero(sun_pulse.since < over.since)
@@ -336,7 +341,7 @@ class SunClock:
             for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
-    def _root(self, start: Stretch, pace: Array, sun: Array) -> Stretch:
+    def _root(self, start: MotionStretch, pace: Array, sun: Array) -> MotionStretch:
         """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by Newton's method."""
         here = start
         for _ in range(ITERATIONS):
@@ -347,12 +352,12 @@ class SunClock:
                 break
         return here
 
-    def _off(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
+    def _off(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """Angle (n,) in [-π, π) by which the body has to turn until the Sun passes the sensor, and its rate."""
         ahead, rate = self._ahead(here, sun)
         return (ahead + math.pi) % CIRCLE - math.pi, rate
 
-    def _ahead(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
+    def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
         """`_off` in [0, 2π)."""
         return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
 
@@ -361,7 +366,7 @@ def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: fl
     """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its rate, rad/s.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
-    rad and ``sense`` are those of a `SunClock`.
+    rad and ``sense`` are those of a `SunPulseClock`.
     """
     w, x, y, z = quaternion
     s1, s2, s3 = sun

@@ -285,7 +285,7 @@ NOTHING = Forcing()
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class TaylorPiece:
     """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration.
 
     ``rates`` (orders, 3) in rad/s, ``attitude`` (orders, 4).
@@ -320,7 +320,7 @@ def integrate(
     most: int = MOST_STEPS,
     slope: Array | None = None,
     falling: Falling | None = None,
-) -> list[Piece]:
+) -> list[TaylorPiece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
@@ -328,7 +328,7 @@ def integrate(
     ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
     # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
-    pieces: list[Piece] = []
+    pieces: list[TaylorPiece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     jerk = None if slope is None else slope / inertia
@@ -361,7 +361,7 @@ def integrate(
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
-        piece = Piece(now, step, scaled[:, :3], scaled[:, 3:])
+        piece = TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:])
         pieces.append(piece)
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
@@ -398,7 +398,7 @@ def _symmetric(
     end: float,
     forcing: Forcing,
     most: int,
-) -> list[Piece]:
+) -> list[TaylorPiece]:
     """`integrate` for I1 = I2 without dissipation: many steps at once, see `steps`."""
     A, _, C = moments
     drive = Drive(
@@ -418,7 +418,7 @@ def _symmetric(
     if not angle <= LONGEST:
         raise _too_long(start, end, angle)
     count = count_for(drive, omega, spin, duration)
-    pieces: list[Piece] = []
+    pieces: list[TaylorPiece] = []
     try:
         for series in steps(drive, omega, spin, np.array([start]), duration, count):
             pieces += _pieces(series, quaternion)
@@ -431,7 +431,7 @@ def _symmetric(
     return pieces
 
 
-def _pieces(series: Steps, quaternion: Array) -> list[Piece]:
+def _pieces(series: Steps, quaternion: Array) -> list[TaylorPiece]:
     """Steps of one body as pieces, from its ``quaternion`` (4,) at their start."""
     terms, count = len(series.omega), len(series.starts)
     rates = np.zeros((count, terms, 3))
@@ -444,7 +444,7 @@ def _pieces(series: Steps, quaternion: Array) -> list[Piece]:
     parts = np.stack([turn[:, 0].real, turn[:, 1].real, turn[:, 1].imag, turn[:, 0].imag], axis=-1)
     quaternions = attitude.multiply(quaternion, np.swapaxes(parts, 0, 1))
     starts, duration = series.starts[:, 0].tolist(), float(series.duration[0])
-    return [Piece(*parts) for parts in zip(starts, [duration] * count, rates, quaternions, strict=True)]
+    return [TaylorPiece(*parts) for parts in zip(starts, [duration] * count, rates, quaternions, strict=True)]
 
 
 def _series(

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import Cones, momentary
+from nutdamp.physics.body import ConeAngles, momentary
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
 
 
-def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
+def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> ConeAngles:
     """Cone angles at the instant of largest nutation angle of the motion through ``rates0``.
 
     The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed.
@@ -116,7 +116,7 @@ def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
     return _of_other_end(least) if reversed_ else largest
 
 
-def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]:
+def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[ConeAngles, ConeAngles]:
     """Cone angles at the least and at the largest nutation angle."""
     polhode = _polhode(moments, rates0)
     inertia, (a, b, c) = polhode.moments, polhode.axes
@@ -136,12 +136,12 @@ def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]
     return least, _of_other_end(least)
 
 
-def _of_other_end(cones: Cones) -> Cones:
+def _of_other_end(cones: ConeAngles) -> ConeAngles:
     """Cone angles of the same instant seen from the other end of axis 3."""
-    return Cones(math.pi - cones.nutation, math.pi - cones.body)
+    return ConeAngles(math.pi - cones.nutation, math.pi - cones.body)
 
 
-class _Polhode(NamedTuple):
+class _ScaledPolhode(NamedTuple):
     """Path of ω in the body; moments and rates scaled by powers of two against under- and overflow."""
 
     axes: tuple[int, int, int]  # a, b, c
@@ -155,7 +155,7 @@ class _Polhode(NamedTuple):
     balance: float  # Q
 
 
-def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _Polhode:
+def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
     inertia, rates = np.array(moments, dtype=float), np.array(rates0, dtype=float)
     inertia /= _unit(inertia)
     rate_unit = _unit(rates)
@@ -172,7 +172,7 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _Polhode:
         largest = math.sqrt(rates[c] ** 2 + inertia[b] * d_ba / (inertia[c] * d_ca) * rates[b] ** 2)
         pace = largest * math.sqrt(d_ca / inertia[a] * (d_cb / inertia[b]))
         complement = min(abs(balance) / (inertia[c] * d_cb * largest**2), 1.0)
-    return _Polhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
+    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
 
 
 def _unit(values: Array) -> float:
@@ -191,7 +191,7 @@ def _balance(inertia: Array, rates: Array, least: int, middle: int, most: int) -
     return float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
 
 
-def _rates(polhode: _Polhode, times: Array) -> Array:
+def _rates(polhode: _ScaledPolhode, times: Array) -> Array:
     """Scaled rates at scaled times: addition theorems, with the amplitudes written as dω/dt at t = 0.
 
     ω_a(t) = (ω_a cn + ω_a' sn dn/p)/N, ω_b(t) = (ω_b cn dn + ω_b' sn/p)/N, ω_c(t) = (ω_c dn + ω_c' sn cn/p)/N with
@@ -211,7 +211,7 @@ def _rates(polhode: _Polhode, times: Array) -> Array:
     return result
 
 
-def _swing(polhode: _Polhode, size: float, times: Array) -> Array:
+def _swing(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     """∫ |ω_c|/(|H| + I_c |ω_c|) dt from 0 to scaled ``times``."""
     if polhode.complement == 0.0:
         return _swing_on_separatrix(polhode, size, times)
@@ -230,7 +230,7 @@ def _swing(polhode: _Polhode, size: float, times: Array) -> Array:
     return np.asarray(total)
 
 
-def _swing_on_separatrix(polhode: _Polhode, size: float, times: Array) -> Array:
+def _swing_on_separatrix(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     """`_swing` without a period: ω_c = D sech u, so that the integrand is D/(|H|(cosh u + ε)), ε = I_c D/|H|.
 
     sqrt(1 - ε²) is I_a |ω_a|/|H| at ω_b = 0, free of cancellation.
@@ -310,7 +310,7 @@ def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
     )
 
 
-def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> Cones:
+def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> ConeAngles:
     """Cone angles at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
 
     Constant with I1 = I2; else θ swings between two values while H is fixed in space. The spin axis is ``sense``·e3.

@@ -20,18 +20,18 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.montecarlo.cases import Model
-from nutdamp.montecarlo.inputs import Input, mixing
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
 from nutdamp.montecarlo.study import CONFIDENCE, SAMPLES, SEED, Results, Study, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.catalogue import OptimalOptions, Options
-from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
+from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
 from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
-from nutdamp.schemes.optimal.refinement import Equations, refine, small_angles
+from nutdamp.schemes.optimal.refinement import EndEquations, refine, small_angles
 from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -70,7 +70,7 @@ class Tightening:
 
     tolerances: tuple[str, ...]
     factor: float
-    inputs: tuple[tuple[Input, bool], ...]
+    inputs: tuple[tuple[DispersedInput, bool], ...]
     cases: int
     seed: int
     complied: float
@@ -125,9 +125,9 @@ def _ranked(study: Study, given: Dispersions) -> list[str]:
     return [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
 
 
-def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[Input, bool], ...]:
+def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[DispersedInput, bool], ...]:
     """Input of each size of the named tolerances, with a flag for relative sizes."""
-    sizes: dict[tuple[str, str, float], tuple[Input, bool]] = {}
+    sizes: dict[tuple[str, str, float], tuple[DispersedInput, bool]] = {}
     for name in names:
         for entry in study.model.inputs.drawn:
             if entry.tolerance == name and entry.kind != "bias":
@@ -135,7 +135,7 @@ def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tup
     return tuple(sizes.values())
 
 
-def _relative(value: Any, entry: Input) -> bool:
+def _relative(value: Any, entry: DispersedInput) -> bool:
     """True if the size of an input is given as a share of its nominal value."""
     if isinstance(value, Tolerance):
         return value.relative
@@ -197,7 +197,7 @@ LARGEST = 60_000
 """Slots of all channels up to which a plan is looked for."""
 
 
-def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Input, ...]]:
+def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[DispersedInput, ...]]:
     """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s; the inputs.
 
     Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
@@ -206,7 +206,7 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Inpu
         channel_pulse(channel, 100.0 + 1e3 * at, on)
         for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))
     ]
-    model = Model(body, Schedule(tuple(pulses)))
+    model = DispersedModel(body, Schedule(tuple(pulses)))
     drawn = [entry for entry in model.inputs.drawn if entry.kind != "bias"]
     biases: dict[str, np.ndarray | float] = {
         entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex)
@@ -264,13 +264,13 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
     if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
     try:
-        search = _Search(spacecraft, body)
+        search = _MarginSearch(spacecraft, body)
     except Infeasible:
         return
     yield from search.plans()
 
 
-class _Search:
+class _MarginSearch:
     """Search for one spacecraft."""
 
     def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
@@ -280,7 +280,7 @@ class _Search:
         bounds = requirements.required(spacecraft)
         parts = {bound.part: bound.most for bound in bounds}
         aimed = requirements.aim(spacecraft) in parts or body.goal.axis is not None
-        self.equations = Equations(shift=aimed, spin=body.goal.spin is not None)
+        self.equations = EndEquations(shift=aimed, spin=body.goal.spin is not None)
         self.options = OptimalOptions(free_axis=not aimed)
         self.problem = Problem(self.model.body, self.options)
         self.program = self.problem.program()
@@ -289,7 +289,7 @@ class _Search:
         flat = self.model.body
         spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
         self.limits = tuple(
-            Limit(kind, most)
+            ChanceLimit(kind, most)
             for part, kind, most in (
                 (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
                 (
@@ -311,7 +311,7 @@ class _Search:
         drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
         last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
         self.program.forbid(None, last, math.inf)
-        every = Equations(True, True)
+        every = EndEquations(True, True)
         goal = np.zeros(5)
         goal[every.chosen] = small_angles(flat, every).goal
         self.chance = ChanceProgram(self.program, dispersed, self.limits, goal)

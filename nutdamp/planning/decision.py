@@ -29,7 +29,7 @@ from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
-    from nutdamp.planning.screening import Candidate, Cases
+    from nutdamp.planning.screening import Cases, PlanCandidate
 
 
 BUG = "internal error, please report"
@@ -47,7 +47,7 @@ class Comparison(results.Data, results.Tabled):
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
-    flown: Mapping[Plan, Candidate] | None = field(default=None, repr=False)
+    flown: Mapping[Plan, PlanCandidate] | None = field(default=None, repr=False)
     named: bool = False
     timed: bool = False
 
@@ -209,7 +209,7 @@ def compare_plans(
     return replace(nominal, flown=_dispersed(nominal, samples))
 
 
-def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, Candidate]:
+def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, PlanCandidate]:
     """Feasible plans in dispersed cases."""
     from nutdamp.montecarlo.study import SAMPLES
     from nutdamp.planning.screening import fly_compared

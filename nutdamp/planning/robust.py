@@ -24,7 +24,7 @@ from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
-from nutdamp.planning.screening import AS_GOOD, Candidate, Cases, cases_of, entered, equal_from, fly_all
+from nutdamp.planning.screening import AS_GOOD, Cases, PlanCandidate, cases_of, entered, equal_from, fly_all
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -133,9 +133,9 @@ class RobustComparison:
     """
 
     comparison: Comparison
-    candidates: tuple[Candidate, ...]
-    usual: Candidate | None
-    chosen: Candidate | None
+    candidates: tuple[PlanCandidate, ...]
+    usual: PlanCandidate | None
+    chosen: PlanCandidate | None
     ground: Ground | None
     equals: int
     by_propellant: bool
@@ -225,7 +225,7 @@ def compare(
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
-    entries: dict[object, Candidate] = {}
+    entries: dict[object, PlanCandidate] = {}
     with work.budget("the robust plans", work.FRONTS):
         for number, trial in enumerate(trials):
             watch(number)
@@ -252,7 +252,7 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
     chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
     if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
         return ranks
-    flown: dict[Plan, tuple[Candidate, Fresh]] = {}
+    flown: dict[Plan, tuple[PlanCandidate, Fresh]] = {}
 
     def complies(plan: Plan) -> bool:
         with suppress(Infeasible):
@@ -270,14 +270,14 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
     return replace(ranks, chosen=robust, candidates=(robust, *ranks.candidates), ground=Ground.COST, fresh=fresh)
 
 
-def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:
+def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
     """Comparison with the chosen plan in fresh cases, against selection by luck.
 
     A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
     comply all the same, with which tolerances enough would.
     """
     comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
-    refused: list[Candidate] = []
+    refused: list[PlanCandidate] = []
     while (chosen := ranks.chosen) is not None:
         ranks = replace(ranks, fresh=_fresh(chosen, samples))
         if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
@@ -289,7 +289,7 @@ def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> Robust
     return replace(ranks, tightening=tightening(chosen.plan, required))
 
 
-def _fresh(chosen: Candidate, samples: int) -> Fresh | None:
+def _fresh(chosen: PlanCandidate, samples: int) -> Fresh | None:
     """Chosen plan in fresh cases; None where nothing is required of it."""
     if chosen.met is None:
         return None
@@ -303,11 +303,11 @@ def _fresh(chosen: Candidate, samples: int) -> Fresh | None:
 
 def ranked(
     comparison: Comparison,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[PlanCandidate],
     samples: int,
     probability: float,
     *,
-    refused: Sequence[Candidate] = (),
+    refused: Sequence[PlanCandidate] = (),
 ) -> RobustComparison:
     """Comparison of flown candidates, and the choice.
 
@@ -384,7 +384,7 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, attempt(body, scheme, options))]
 
 
-def _equals(candidates: Sequence[Candidate], samples: int, probability: float) -> list[Candidate]:
+def _equals(candidates: Sequence[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
     """Candidates that comply as often as required; without any those as good as the best.
 
     But for what the sampling may make of them.

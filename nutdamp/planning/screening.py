@@ -81,7 +81,7 @@ def equal_from(share: float, samples: int) -> float:
 
 
 @dataclass(eq=False)
-class Candidate:
+class PlanCandidate:
     """Plan and its dispersed ``results``.
 
     ``variant`` says how it differs from what its scheme plans. Of all cases the share that complies lies between
@@ -134,10 +134,10 @@ class Candidate:
         return self.left if self.met is None else 1.0 - self.met
 
 
-def entered(plan: Plan, variant: str, study: Study, samples: int) -> Candidate:
+def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    made = Candidate(plan, variant, cases_of(results, samples), results)
+    made = PlanCandidate(plan, variant, cases_of(results, samples), results)
     _bound(made, samples)
     return made
 
@@ -157,13 +157,13 @@ def fly_compared(
     plans: Sequence[Plan],
     samples: int,
     choose: Callable[[Mapping[Plan, Share]], Plan | None],
-) -> dict[Plan, Candidate]:
+) -> dict[Plan, PlanCandidate]:
     """Fly as many of the ``samples`` cases of each plan as decide on its compliance.
 
     All of them with the plan that `choose` takes by the shares. Plans with a case that cannot be flown are left out.
     Ends where the budget of work does.
     """
-    flown: dict[Plan, Candidate] = {}
+    flown: dict[Plan, PlanCandidate] = {}
     for plan in plans:
         study = study_of(plan.spacecraft, plan.pulses)
         if affordable(study, min(STAGES[0], samples)):
@@ -185,10 +185,10 @@ def fly_compared(
 
 def _undecided(
     plans: Sequence[Plan],
-    flown: Mapping[Plan, Candidate],
+    flown: Mapping[Plan, PlanCandidate],
     samples: int,
     choose: Callable[[Mapping[Plan, Share]], Plan | None],
-) -> Candidate | None:
+) -> PlanCandidate | None:
     """Next candidate to fly further; None where all is decided."""
     shares = shares_of(plans, flown)
     ahead = [candidate for candidate in flown.values() if candidate.cases.samples < samples]
@@ -207,7 +207,7 @@ def _undecided(
     )
 
 
-def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, Candidate]) -> dict[Plan, Share]:
+def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dict[Plan, Share]:
     """Complying share of each plan, from none to all where cases have not flown.
 
     Nothing where nothing is required.
@@ -218,7 +218,7 @@ def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, Candidate]) -> dict[Pl
     return {plan: (flown[plan].share or unknown) if plan in flown else unknown for plan in plans}
 
 
-def _bound(candidate: Candidate, samples: int) -> None:
+def _bound(candidate: PlanCandidate, samples: int) -> None:
     if candidate.met is not None:
         known = candidate.cases.samples >= samples
         count = round(candidate.met * candidate.cases.samples)
@@ -232,7 +232,7 @@ def _stage(done: int, samples: int) -> int:
     return next((count for count in STAGES if done < count < samples), samples)
 
 
-def _further(candidate: Candidate, samples: int) -> None:
+def _further(candidate: PlanCandidate, samples: int) -> None:
     """Fly the cases of the next stage."""
     assert candidate.results is not None
     stage = _stage(candidate.cases.samples, samples)
@@ -243,10 +243,10 @@ def _further(candidate: Candidate, samples: int) -> None:
 
 
 def fly_all(
-    candidates: list[Candidate],
+    candidates: list[PlanCandidate],
     samples: int,
     probability: float,
-    always: Sequence[Candidate] = (),
+    always: Sequence[PlanCandidate] = (),
     watch: Callable[[], None] = lambda: None,
 ) -> None:
     """Fly all ``samples`` cases of those that may be chosen, and of ``always``; ``watch`` is called after each step.
@@ -270,13 +270,13 @@ def fly_all(
         watch()
 
 
-def _promise(candidate: Candidate, probability: float) -> tuple[bool, float]:
+def _promise(candidate: PlanCandidate, probability: float) -> tuple[bool, float]:
     """Sort key of the next candidate to fly."""
     may = candidate.high is not None and candidate.high >= probability
     return not may, candidate.plan.pulses.cost if may else candidate.rank
 
 
-def _hopeful(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
+def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
     """Candidates that may still be chosen."""
     if any(candidate.low is None for candidate in candidates):
         return _as_near(candidates, samples, probability)
@@ -292,7 +292,7 @@ def _hopeful(candidates: list[Candidate], samples: int, probability: float) -> l
     return [candidate for candidate, _, high in bounds if high >= least]
 
 
-def _as_near(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
+def _as_near(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
     """Candidates that may leave as little as the best complete one, where nothing is required."""
     ranks = [candidate.rank for candidate in candidates if candidate.cases.samples >= samples]
     if not ranks:
@@ -301,7 +301,7 @@ def _as_near(candidates: list[Candidate], samples: int, probability: float) -> l
     return [candidate for candidate in candidates if _share_within(candidate, most) >= probability]
 
 
-def _share_within(candidate: Candidate, most: float) -> float:
+def _share_within(candidate: PlanCandidate, most: float) -> float:
     """Largest share of all cases that may leave at most ``most`` rad."""
     body = candidate.plan.spacecraft
     if candidate.results is None or candidate.results.values is None:

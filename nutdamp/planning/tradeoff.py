@@ -262,7 +262,7 @@ class _Searches:
     """
 
     count: int
-    budget: work.Budget
+    budget: work.WorkBudget
     progress: Callable[[int], None]
     done: int = 0
 

@@ -1,15 +1,9 @@
-"""Search over command blocks.
+"""Command blocks for spinners: channel, delay after the Sun pulse, width, number of pulses.
 
-The search for command blocks in closed form: which there are, and the best few of up to so many in a row.
-
-Blocks of pulses as spinners are commanded: channel, delay after the Sun pulse, width, number of pulses.
-
-All blocks that can be commanded are looked at in closed form (`block_model`): of one block every channel, width,
-number of pulses and interval, each at the delays next to the two that serve best, one for the heading of H and one for
-the nutation. Where one does not do, a second and a third are looked for behind the most promising. The best dozen are
+All blocks that can be commanded are examined in closed form (`block_model`): of one block every channel, width,
+number of pulses and interval, each at the delays next to the two best ones, one for the heading of H and one for
+the nutation. Where one does not do, a second and a third are sought behind the most promising. The best dozen are
 flown from the Sun pulses of the nutating body, and the best of these is the schedule.
-
-What is said of command blocks: what was searched, which steps are too coarse and which limits are used up.
 """
 
 from __future__ import annotations
@@ -30,7 +24,7 @@ from nutdamp.errors import Infeasible, listed
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.flight.propagation import shed
-from nutdamp.schemes.block_model import BlockModel, State, Trial, acts, evenly, fired, spin_turn
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fired, spin_turn
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft import requirements
@@ -41,11 +35,11 @@ from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 ANY = "finer steps of delay and width in commands, or a longer limits.horizon"
-"""What may help where nothing is known to hinder."""
+"""Advice where nothing is known to hinder."""
 
 
 def searched(compared: str, form: Left, flown: Left, *, first: bool) -> str:
-    """That nothing ``compared`` is better, and how far flight and closed form are apart.
+    """Note that nothing ``compared`` is better, with the difference of flight and closed form.
 
     ``first``: what was flown is the best in closed form.
     """
@@ -58,7 +52,7 @@ def searched(compared: str, form: Left, flown: Left, *, first: bool) -> str:
 
 
 def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
-    """That blocks are on no ``tick`` (s), where their steps are others than those."""
+    """Note on blocks that are on no ``tick`` (s), where their steps differ."""
     if tick is None:
         return ()
     steps = np.array([commands.delay_step, *commands.widths]) / tick
@@ -98,7 +92,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
 
 
 def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
-    """By how much one pulse of a channel turns H more than one of the width before, or than none, rad: the least."""
+    """Least extra turn of H, rad, by one pulse of a channel over one of the next smaller width, or none."""
     assert model.body.commands is not None
     widths = commandable_widths(model.body.commands, channel)
     if len(widths):
@@ -157,33 +151,33 @@ BLOCKS = 3
 """Blocks of a schedule, at most."""
 
 DOUBTFUL = 1.5
-"""Share of a bound up to which the closed form may err, so that a flight has to tell whether it is kept."""
+"""Fraction of a bound up to which the closed form may err, so that a flight has to decide."""
 
 SURELY = 3.0
 """Times its error by which the length of a block that ends at the target differs from the way there, at most."""
 
 LOWER = 0.98
-"""Share of the nutation above which it does not count as lowered."""
+"""Fraction of the nutation above which it does not count as lowered."""
 
 LOOKED = 2e-6
-"""Units of `work` of a block that is looked at."""
+"""Units of `work` of an examined block."""
 
 
-class Found(NamedTuple):
-    """Blocks, the motion after them in closed form, and how good that is: the less, the better.
+class BlockSequence(NamedTuple):
+    """Blocks, the motion after them in closed form, and their rank: the less, the better.
 
     ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
     ``share``: the share.
     """
 
     blocks: tuple[Block, ...]
-    state: State
+    state: BlockState
     rank: tuple[float, float, float]
     share: float = math.inf
 
 
 class BlockSearch:
-    """The blocks of one spacecraft: which there are, and how good they are in closed form."""
+    """Blocks of one spacecraft, and their rank in closed form."""
 
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
@@ -191,7 +185,7 @@ class BlockSearch:
         self.bounds = [self._lowered(bound) for bound in requirements.bounds(spacecraft)]
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
-        self.doubtful: list[Found] = []  # those that may comply in a flight, the cheapest first
+        self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
         self.pause = math.ceil(limits.gap / self.model.turn)
@@ -199,17 +193,17 @@ class BlockSearch:
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
 
     def _lowered(self, bound: requirements.Bound) -> requirements.Bound:
-        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
+        """Bound of the nutation at its present value: without a target blocks are to lower it."""
         goal = self.body.goal
         if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
             return bound
         return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
-    def best(self, most: int) -> list[Found]:
-        """The best few sequences of up to ``most`` blocks, those that are flown."""
-        start = Found((), self.model.start, (math.inf, math.inf, math.inf))
+    def best(self, most: int) -> list[BlockSequence]:
+        """Best few sequences of up to ``most`` blocks, to be flown."""
+        start = BlockSequence((), self.model.start, (math.inf, math.inf, math.inf))
         sequences = self._single(start)
-        firsts: list[Found] = []
+        firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
             self.most = min((sequence.rank[1] for sequence in sequences if sequence.rank[0] <= 0.0), default=math.inf)
             if work.exhausted() or (self.most < math.inf and not self.small):
@@ -244,16 +238,20 @@ class BlockSearch:
         }
         return [*first.values(), *islice(more.values(), 2 * FLOWN)]
 
-    def _largest_pulse(self, sequence: Found) -> float:
-        """The most by which one of its pulses turns H, rad."""
+    def _largest_pulse(self, sequence: BlockSequence) -> float:
+        """Largest turn of H by one of its pulses, rad."""
         named = {channel.name: channel for channel in self.channels}
         spin = self.body.spin
         return max(float(self.model.turned_by(named[block.channel], block.width, spin)) for block in sequence.blocks)
 
     def behind(
-        self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN, off: State | None = None
-    ) -> Iterator[Found]:
-        """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``.
+        self,
+        before: BlockSequence,
+        trials: Iterator[tuple[Channel, Trial]],
+        few: int = FLOWN,
+        off: BlockState | None = None,
+    ) -> Iterator[BlockSequence]:
+        """Best ``few`` of the ``trials`` of each channel, after the blocks ``before``.
 
         ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
         """
@@ -285,25 +283,25 @@ class BlockSearch:
                     block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, interval)
                     here = state.at(at, shape)
                     rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
-                    yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
+                    yield BlockSequence((*before.blocks, block), here, rank, float(severity.ravel()[index]))
 
     def share(self, bound: requirements.Bound, left: requirements.Left) -> Array:
-        """Share of a ``bound`` that is ``left``: 1 or less keeps it."""
+        """Fraction of a ``bound`` that is ``left``: 1 or less keeps it."""
         return np.asarray(requirements.left_of(bound.part, left, self.body) / bound.most)
 
     def _spaced(self, every: int) -> bool:
-        """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
+        """True if pulses in one of ``every`` spins are as far apart as limits.gap requires."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
-    def _counts(self, start: State, every: int) -> NDArray[np.int64]:
+    def _counts(self, start: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
         if not self._spaced(every):
             return np.arange(0)
         return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
 
-    def _single(self, start: Found) -> list[Found]:
-        """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
+    def _single(self, start: BlockSequence) -> list[BlockSequence]:
+        """Best single blocks, of all widths, numbers and intervals at the best delays.
 
         What surely ends worse than the best ones found is left out: see `_short_by`.
         """
@@ -326,8 +324,8 @@ class BlockSearch:
                 return sequences
             within = min(enough, 10.0 * within, most)
 
-    def _short_by(self, state: State, channel: Channel, every: int) -> Array:
-        """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
+    def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
+        """Least miss of blocks of each width and number (w, n), in fractions of the missed bound.
 
         Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
         shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
@@ -348,16 +346,16 @@ class BlockSearch:
         length = full * self.model.turned_by(channel, widths, self.body.spin)
         return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
 
-    def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
-        """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
+    def _chosen(self, state: BlockState, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
+        """Blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
         if len(index):
             widths = commandable_widths(self.commands, channel)[index[:, 0]]
             counts = self._counts(state, every)[index[:, 1]]
             for wait in self._waits(state, self.earliest, WAITS if abs(state.phasor) > 0.0 else 1):
                 yield self._at_delays(state, channel, wait, widths, counts, every)
 
-    def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
-        """Blocks that go the rest of the way, or take the nutation that is left."""
+    def _rest(self, before: BlockSequence) -> Iterator[tuple[Channel, Trial]]:
+        """Blocks for the rest of the way, or of the nutation."""
         state, least = before.state, self.pause if before.blocks else self.earliest
         if self.small:
             yield from self._grid(state, least)
@@ -378,7 +376,7 @@ class BlockSearch:
                 for wait in self._waits(state, least, LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
 
-    def _parts(self, start: Found) -> Iterator[Found]:
+    def _parts(self, start: BlockSequence) -> Iterator[BlockSequence]:
         """First blocks that go a part of the way to the target."""
         heading, way = self.model.course(start.state)
         every = next((interval for interval in self.commands.every if self._spaced(interval)), None)
@@ -399,7 +397,7 @@ class BlockSearch:
 
     @cached_property
     def small(self) -> bool:
-        """Whether there are so few blocks that all are looked at."""
+        """True if there are so few blocks that all are examined."""
         widths = sum(len(commandable_widths(self.commands, channel)) for channel in self.channels)
         return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
 
@@ -413,7 +411,7 @@ class BlockSearch:
     def _all_counts(self) -> NDArray[np.int64]:
         return np.arange(1, min(self.commands.max_count, self.allowed) + 1)
 
-    def _grid(self, state: State, least: int) -> Iterator[tuple[Channel, Trial]]:
+    def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """All blocks of each channel, from ``least`` Sun pulses on: by wait, delay, width and number of pulses."""
         waits = np.array(self._waits(state, least, LATER_WAITS))[:, None, None, None]
         for channel in self.channels:
@@ -424,25 +422,25 @@ class BlockSearch:
             for every in filter(self._spaced, self.commands.every):
                 yield channel, Trial(wait, delay, width, count, every)
 
-    def _all_firsts(self, start: Found) -> list[Found]:
+    def _all_firsts(self, start: BlockSequence) -> list[BlockSequence]:
         """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
         sequences = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
         return sorted(sequences, key=lambda sequence: sequence.rank[1])[:ALL_FIRSTS]
 
-    def _waits(self, state: State, least: int, few: int) -> list[int]:
+    def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
         after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
-    def _longer_round(self, before: State, after: State) -> NDArray[np.bool_]:
-        """Whether H has gone round the Sun the longer way to the target, or once more: far for a few degrees."""
+    def _longer_round(self, before: BlockState, after: BlockState) -> NDArray[np.bool_]:
+        """True if H has gone round the Sun the longer way to the target, or once more."""
         if self.body.goal.axis is None:
             return np.zeros((), dtype=bool)
         return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
 
-    def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
-        """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
+    def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
+        """True if a pulse of the blocks would be on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
         dark = np.zeros(shape, dtype=bool)
         if not len(self.dark[0]):
@@ -460,9 +458,9 @@ class BlockSearch:
         return dark
 
     def _at_delays(
-        self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
+        self, state: BlockState, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
     ) -> Trial:
-        """The blocks at the delays that serve the heading best, and at those that serve the nutation best."""
+        """Blocks at the best delays for the heading, and at those for the nutation."""
         widths, counts = np.broadcast_arrays(widths, counts)
         chosen = []
         if self.body.goal.axis is not None:
@@ -481,23 +479,23 @@ class BlockSearch:
         return Trial(wait, delay, widths[..., None], counts[..., None], every)
 
     def commanded(self, delay: Array) -> Array:
-        """The nearest delay that can be commanded, of those within a spin turn."""
+        """Nearest delay that can be commanded, of those within a spin turn."""
         step, longest = self.commands.delay_step, min(self.commands.delay_max, self.model.turn)
         most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
 
-def of_each_kind(ranked: Iterable[Found]) -> list[Found]:
-    """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
-    kinds: dict[tuple[tuple[str, int], ...], Found] = {}
+def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
+    """First of each kind of sequence: their flights may differ much though their closed forms do not."""
+    kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
     for sequence in ranked:
         kinds.setdefault(tuple((block.channel, block.every) for block in sequence.blocks), sequence)
     return list(kinds.values())
 
 
-def _promising(sequences: Iterable[Found], most: int) -> list[Found]:
-    """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
-    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[Found]()
+def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
+    """Sequences of least residual, and others of least residual at their cost: ``most`` of each."""
+    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[BlockSequence]()
     for sequence in ranked:
         if not front or sequence.rank[1] < front[-1].rank[1]:
             front.append(sequence)
@@ -514,19 +512,19 @@ CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
 ROUNDS = 3
-"""How often, each time from the best flights so far."""
+"""Rounds, each from the best flights so far."""
 
 
-class Flown(NamedTuple):
-    """What was found, flown: how good it is, those that break a limit last, then the earlier end, and its pulses."""
+class FlownSequence(NamedTuple):
+    """Sequence as flown, with its rank: broken limits last, then the earlier end; and its pulses."""
 
     rank: tuple[bool, float, float, float]
     made: Schedule
-    found: Found
+    found: BlockSequence
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
-    """The blocks that meet the requirement with the least propellant, else those that leave least.
+    """Blocks that meet the requirement with the least propellant, else those of least residual.
 
     ``options.max_blocks``: how many there may be. Raises Infeasible with the reason.
     """
@@ -542,7 +540,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = Search(spacecraft, channels, commands)
-    flights: list[Flown] = []
+    flights: list[FlownSequence] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
@@ -567,8 +565,8 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     return replace(chosen.made, notes=tuple(notes))
 
 
-def _cheapest(flights: Sequence[Flown]) -> Flown:
-    """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
+def _cheapest(flights: Sequence[FlownSequence]) -> FlownSequence:
+    """Best flight; of equal costs within `SAME_COST` the fewest pulses, then the earlier end."""
     best = min(flights, key=lambda flight: flight.rank)
     broken, missed, cost, _ = best.rank
     equal = [
@@ -580,19 +578,19 @@ def _cheapest(flights: Sequence[Flown]) -> Flown:
 
 
 class Search(BlockSearch):
-    """The same, flown."""
+    """Block search with flights."""
 
-    def flown(self, sequence: Found) -> Flown:
-        """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
+    def flown(self, sequence: BlockSequence) -> FlownSequence:
+        """Rank of the blocks when flown. Raises Infeasible where they cannot be."""
         schedule = fired(self.body, sequence.blocks)
         left = left_by(propagation.flown(self.body, schedule))
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
         rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
-        return Flown(rank, schedule, sequence)
+        return FlownSequence(rank, schedule, sequence)
 
-    def doubted(self, flights: list[Flown]) -> None:
-        """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
+    def doubted(self, flights: list[FlownSequence]) -> None:
+        """Fly sequences that would be cheaper than the best of the ``flights`` if they complied, and add them."""
         best = min((flight.rank for flight in flights if not flight.rank[0]), default=None)
         most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
         known = {flight.found.blocks for flight in flights}
@@ -605,12 +603,12 @@ class Search(BlockSearch):
                 if flights[-1].rank[:2] == (False, 0.0):
                     return
 
-    def nearer(self, flights: Sequence[Flown]) -> list[Found]:
-        """Neighbours of the best of ``flights`` that leave least where the closed form errs as it does for those.
+    def nearer(self, flights: Sequence[FlownSequence]) -> list[BlockSequence]:
+        """Neighbours of the best of ``flights`` of least residual if the closed form errs as it does for those.
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
-        named, sequences = {channel.name: channel for channel in self.channels}, list[Found]()
+        named, sequences = {channel.name: channel for channel in self.channels}, list[BlockSequence]()
         by_blocks = {flight.found.blocks: flight for flight in sorted(flights, key=lambda flight: flight.rank)}
         best = of_each_kind([flight.found for flight in by_blocks.values()])
         for flight in (by_blocks[each.blocks] for each in best[:CORRECTED]):
@@ -620,7 +618,7 @@ class Search(BlockSearch):
                 trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
                 state = self.model.after(state, named[block.channel], trial)
                 number = block.first + (block.count - 1) * block.every + 1
-            before = Found(tuple(earlier), state, (math.inf, math.inf, math.inf))
+            before = BlockSequence(tuple(earlier), state, (math.inf, math.inf, math.inf))
             off = self.model.apart(flight.found.state, propagation.flown(self.body, flight.made))
             trials = iter([(channel, self._around(before, channel, last, number))])
             sequences += self.behind(before, trials, off=off)
@@ -633,13 +631,13 @@ class Search(BlockSearch):
         chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
         return [self._in_form(sequence) for sequence in {sequence.blocks: sequence for sequence in chosen}.values()]
 
-    def _in_form(self, sequence: Found) -> Found:
-        """The same, ranked by the closed form alone."""
+    def _in_form(self, sequence: BlockSequence) -> BlockSequence:
+        """Sequence ranked by the closed form alone."""
         left = self.model.left(sequence.state)
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
 
-    def _around(self, before: Found, channel: Channel, last: Block, number: int) -> Trial:
+    def _around(self, before: BlockSequence, channel: Channel, last: Block, number: int) -> Trial:
         """Blocks about as long and as late as the ``last`` one, from the Sun pulse of that ``number`` on."""
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
@@ -656,15 +654,15 @@ class Search(BlockSearch):
         wait, delay, width, count = (np.broadcast_to(part, shape) for part in parts)
         return Trial(wait, delay, width, count, last.every)
 
-    def cures(self, chosen: Flown, most: int) -> str:
-        """What keeps ``chosen`` from leaving less, of up to ``most`` blocks."""
+    def cures(self, chosen: FlownSequence, most: int) -> str:
+        """Factors that keep ``chosen`` from leaving less, of up to ``most`` blocks."""
         left = left_by(propagation.flown(self.body, chosen.made))
         missed = {bound.part: bound.most for bound in self.bounds if float(self.share(bound, left)) > 1.0}
         more = [f"--max-blocks {BLOCKS}"] * (len(chosen.made.blocks) == most < BLOCKS)
         return cures(self.model, self.channels, missed, chosen.made, more)
 
-    def note(self, chosen: Flown, *, first: bool) -> str:
-        """What was looked at, and how far flight and closed form are apart; ``first``: it is the best in that form."""
+    def note(self, chosen: FlownSequence, *, first: bool) -> str:
+        """Note on the search, and on the difference of flight and closed form; ``first``: best in that form."""
         schedule, form = chosen.made, self.model.left(chosen.found.state)
         compared = (
             f"none of the {self.looked:,} sequences compared" if len(schedule.blocks) > 1 else "no other single block"

@@ -1,13 +1,8 @@
-"""Schedules corrected by least squares on the flown motion, whole or stage by stage.
+"""Correction of schedules by least squares on the flown motion, whole or stage by stage.
 
-Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
-
-A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
-takes longer than a whole plan.
-
-A schedule laid stage by stage along the flown motion: what the schemes that point the spin axis share.
-
-Taking the nutation out before H is turned: at a moment at which the spin axis, where H goes, is near the target.
+Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a handful of unknowns.
+scipy.optimize would do it too, but loading it takes longer than a whole plan. Schemes that point the spin axis lay
+their schedules stage by stage along the flown motion, after damping at a time at which H ends near the target.
 """
 
 from __future__ import annotations
@@ -44,7 +39,7 @@ ALIKE = 1e-9
 STEPS = 30
 
 INTEGRATED = 50_000
-"""Steps of integration after which a correction is left as it is: some seconds."""
+"""Steps of integration after which a correction stops: some seconds."""
 
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
@@ -60,7 +55,7 @@ BEFORE, AFTER = 12, 24
 """Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
 
 CLEARLY = 0.5
-"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+"""Largest residual, over that of an earlier candidate, with which a later or dearer one is taken."""
 
 EXACT = 1e-11
 """rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
@@ -77,7 +72,7 @@ def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
-    """Of schedules with what they leave (rad), the preferred first, the one to take; and the first that breaks a limit.
+    """Choice among schedules with residuals (rad), the preferred first; and the first that breaks a limit.
 
     The first that is exact is taken, else the first that none behind it beats clearly.
     """
@@ -94,7 +89,7 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
 
 
 def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
-    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+    """Residual of the flown schedule, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
 
     The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
@@ -103,7 +98,7 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
-    """`misses` of a flight; ``spin`` adds a fifth, by how much of itself the final spin of the goal is missed."""
+    """`misses` of a flight; ``spin`` adds a fifth, the relative error of the final spin."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
     moments = np.asarray(flight_.last_moments)
     body = flight_.settled.rates * moments
@@ -116,7 +111,7 @@ def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
 
 
 def _across(axis: Vector, vector: Vector) -> Vector:
-    """The two components of ``vector`` square to the unit vector ``axis``."""
+    """Components of ``vector`` perpendicular to the unit vector ``axis``."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, other)
     first /= float(np.linalg.norm(first))
@@ -187,12 +182,12 @@ class Correction:
 
     @property
     def momentum(self) -> bool:
-        """Whether H too is to end where it should."""
+        """True if H too has an end condition."""
         return self.scheme.points and not self.options.frees_axis
 
     @property
     def equal(self) -> bool:
-        """Whether the pulses are planned to be equal."""
+        """True if the pulses are planned to be equal."""
         return self.options.equal
 
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
@@ -217,7 +212,7 @@ class Correction:
 
 
 def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
-    """Start, scale, lower and upper bound of all that is free."""
+    """Start, scale, lower and upper bound of all free parameters."""
     start, scale, lower, upper = (
         np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "scale", "lower", "upper")
     )
@@ -225,14 +220,14 @@ def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector
 
 
 def alike(schedule: Schedule, pulse: Pulse) -> bool:
-    """Whether a pulse is as large as the last one of a schedule."""
+    """True if a pulse is as large as the last one of a schedule."""
     last = schedule.pulses[-1]
     size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
     return abs(size - other) <= ALIKE * other
 
 
 class _Movable:
-    """What can be turned of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
+    """Free parameters of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
     Without the last of them where it is not ``sized`` for itself.
     """
@@ -255,7 +250,7 @@ class _Movable:
         self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
 
     def turn(self, x: Vector, factor: float) -> Pulse:
-        """The pulse with these settings; ``factor`` times as large where it is not sized for itself."""
+        """Pulse with these settings; ``factor`` times as large where it is not sized for itself."""
         size = float(x[-1]) if self.sized else factor * self.size
         if self.channel is not None:
             return channel_pulse(self.channel, x[0] + 0.5 * size, size)
@@ -266,7 +261,7 @@ class _Movable:
 
 
 class _Common:
-    """What equal pulses change alike: one factor on the size of all that are as large as the last one."""
+    """Common factor of equal pulses, on the size of all that are as large as the last one."""
 
     start = scale = np.ones(1)
 
@@ -276,7 +271,7 @@ class _Common:
         self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
-        """The ``pulses`` about their centres, those alike ``factor`` times as large."""
+        """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
         return [self._resized(pulse, factor) if alike(self.made, pulse) else pulse for pulse in pulses]
 
     def _resized(self, pulse: Pulse, factor: float) -> Pulse:
@@ -285,12 +280,12 @@ class _Common:
 
 
 def _size(pulse: Pulse) -> float:
-    """What a pulse is measured by: on-time of a channel, s, impulse of a steerable torquer, N m s."""
+    """Size of a pulse: on-time of a channel, s, impulse of a steerable torquer, N m s."""
     return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
 
 
 def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
-    """The least and the largest size of a pulse."""
+    """Least and largest size of a pulse."""
     channel = channel_of(spacecraft, pulse)
     if channel is None:
         return 0.0, math.inf
@@ -358,10 +353,10 @@ def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lowe
 
 
 LEFT_OVER = 0.05
-"""Share of nutation and turn together above which what is left makes a schedule no way to the target."""
+"""Largest residual, over nutation and turn together, of a schedule that reaches the target."""
 
 LEFT_OVER_BY_TICKS = 0.5
-"""The same where the resolution of commands may be to blame."""
+"""Largest residual where the resolution of commands may be to blame."""
 
 
 ROUNDING = 1e-12
@@ -369,7 +364,7 @@ ROUNDING = 1e-12
 
 
 class FlownBuilder:
-    """The pulses chosen so far, and the spacecraft as it is after them.
+    """Pulses chosen so far, and the spacecraft after them.
 
     ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there: attitude, rates,
     limits and disturbances are those of that moment, its goal is where the builder is to end. ``steps``: of integration
@@ -389,13 +384,13 @@ class FlownBuilder:
 
     @property
     def allowed(self) -> float:
-        """How many pulses the limits still allow."""
+        """Number of further pulses within the limits."""
         most = self.here.limits.max_pulses
         return math.inf if most is None else most
 
     @property
     def left(self) -> float:
-        """What is left, rad: nutation and distance of H from the target, whichever is more."""
+        """Residual, rad: nutation or distance of H from the target, whichever is larger."""
         return max(self.here.nutation, self.here.to_turn)
 
     def fork(self) -> FlownBuilder:
@@ -435,18 +430,18 @@ class FlownBuilder:
         self.fire(correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0))
 
     def schedule(self, *notes: str) -> Schedule:
-        """What has been chosen."""
+        """Chosen pulses."""
         return Schedule(tuple(self.pulses), notes)
 
 
 def tolerable(spacecraft: Spacecraft) -> float:
-    """What a schedule may leave, rad, and still count as having reached the target: more where commands have ticks."""
+    """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
 def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
-    """The spacecraft as it is when ``pulse`` ends, with its time counted from there; and the steps that it took."""
+    """Spacecraft at the end of ``pulse``, with its time counted from there; and the steps taken."""
     flown = propagation.flown(spacecraft, Schedule((pulse,)))
     settled, since, limits = flown.settled, pulse.over, spacecraft.limits
     to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)

@@ -62,13 +62,13 @@ def _turning(
 
 
 def _next(builder: ImpulseBuilder, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
-    """The next pulse of ``channel``: a full one, or in fine damping just what is left."""
+    """Next pulse of ``channel``: a full one, or in fine damping one of the remaining size."""
     just_enough = None if coarse else builder.on_time_for(channel, builder.left, on_time)
     return builder.align(channel, on_time if just_enough is None else just_enough)
 
 
 def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPulseOptions) -> None:
-    """A sphere: ω does not turn, so the two channels on either side of -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
+    """Pulses on a sphere: ω does not turn, so the channels beside -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
     shares = _shares(channels, -builder.A * builder.omega)
     for channel, impulse in shares:
         unit = impulse / abs(channel.transverse)

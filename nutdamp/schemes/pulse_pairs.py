@@ -1,16 +1,9 @@
-"""Two pulses to a target axis.
+"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
 
-Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
-
-A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
-says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
-comes there; the moments are kept at which the second channel then points the right way. Both are corrected on the real
-widths.
-
-Where a steerable torquer is to push so that H and the spin axis come to the target axis: exact at any angle.
-
-The two pulses of an acquisition, and the first pulse of a row of half cones, are placed by `precession`; what is
-free, the moment of the first pulse and how far aside H goes between two, is chosen for least impulse.
+A steerable torquer is placed for least impulse by `precession`: free are the time of the first pulse and how far aside
+H goes between two. Body-fixed channels are searched: the time of the first alone determines the jump after which H has
+the component C|ω3| along the target that it keeps when the spin axis comes there; times are kept at which the second
+channel then points the right way. Both are corrected on the real widths.
 """
 
 from __future__ import annotations
@@ -78,7 +71,7 @@ NOTHING = 1e-12
 
 
 class SteerablePair:
-    """The choices of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
+    """Placement of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
 
     def __init__(self, spacecraft: Spacecraft, torquer: Steerable) -> None:
         self.spacecraft, self.torquer = spacecraft, torquer
@@ -138,7 +131,7 @@ class SteerablePair:
         return np.asarray(times[times <= self.windows.horizon])
 
     def one(self, cones: int) -> tuple[Pulse, ...]:
-        """The first pulse of ``cones`` half cones in a row, at the moment from which all of them cost least."""
+        """First pulse of ``cones`` half cones in a row, at the time from which all of them cost least."""
 
         def cost(times: Vector) -> tuple[Vector, Vector]:
             middle, rest = precession.half_cone(self.h, self.axes(times), self.target, cones)
@@ -157,7 +150,7 @@ class SteerablePair:
         return self.pulses([(moment, cost(np.array([moment]))[1][0])])
 
     def two(self, straight: bool = False) -> tuple[Pulse, ...]:
-        """The two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
+        """Two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
         times = self.moments()
         plain = np.zeros(len(times))
         if len(times) == 0:
@@ -203,9 +196,9 @@ class SteerablePair:
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
-    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Found | None:
-        """The cheapest choice with up to ``most`` further turns, of equal ones that which ends first."""
-        best: _Found | None = None
+    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Placement | None:
+        """Cheapest choice with up to ``most`` further turns, of equal ones the first to end."""
+        best: _Placement | None = None
         for further in range(most):
             costs, second, jumps = self._costs(times, aside, further, straight)
             least = float(costs.min())
@@ -213,13 +206,13 @@ class SteerablePair:
                 near = np.flatnonzero(costs <= least * (1.0 + EQUAL))
                 index = near[np.argmin(second[near])]
                 size = float(jumps.cost[index])
-                best = _Found(least, float(times[index]), float(aside[index]), further, size)
+                best = _Placement(least, float(times[index]), float(aside[index]), further, size)
             if not (second < self.windows.horizon).any() or (best is not None and not self.spacecraft.limits.blackout):
                 break
         return best
 
     def no_room(self, cones: int) -> str:
-        """Why no pulse could be placed."""
+        """Reason why no pulse could be placed."""
         torque, spin, horizon = self.torquer.torque, abs(self.spacecraft.spin), self.windows.horizon
         if torque is not None:
             once = 2.0 * torque / spin
@@ -244,7 +237,7 @@ class SteerablePair:
         )
 
 
-class _Found(NamedTuple):
+class _Placement(NamedTuple):
     cost: float
     moment: float
     aside: float
@@ -253,7 +246,7 @@ class _Found(NamedTuple):
 
 
 def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> Vector:
-    """The least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass that narrows from ``steps`` (k,)."""
+    """Least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass search narrowing from ``steps`` (k,)."""
     rose = np.vstack([np.diag(steps), -np.diag(steps)])
     rose = rose[np.any(rose != 0.0, axis=1)]
     best = float(cost(point[None, :])[0])
@@ -300,7 +293,7 @@ BESIDE = 0.05
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
-    """The two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
+    """Two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
 
     Raises Infeasible with the reason.
     """
@@ -319,7 +312,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 
 
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
-    """The schedule, if it keeps the limits and comes near the target."""
+    """Schedule, if it keeps the limits and comes near the target."""
     if not keeps_limits(spacecraft, schedule.pulses):
         raise Infeasible(_off_limits())
     if not _left(spacecraft, schedule) <= tolerable(spacecraft):
@@ -348,7 +341,7 @@ def _left(spacecraft: Spacecraft, schedule: Schedule) -> float:
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
-class Candidate(NamedTuple):
+class PairCandidate(NamedTuple):
     """Two channels, the moments (s) at which ideal impulses of theirs acquire the target, and their on-times (s)."""
 
     cost: float
@@ -359,7 +352,7 @@ class Candidate(NamedTuple):
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
-    search = _Search(spacecraft, channels)
+    search = _PairSearch(spacecraft, channels)
     candidates = sorted(search.all_candidates(), key=lambda candidate: candidate.cost)
     if not candidates:
         raise Infeasible(search.reason())
@@ -376,8 +369,8 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     return Schedule(schedule.pulses, (f"{note}; {schedule.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
 
 
-def _tried(spacecraft: Spacecraft, candidates: list[Candidate]) -> Iterator[tuple[Schedule, float]]:
-    """The candidates, corrected on the flown motion, with the residual (rad) that each leaves."""
+def _tried(spacecraft: Spacecraft, candidates: list[PairCandidate]) -> Iterator[tuple[Schedule, float]]:
+    """Candidates, corrected on the flown motion, with the residual (rad) of each."""
     for candidate in candidates:
         schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
         if spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses):
@@ -388,7 +381,7 @@ def _tried(spacecraft: Spacecraft, candidates: list[Candidate]) -> Iterator[tupl
 Indices = NDArray[np.intp]
 
 
-class _Search:
+class _PairSearch:
     """Pairs of channels and moments at which ideal impulses acquire the target."""
 
     def __init__(self, spacecraft: Spacecraft, channels: list[Channel]) -> None:
@@ -411,7 +404,7 @@ class _Search:
         return np.asarray(times[times <= self.windows.horizon])
 
     def after(self, channel: Channel, times: Vector) -> _After:
-        """What follows when ``channel`` fires at ``times`` (n,) s as much as it must."""
+        """Motion after ``channel`` fires at ``times`` (n,) s as much as it must."""
         direction = channel.transverse / abs(channel.transverse)
         _, quaternions = self.arc.motion(times)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
@@ -432,7 +425,7 @@ class _Search:
             body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
         return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
 
-    def all_candidates(self) -> list[Candidate]:
+    def all_candidates(self) -> list[PairCandidate]:
         """Candidates for the target; where the first jump would be nothing, for targets beside it, to be corrected.
 
         That is where the target lies on the cone of the spin axis itself.
@@ -450,10 +443,10 @@ class _Search:
         self.target = target
         return candidates
 
-    def candidates(self) -> list[Candidate]:
-        """The pairs that close and keep the limits, the cheapest of each first channel."""
+    def candidates(self) -> list[PairCandidate]:
+        """Pairs that close and keep the limits, the cheapest of each first channel."""
         times = self.times()
-        candidates: list[Candidate] = []
+        candidates: list[PairCandidate] = []
         if len(times) < 2:
             return candidates
         adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / abs(self.spacecraft.spin) / BODY_SAMPLES
@@ -476,8 +469,8 @@ class _Search:
 
     def _placed(
         self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Indices
-    ) -> list[Candidate]:
-        """The pairs at the zeros of ``off`` behind the rows ``crosses``, as far as on-times and limits allow them."""
+    ) -> list[PairCandidate]:
+        """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
         if len(crosses) == 0:
             return []
         here, there = off[crosses], off[crosses + 1]
@@ -499,17 +492,17 @@ class _Search:
         for row in np.flatnonzero(allowed):
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
             cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
-            pairs.append(Candidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
+            pairs.append(PairCandidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
         return sorted(pairs, key=lambda candidate: candidate.cost)[:SHORTLIST]
 
     def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
-        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number where it cannot."""
+        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number beyond its reach."""
         on_times = precession.on_times_to_turn(jumps, abs(channel.transverse), self.spacecraft.spin)
         outside = (on_times < channel.min_on_time) | (on_times > channel.max_on_time)
         return np.where(outside, np.nan, on_times)
 
     def reason(self) -> str:
-        """Why there is no candidate."""
+        """Reason why there is no candidate."""
         names = ", ".join(channel.name for channel in self.channels)
         strongest = max(
             precession.reach(abs(channel.transverse), self.spacecraft.spin, channel.max_on_time)

@@ -1,18 +1,11 @@
-"""Sun-synchronous pulse train.
-
-What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
-
-From one pulse to the next the phasor that a pulse gives the nutation turns by 2πC/(AK) for K pulses a turn; the sum of
-the phasors says which numbers of pulses leave no nutation.
-
-A train of short pulses at a fixed inertial phase, which walks H to the target; one or more in each spin turn.
+"""Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin turn.
 
 Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
 2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
 chosen so that they close, a nutation at t = 0 included. All pulses are equal, as the width is one command: it is chosen
-so that they just reach the target, and phases do the rest. What is too much is bent away: the train heads a little to
-one side of its course (a spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π,
-which is C = A for one pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
+so that they just reach the target. An excess is bent away: the train heads a little to one side of its course (a
+spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π, which is C = A for one
+pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
 
 The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
 """
@@ -57,7 +50,7 @@ OPEN = 1.2
 MOST_PULSES = 600
 
 LAST = 20
-"""How many of the last pulses may be moved, at most."""
+"""Largest number of last pulses that are moved."""
 
 TRIES = 4
 """Counts that are flown, at most."""
@@ -86,7 +79,7 @@ class Shot(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
+    """Train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
 
     ``closes``: whether they leave little nutation as they are, so that correction costs little. ``resizable``: whether
     the size is not that of a command, and may be corrected.
@@ -99,7 +92,7 @@ class Attempt(NamedTuple):
 
 
 class Train:
-    """What a train from the motion of ``here`` can do."""
+    """Trains from the motion of ``here``."""
 
     def __init__(self, here: Spacecraft, options: RhumbLineOptions) -> None:
         self.here, self.options = here, options
@@ -126,12 +119,12 @@ class Train:
         self.ahead, self.way = precession.course(here.momentum, here.target_axis, self.sun)
 
     def turns_by(self, size: float) -> float:
-        """By how much a pulse of a ``size`` as in `Attempt` turns H, N m s."""
+        """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
         return size if math.isinf(self.torque) else self.torque * size * precession.arc_efficiency(self.here.spin, size)
 
     @property
     def strongest(self) -> float:
-        """By how much a full pulse of the train turns H, N m s."""
+        """Turn of H by a full pulse of the train, N m s."""
         return self.turns_by(STEP * self.h if math.isinf(self.torque) else self.on_time)
 
     def _check(self, given: float) -> None:
@@ -149,7 +142,7 @@ class Train:
             raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
 
     def size(self, count: int, spare: float) -> float:
-        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on the ticks, rounded up.
+        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on ticks, rounded up.
 
         Not a number where that is too far.
         """
@@ -162,7 +155,7 @@ class Train:
         return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
     def rounding(self, size: float) -> float:
-        """What it may leave, rad, that the start of one pulse is rounded to a tick."""
+        """Residual, rad, by rounding the start of one pulse to a tick."""
         return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
 
     def attempts(self) -> list[Attempt]:
@@ -171,7 +164,7 @@ class Train:
         return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
 
     def _spare(self, count: int, left: Vector) -> float:
-        """Pulses to spare for a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
+        """Spare pulses of a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
 
         A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
         of its square.
@@ -232,7 +225,7 @@ class Train:
         return self.h * self.way / precession.arc_efficiency(self.here.spin, given)
 
     def lengths_near(self, given: float) -> list[float]:
-        """On-times (s) of trains that may close, in the order of how near they are to the one ``given``."""
+        """On-times (s) of trains that may close, in the order of their distance from the ``given`` one."""
         left = self.left_by(self.shots())
         closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
         sizes = {self.size(count, self._spare(count, left)) for count in closing}
@@ -247,7 +240,7 @@ class Train:
         return min(self.longest, WIDEST * self.turn)
 
     def fewest(self) -> int:
-        """Pulses that it takes with the on-time given; two at least, to close."""
+        """Least number of pulses with the on-time given; two at least, to close."""
         return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
 
     def _most(self) -> int:
@@ -302,7 +295,7 @@ class Train:
         return shots
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
-        """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
+        """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
         windows, limits = Windows(here), here.limits
         ahead = self._heading(here, remaining, attempt)
         on_time = 0.0 if math.isinf(self.torque) else attempt.size
@@ -321,7 +314,7 @@ class Train:
         return steerable_pulse(here.torquer, centre, cmath.phase(_in_body(here, ahead, centre)), **given)
 
     def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
-        """The course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
+        """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
         ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
         bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
@@ -329,7 +322,7 @@ class Train:
         return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
     def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
-        """The first firing of a channel as it passes the phase that the limits allow."""
+        """First firing of a channel at the required phase within the limits."""
         for _ in range(MOST_PULSES):
             moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
             t, channel = min(moments, key=lambda passage: passage[0])
@@ -347,7 +340,7 @@ class Train:
         return Infeasible(sequential.in_phase(self.here, self.options.per_turn, fewest, most, nutation))
 
     def _too_few(self, needed: int, moments: int) -> Infeasible:
-        """That the limits do not leave moments for as many pulses as are needed, or allow too few."""
+        """Message on limits that leave too few times or pulses."""
         most = self.here.limits.max_pulses
         if most is not None and most < needed:
             return Infeasible(
@@ -379,7 +372,7 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
 
 
 def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
-    """What an inertial ``direction`` (3,) has along axes 1 and 2 of the body at ``t`` s, undisturbed."""
+    """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s, undisturbed."""
     _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
@@ -410,12 +403,12 @@ def _too_long(turn: float) -> str:
 
 
 def _ratio(whole: float, part: float) -> float:
-    """How often ``part`` goes into ``whole``; a billion times at most."""
+    """Ratio of ``whole`` to ``part``; a billion at most."""
     return whole / part if whole < 1e9 * part else 1e9
 
 
 MOVED = (6, 12, LAST)
-"""How many of the last pulses are moved, one number after the other until nothing is left."""
+"""Numbers of last pulses that are moved, one after the other until nothing is left."""
 
 SHORT = 60
 """Pulses up to which their size is corrected on the flown motion too: a longer train has little to spare."""
@@ -424,14 +417,14 @@ EXACT = 1e-10
 """rad of flown residual that counts as nothing."""
 
 CLEARLY = 0.01
-"""Share of the cost of a train that is worth more pulses."""
+"""Relative saving that is worth more pulses."""
 
 OTHERS = 4
 """Other lengths of the pulses that are tried where the one requested does not do."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """The train, after one pulse (or a train against ω) where there is more nutation than it can take along.
+    """Train, after one pulse (or a train against ω) where there is more nutation than it can absorb.
 
     ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
@@ -445,7 +438,7 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """The train from t = 0, or else after what damps the nutation. Raises Infeasible with the reason."""
+    """Train from t = 0, or else after damping of the nutation. Raises Infeasible with the reason."""
     builder, reason = FlownBuilder(spacecraft), Infeasible("")
     train = Train(builder.here, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
@@ -462,7 +455,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
-    """Which pulse length would do instead of the one requested, the nearest first, in words."""
+    """Advice on a pulse length that works instead of the requested one, the nearest first."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
@@ -484,7 +477,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
 
 
 def _best(builder: FlownBuilder, train: Train) -> Schedule:
-    """The train from where the ``builder`` is that leaves least; raises Infeasible where that is too much.
+    """Train of least residual from the ``builder``; raises Infeasible where that is too much.
 
     Of those that leave nothing the first one, unless a later one costs clearly less.
     """
@@ -508,12 +501,12 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
 
 
 def _cheaper(schedule: Schedule, other: Schedule, before: float) -> bool:
-    """Whether a train costs clearly less than another, ``before`` N m s that came before them apart."""
+    """True if a train costs clearly less than another, ``before`` N m s of earlier pulses apart."""
     return schedule.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
-    """The train, each pulse aimed from where H then is, the last ones moved; and what it leaves, rad."""
+    """Train, each pulse aimed from the current H, the last ones moved; and its residual, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
         pulse = train.next_pulse(builder.here, remaining, attempt)
@@ -533,7 +526,7 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
 
 
 def _note(builder: FlownBuilder, train: Train, count: int) -> str:
-    """What the train is, in words."""
+    """Description of the train."""
     on_time = builder.pulses[-1].on_time
     efficiency = precession.arc_efficiency(train.here.spin, on_time)
     line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
@@ -549,7 +542,7 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> str:
 
 
 def _reason(train: Train, best: tuple[float, Schedule] | None) -> str:
-    """Why the ``best`` train found, with what it leaves (rad), is none."""
+    """Reason why the ``best`` train, with its residual (rad), is none."""
     requested = train.options.on_time
     held = "" if requested is None else f" of {requested:.4g} s"
     text = f"no train of equal pulses{held} was found that ends on the target within the limits"

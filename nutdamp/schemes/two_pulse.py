@@ -46,7 +46,7 @@ SHORTLIST = 6
 
 
 def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """Two pulses, and a remark on what fixed channels cost or leave.
+    """Two pulses, and a note on the cost or residual of fixed channels.
 
     ``options.literal``: equal halves and the wait as printed, not corrected, and the target left alone. Raises
     Infeasible with the reason.
@@ -65,7 +65,7 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 
 def _wide(spacecraft: Spacecraft) -> Schedule | None:
-    """The pulses that damp without drift, corrected to a target nearby; None where they do not come there.
+    """Pulses that damp without drift, corrected to a target nearby; None where they do not reach it.
 
     A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
     that are all there is, this finds what an acquisition, which plans for the turn, does not.
@@ -80,7 +80,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """The two pulses that leave H where it was, as far as correction goes for a target."""
+    """Two pulses that leave H where it was, but for the correction to a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
@@ -168,7 +168,7 @@ def _pair(
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
-class Candidate(NamedTuple):
+class HalfPulseCandidate(NamedTuple):
     """Two channels and moments that close to first order; ``short`` is the part of the impulse out of reach."""
 
     short: float
@@ -184,7 +184,7 @@ class Candidate(NamedTuple):
 
 
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
-    """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
+    """Schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
 
     None either where there is no nutation: these damp, and nothing else.
     """
@@ -195,7 +195,7 @@ def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[S
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
-    """The smallest flown residual of the most promising candidates wins, exact ones in order.
+    """Candidate of least flown residual; exact ones in order.
 
     Where every one breaks a limit, the first of them: the judge says which.
     """
@@ -209,7 +209,7 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
-    """The most promising candidates, corrected, with the residual (rad) that each leaves when flown."""
+    """Most promising candidates, corrected, with the flown residual (rad) of each."""
     candidates = sorted(
         (candidate for a in channels for b in channels for candidate in _candidates(spacecraft, a, b, options.literal)),
         key=lambda candidate: (candidate.short, candidate.cost),
@@ -225,7 +225,7 @@ def _shortlist(
         yield _corrected(spacecraft, candidate, options.literal)
 
 
-def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
+def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
     schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
     if not literal:
@@ -234,7 +234,7 @@ def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> t
     return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _remark(spacecraft: Spacecraft, candidate: Candidate, schedule: Schedule) -> tuple[str, ...]:
+def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[str, ...]:
     inertia = spacecraft.inertia
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     first, second = schedule.pulses
@@ -250,7 +250,7 @@ def _remark(spacecraft: Spacecraft, candidate: Candidate, schedule: Schedule) ->
     return (text,)
 
 
-def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[Candidate]:
+def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
     inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
     A, C, a, spin = inertia.A, inertia.C, inertia.a, spacecraft.spin
@@ -310,7 +310,7 @@ def _place(
     wait: float,
     miss: float,
     literal: bool,
-) -> Candidate | None:
+) -> HalfPulseCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
     windows, a, spin = Windows(spacecraft), spacecraft.inertia.a, spacecraft.spin
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
@@ -347,7 +347,7 @@ def _place(
             pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
             schedule = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return Candidate(
+            return HalfPulseCandidate(
                 short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
             )
         first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
@@ -355,7 +355,7 @@ def _place(
 
 
 def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
-    """What a pulse of ``on_time`` s is off the effective impulse ``needed`` N m s, over all that the nutation needs."""
+    """Deficit of a pulse of ``on_time`` s against the impulse ``needed`` N m s, over that for all nutation."""
     rate = channel.axial / spacecraft.inertia.C
     width = response.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
     return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
@@ -372,7 +372,7 @@ def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
 
 
 def _grown(spacecraft: Spacecraft, time: float) -> float:
-    """By what factor dissipation changes the transverse rate until ``time`` s."""
+    """Factor of dissipation on the transverse rate until ``time`` s."""
     if spacecraft.growth == 0.0:
         return 1.0
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()

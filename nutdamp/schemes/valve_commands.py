@@ -1,9 +1,9 @@
-"""Plans through valves: schemes lay rectangular pulses, and here they become the commands that give them.
+"""Valve commands: translation of rectangular pulses into commands of valves.
 
-What a command gives is known by its effective on-time and the centroid of its thrust (`thruster`). So schemes plan
+A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes plan
 for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
 limits that leave room for the delays. Each of its pulses becomes the command with the same impulse and centroid, cold
-and blowdown included; what the shape of the thrust changes besides is corrected on the flown motion.
+and blowdown included; further effects of the shape of the thrust are corrected on the flown motion.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ PLANS = 6
 def plain(
     spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
 ) -> Spacecraft:
-    """The body that schemes plan for: rectangles of full thrust at any time, that the channels can really give.
+    """Body that schemes plan for: rectangles of full thrust within the capability of the channels.
 
     Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
     ``room`` s longer at either end. Its moments are those with so many kg ``used``.
@@ -73,7 +73,7 @@ def plain(
 
 
 def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
-    """How long before and after the rectangle a command and its thrust may last, s, whichever the channel."""
+    """Longest extension of a command and its thrust before and after the rectangle, s, over all channels."""
     reaches = [
         channel.valve.reaches(*effective_on_times(channel))
         for channel in spacecraft.channels
@@ -89,7 +89,7 @@ def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: 
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
-    """The options of a scheme for the plain body: an on-time that is requested is a command.
+    """Options of a scheme for the plain body: a requested on-time is a command.
 
     Raises Infeasible where the channels make different pulses of it.
     """
@@ -109,7 +109,7 @@ def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
 
 
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction) -> Schedule:
-    """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
+    """Schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
@@ -156,7 +156,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
 
 
 def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
-    """What a schedule leaves of what counts, rad."""
+    """Residual of the bounded parts of a schedule, rad."""
     missed = misses(spacecraft, schedule)
     return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
@@ -192,7 +192,7 @@ def as_commands(
 def _weakened(
     spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
 ) -> Iterator[str]:
-    """What falling pressure and cold nozzles make of a plan, in words; ``pairs`` of its pulses and their commands."""
+    """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
     if correct.equal and pairs:
         yield from _unequal(pairs)
     tank = spacecraft.tank
@@ -205,7 +205,7 @@ def _weakened(
 
 
 def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
-    """What equal pulses of a plan, the last ones, are as commands where those differ, in words."""
+    """Note on the last equal pulses of a plan whose commands differ."""
     last = pairs[-1][0].on_time
     alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
     shortest, longest = (f"{extreme(alike, default=0.0):.4g}" for extreme in (min, max))
@@ -217,14 +217,14 @@ def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
 
 
 def _firing(schedule: Schedule) -> Schedule:
-    """The schedule without pulses of no impulse."""
+    """Schedule without pulses of no impulse."""
     return replace(schedule, pulses=tuple(pulse for pulse in schedule if pulse.magnitude > 0.0))
 
 
 def _translated(
     spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia | None, correct: Correction, *, unbounded: bool = False
 ) -> tuple[Pulse, ...]:
-    """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
+    """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
     H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
@@ -283,7 +283,7 @@ def _outside(
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """The schedule on the ticks of its commands.
+    """Schedule on the ticks of its commands.
 
     It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves
     less is taken.
@@ -292,7 +292,7 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Sc
     made = correct(smooth, made, TAIL)
 
     def rounded(schedule: Schedule, count: int) -> Schedule:
-        """With the first ``count`` pulses on ticks."""
+        """Copy with the first ``count`` pulses on ticks."""
         pulses = (commandable(spacecraft, pulse) if index < count else pulse for index, pulse in enumerate(schedule))
         return replace(schedule, pulses=supplied(spacecraft, pulses))
 

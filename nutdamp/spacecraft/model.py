@@ -22,7 +22,7 @@ from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import Cones
+from nutdamp.physics.body import ConeAngles
 from nutdamp.physics.thruster import Cold as Cold
 from nutdamp.physics.thruster import Tank as Tank
 from nutdamp.physics.triaxial import arc_cones
@@ -244,7 +244,7 @@ class SpinState:
         return np.array([self.omega.real, self.omega.imag, self.spin])
 
 
-class Source(Protocol):
+class SourceFile(Protocol):
     """Origin of a spacecraft: its file."""
 
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
@@ -287,7 +287,7 @@ class Spacecraft(results.Data, results.Shown):
     cold: Cold | None = None
     tank: Tank | None = None
     loop: Loop | None = None
-    source: Source | None = field(default=None, init=False)
+    source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
         """Spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
@@ -434,7 +434,7 @@ class Spacecraft(results.Data, results.Shown):
             return None
 
     @cached_property
-    def widest(self) -> Cones:
+    def widest(self) -> ConeAngles:
         """Cone angles at the largest nutation of the free motion from t = 0; constant with I1 = I2."""
         return arc_cones(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin))
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, Budget, Held
+from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.views.plan_json import heading
 
@@ -29,7 +29,7 @@ HEADER = (
 )
 
 
-def _numbers(held: Held) -> tuple[float | None, ...]:
+def _numbers(held: HeldNutation) -> tuple[float | None, ...]:
     """The numbers of a row."""
     cycle, band = held.cycle, held.band
     made: tuple[float | None, ...] = (None,) * 9
@@ -42,7 +42,7 @@ def _numbers(held: Held) -> tuple[float | None, ...]:
     return (*map(math.degrees, held.thresholds), held.begins, *made, *bounds, lasts)
 
 
-def _other(held: Held) -> dict[str, float | None] | None:
+def _other(held: HeldNutation) -> dict[str, float | None] | None:
     """The second limit cycle, where there is one."""
     if held.other is None:
         return None
@@ -50,13 +50,13 @@ def _other(held: Held) -> dict[str, float | None] | None:
     return {name: made[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
 
 
-def budget_csv(found: Budget) -> str:
+def budget_csv(found: HoldingBudget) -> str:
     """One row for each two thresholds; what is not known stays empty."""
     rows = ([*(number(value) for value in _numbers(one)), truth(one.meets_requirement), one.why] for one in found.held)
     return csv_text((*HEADER, "meets_requirement", "why"), rows)
 
 
-def budget_json(found: Budget) -> dict[str, Any]:
+def budget_json(found: HoldingBudget) -> dict[str, Any]:
     """How the nutation grows, and every row."""
     body = found.spacecraft
     return {

@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.control_loop.limit_cycle import DAY, NOISY, WIDENED, YEAR, Budget, Cycle, Held
+from nutdamp.control_loop.limit_cycle import DAY, NOISY, WIDENED, YEAR, Cycle, HeldNutation, HoldingBudget
 from nutdamp.views.layout import columns, facts
 from nutdamp.views.loop_tables import described, warnings
 from nutdamp.views.plan_tables import header
@@ -20,7 +20,7 @@ SLOW = 0.1
 """Share of its spin by which a year may change it before figures of the present spin mislead."""
 
 
-def budget_screen(found: Budget) -> RenderableType:
+def budget_screen(found: HoldingBudget) -> RenderableType:
     """Everything that ``budget`` shows."""
     body = found.spacecraft
     parts: list[RenderableType] = [header(body), Text()]
@@ -33,7 +33,7 @@ def budget_screen(found: Budget) -> RenderableType:
     return Group(*parts)
 
 
-def _outlook(found: Budget) -> Iterator[str]:
+def _outlook(found: HoldingBudget) -> Iterator[str]:
     """What the nutation does by itself, and when damping must begin."""
     body, limit = found.spacecraft, found.largest
     now = degrees(body.nutation)
@@ -58,12 +58,12 @@ def _outlook(found: Budget) -> Iterator[str]:
         yield "Pulses a day and propellant a year need a closed loop: the key loop of the file (nutdamp explain loop)."
 
 
-def _falls(found: Budget, limit: float) -> str:
+def _falls(found: HoldingBudget, limit: float) -> str:
     time = found.until_largest
     return f"; it is below {most(limit)}" + (" already" if time == 0.0 else f" in {lasting(time)}")
 
 
-def _warnings(found: Budget) -> Iterator[str]:
+def _warnings(found: HoldingBudget) -> Iterator[str]:
     """What of each pair of thresholds wastes propellant, of the present spin, and why there is no limit cycle."""
     body, seen = found.spacecraft, set()
     for one in found.held:
@@ -104,11 +104,11 @@ def _second(cycle: Cycle, other: Cycle) -> str:
     return f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
 
 
-def _pair(one: Held) -> str:
+def _pair(one: HeldNutation) -> str:
     return f"{most(one.thresholds.start)} to {most(one.thresholds.stop)}"
 
 
-def _table(found: Budget) -> Table:
+def _table(found: HoldingBudget) -> Table:
     """A row for each two thresholds."""
     tank, required = found.spacecraft.tank is not None, found.meets_requirement is not None
     names = [
@@ -142,7 +142,7 @@ def _days(time: float | None) -> str:
     return quantity(None if time is None else time / DAY, "").strip()
 
 
-def _notes(found: Budget) -> Table:
+def _notes(found: HoldingBudget) -> Table:
     """What bounds the limit cycle, and how well the figures are known."""
     table = facts()
     band = next((one.band for one in found.held if one.band is not None), None)

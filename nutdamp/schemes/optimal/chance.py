@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.schemes.optimal import highs
-from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Columns, Program, alone, burns
+from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
 from nutdamp.spacecraft.model import Vector
 
 Complex = NDArray[np.complex128]
 
 KINDS = ("nutation", "shift", "spin")
-"""What may be left, see `Limit`."""
+"""What may be left, see `ChanceLimit`."""
 
 TURNS = 100_000
 """More than there are turns in a horizon: pulses are numbered by channel and turn."""
@@ -58,7 +58,7 @@ class Uncertain:
     less: Vector
 
 
-class Limit(NamedTuple):
+class ChanceLimit(NamedTuple):
     """The most that may be left, N m s, of equation ``kind``: 0 nutation, 1 shift, 2 spin."""
 
     kind: int
@@ -71,7 +71,7 @@ class Tangent(NamedTuple):
     ``own`` begins with the number of the pulse, see `ChanceModel.pulse`.
     """
 
-    limit: Limit
+    limit: ChanceLimit
     u: complex
     shared: Vector
     own: Vector
@@ -105,7 +105,7 @@ class Weights(NamedTuple):
 class ChanceModel:
     """The cones of a ``program`` of small angles; ``goal`` (5,) N m s is what firing is to add."""
 
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[Limit, ...], goal: Vector) -> None:
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.uncertain, self.limits = program, uncertain, limits
         body = program.spacecraft
         self.pace = np.array([body.inertia.a * body.spin, body.spin])
@@ -118,11 +118,11 @@ class ChanceModel:
         turn = np.floor((times - self.program.spacecraft.limits.earliest) / self.turn).astype(int)
         return np.asarray(np.maximum(turn, 0))
 
-    def pulse(self, columns: Columns) -> NDArray[np.int_]:
+    def pulse(self, columns: ProgramColumns) -> NDArray[np.int_]:
         """Number of the pulse to which each column belongs: those of one channel within one turn are one."""
         return np.asarray(columns.channel * TURNS + self.turn_of(columns.t))
 
-    def turns(self, kind: int, columns: Columns) -> Complex:
+    def turns(self, kind: int, columns: ProgramColumns) -> Complex:
         """What one unit of torque in each column (n,) does, before any dispersion: turned back, and lost to widths."""
         if kind == 2:
             return np.ones(len(columns.t), dtype=complex)
@@ -152,12 +152,12 @@ class ChanceModel:
         inputs = self.uncertain
         return inputs.spin.astype(complex) if kind == 2 else inputs.begin[kind] + inputs.less * self.goal[kind]
 
-    def plain(self, limit: Limit, u: complex) -> Tangent:
+    def plain(self, limit: ChanceLimit, u: complex) -> Tangent:
         """The tangent in a direction that knows of no dispersion."""
         count = len(self.uncertain.own)
         return Tangent(limit, complex(u), np.zeros(count), np.zeros((0, 1 + count)))
 
-    def row(self, tangent: Tangent, columns: Columns, margin: float) -> Vector:
+    def row(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """What a second of each column adds to a tangent, N m, (n,)."""
         kind = tangent.limit.kind
         effects, changes = self.effects(kind)
@@ -180,12 +180,12 @@ class ChanceModel:
         taken = (np.conj(tangent.u) * (margin * self.start(kind) @ tangent.shared - self.goal[kind])).real
         return float(tangent.limit.most - taken)
 
-    def left(self, columns: Columns, on_times: Vector) -> Complex:
+    def left(self, columns: ProgramColumns, on_times: Vector) -> Complex:
         """What is left of nutation, shift and spin, (3,) N m s."""
         each = [self.turns(kind, columns) * self.effects(kind)[0][columns.channel] @ on_times for kind in range(3)]
         return np.asarray(np.array(each, dtype=np.complex128) - self.goal)
 
-    def spread(self, kind: int, columns: Columns, on_times: Vector) -> Spread:
+    def spread(self, kind: int, columns: ProgramColumns, on_times: Vector) -> Spread:
         """What one sigma of each input leaves, N m s, after columns have been on for ``on_times`` (n,) s."""
         shared = ~self.uncertain.own
         effect, changed = (part[columns.channel] for part in self.effects(kind))
@@ -253,7 +253,7 @@ class Sure(NamedTuple):
 class ChanceProgram:
     """The program of margins for the channels and slots of a ``program`` of small angles."""
 
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[Limit, ...], goal: Vector) -> None:
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.limits = program, limits
         self.model = ChanceModel(program, uncertain, limits, goal)
         self.scale = max(float(np.linalg.norm(goal)), max(limit.most for limit in limits))
@@ -301,15 +301,15 @@ class ChanceProgram:
             np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
         )
 
-    def _on_times(self, columns: Columns, amounts: Vector) -> Vector:
+    def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
         """On-times (n,) s of amounts in units, without rounding."""
         return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
 
-    def _coefficients(self, tangent: Tangent, columns: Columns, margin: float) -> Vector:
+    def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Of a tangent, for one unit of each column, over the scale."""
         return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
-    def _broken(self, columns: Columns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
+    def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
@@ -317,7 +317,7 @@ class ChanceProgram:
         for limit in self.limits:
             spread = self.model.spread(limit.kind, columns, on_times)
 
-            def passed(directions: Complex, limit: Limit = limit, spread: Spread = spread) -> Vector:
+            def passed(directions: Complex, limit: ChanceLimit = limit, spread: Spread = spread) -> Vector:
                 along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
                 return np.asarray(along - (1.0 + excess + TIGHT) * limit.most)
 
@@ -331,7 +331,7 @@ class ChanceProgram:
                 tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
         return tangents
 
-    def _begin(self) -> Columns:
+    def _begin(self) -> ProgramColumns:
         """Columns to begin with: those that pull along the goal, or back."""
         model = self.model
         toward = np.conj(model.goal[0] or model.goal[1] or 1.0)
@@ -341,20 +341,20 @@ class ChanceProgram:
         some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
         return self._slots(channel[some], slot[some])
 
-    def _all(self, channel: int = 0) -> Columns:
+    def _all(self, channel: int = 0) -> ProgramColumns:
         centres = self.program.centres
         width = 0.0 if self.strong[channel] else self.program.width
         return alone(np.full(len(centres), channel), centres, np.full(len(centres), width))
 
-    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
+    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], np.where(self.strong[channel], 0.0, self.program.width))
 
-    def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: Columns, margin: float) -> None:
+    def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
         rows = np.array([self._coefficients(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
 
-    def _priced(self, tangents: list[Tangent], shadows: Vector, taken: Columns, margin: float) -> Columns:
+    def _priced(self, tangents: list[Tangent], shadows: Vector, taken: ProgramColumns, margin: float) -> ProgramColumns:
         """Slots that would lower the cost, the best; of channels that act at once the best moments too."""
         cost = self.cost / self.dearest
         active = [(tangent, price) for tangent, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
@@ -384,6 +384,6 @@ class ChanceProgram:
         return self._kept[kind, channel]
 
 
-def directions_of(limit: Limit, count: int) -> Complex:
+def directions_of(limit: ChanceLimit, count: int) -> Complex:
     """Unit vectors (n,), ``count`` or the two that there are, in which a limit is looked at."""
     return np.array([1.0, -1.0], dtype=complex) if limit.kind == 2 else np.exp(2j * np.pi * np.arange(count) / count)

@@ -22,7 +22,7 @@ from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds, refinement
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.refinement import Equations
+from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, rounded_off, usable
 from nutdamp.spacecraft.equipment import Channel
@@ -194,7 +194,7 @@ class Problem:
         self.channels = tuple(at_hand(spacecraft, usable(spacecraft, axial=requested)))
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
-        self.equations = Equations(shift=not options.free_axis, spin=requested)
+        self.equations = EndEquations(shift=not options.free_axis, spin=requested)
         flows = [channel.mass_flow for channel in self.channels]
         known = [flow for flow in flows if flow is not None]
         if options.least != "impulse" and len(known) == len(flows):
@@ -213,7 +213,7 @@ class Problem:
         """Whether the motion between pulses is that of a symmetric body left alone."""
         return self._dynamics.free and self.spacecraft.growth == 0.0
 
-    def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
+    def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
         aim = refinement.small_angles(body, equations)
@@ -263,7 +263,7 @@ class Problem:
 
     def _keeping(self) -> float | None:
         """The first-order least cost of a schedule that keeps H; None where there is none."""
-        program = self.program(equations=Equations(shift=True, spin=self.equations.spin))
+        program = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
         solution = program.solve()
         return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
 
@@ -351,11 +351,14 @@ class Problem:
         """Why the program has no solution, and which limit to relax; ``long_enough``: see `relaxed`."""
         body = self.spacecraft
         names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
-        nutation = Equations(shift=False)
+        nutation = EndEquations(shift=False)
         left = self.program(body, nutation).solve().unmet
         if left <= UNMET:
             failing = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
-            if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
+            if (
+                self.equations.spin
+                and self.program(body, EndEquations(shift=self.equations.shift)).solve().unmet <= UNMET
+            ):
                 failing = "the spin cannot be brought to the rate of the goal"
             out = "the nutation can be taken out, but " if body.transverse_rate > 0.0 else ""
             what = f"within {horizon:.4g} s {out}{failing}"

@@ -49,7 +49,7 @@ KNOTS = 400
 
 
 @dataclass(frozen=True, slots=True)
-class Equations:
+class EndEquations:
     """Which of the five are requested; the nutation always is."""
 
     shift: bool = True
@@ -99,7 +99,7 @@ def growth_from(spacecraft: Spacecraft) -> float:
     return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
 
 
-def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
+def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
 
     What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
@@ -123,7 +123,7 @@ def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
 
-def along(flight: Flight, equations: Equations, step: float) -> Influence:
+def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
     """The equations about a flight, at its true angles: what its pulses add, less what it leaves, is the goal.
 
     That a firing also turns the body under the pulses that follow is neglected; ``step`` s is for `Influence.of`.
@@ -140,7 +140,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
     return Influence(rows, here.of(flight.schedule, step) - misses(flight, equations), here.turning)
 
 
-def misses(flight: Flight, equations: Equations) -> Vector:
+def misses(flight: Flight, equations: EndEquations) -> Vector:
     """What a flight leaves of the equations, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
@@ -243,7 +243,7 @@ class PulseParameters:
         )
         return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
 
-    def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: Equations, step: float) -> Vector:
+    def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: EndEquations, step: float) -> Vector:
         """What the scaled parameters change in the equations, (equations, 2k) N m s."""
         rows = along(flown, equations, step).rows
         columns = []
@@ -352,7 +352,7 @@ NEWTON_STEPS = 25
 def refine(
     spacecraft: Spacecraft,
     schedule: Schedule,
-    equations: Equations,
+    equations: EndEquations,
     aside: Vector,
     step: float,
     fly: Callable[[Schedule], Flight],

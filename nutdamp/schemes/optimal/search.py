@@ -302,7 +302,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
-    search = _Search(_before_it_fades(spacecraft), options)
+    search = _LeastCostSearch(_before_it_fades(spacecraft), options)
     simple = list(schedules(search.spacecraft, search.flown))
     if simple and options.least == "pulses":
         return search.with_bounds(search.preferred(simple))
@@ -327,7 +327,7 @@ def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
     return replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
 
 
-def _fewest(search: _Search) -> Schedule:
+def _fewest(search: _LeastCostSearch) -> Schedule:
     """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
     from nutdamp.schemes import one_pulse, two_pulse
 
@@ -345,7 +345,7 @@ def _fewest(search: _Search) -> Schedule:
     return search.schedule()
 
 
-class _Found(NamedTuple):
+class _FlownSchedule(NamedTuple):
     """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
 
     left: float
@@ -353,7 +353,7 @@ class _Found(NamedTuple):
     made: Schedule
 
 
-class _Search(Problem):
+class _LeastCostSearch(Problem):
     """The search for the cheapest schedule."""
 
     def soonest(self) -> Schedule:
@@ -365,11 +365,11 @@ class _Search(Problem):
         if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
             return self.with_bounds(early)
         try:
-            return self.preferred([early, _Search(body, self.options).sooner().schedule()])
+            return self.preferred([early, _LeastCostSearch(body, self.options).sooner().schedule()])
         except Infeasible:
             return self.with_bounds(early)
 
-    def sooner(self) -> _Search:
+    def sooner(self) -> _LeastCostSearch:
         """The same search with the shortest horizon in which a schedule is found."""
         begin, horizon = self.spacecraft.limits.earliest, self.spacecraft.horizon
         if not self.feasible(horizon):
@@ -380,16 +380,16 @@ class _Search(Problem):
             end = begin + span * (1.0 + margin)
             if end >= horizon:
                 break
-            if _Search(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).found():
                 high = end
                 break
             low = end
-        if high == horizon and not _Search(self.within(horizon), self.options).found():
+        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).found():
             return self  # shorter ones are looked at on the way to a schedule
         while high - low > SHARP * high:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)
-        return _Search(self.within(high), self.options)
+            low, high = (low, middle) if _LeastCostSearch(self.within(middle), self.options).found() else (middle, high)
+        return _LeastCostSearch(self.within(high), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
         """Of schedules that all do what is required that with least of what is to be saved.
@@ -411,7 +411,7 @@ class _Search(Problem):
         """Why the program has no solution, and what would do: each cure that is named was tried, or says that not."""
         goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
-        freed = bound and not work.exhausted() and _Search(self.spacecraft, free).found()
+        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).found()
         return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
 
     def long_enough(self, needed: float) -> float | None:
@@ -423,7 +423,7 @@ class _Search(Problem):
             if work.exhausted():
                 return None
             end = float(f"{needed * (1.0 + margin):.4g}")
-            if _Search(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).found():
                 return end
         return None
 
@@ -438,21 +438,21 @@ class _Search(Problem):
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
-            kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
+            kept = _LeastCostSearch(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             still = kept.whole_or_shorter(kept.program().solve())
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
 
-    def without(self, overtaxed: dict[str, float]) -> _Search:
+    def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
         """The search without channels whose pulses are too short to do what is asked of them.
 
         Raises Infeasible, naming the limit, where there are no others.
         """
         others = tuple(channel for channel in self.spacecraft.channels if channel.name not in overtaxed)
         try:
-            return _Search(replace(self.spacecraft, channels=others), self.options)
+            return _LeastCostSearch(replace(self.spacecraft, channels=others), self.options)
         except Infeasible:
             # Of opposite channels one program asks this one and another one that one for the same: their sum is told.
             longest = max(channel.max_on_time for channel in self.channels if channel.name in overtaxed)
@@ -472,7 +472,7 @@ class _Search(Problem):
 
     def within_shorter(self, horizon: float) -> Schedule | None:
         """The cheapest schedule found within ``horizon`` s."""
-        shorter = _Search(self.within(horizon), self.options)
+        shorter = _LeastCostSearch(self.within(horizon), self.options)
         return shorter.cheapest(shorter.program().solve())
 
     @property
@@ -536,7 +536,7 @@ class _Search(Problem):
             halvings += 1
             if best is not None and halvings > HALVINGS:
                 break
-            shorter = _Search(self.within(horizon), self.options)
+            shorter = _LeastCostSearch(self.within(horizon), self.options)
             if not shorter.feasible(horizon):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
@@ -572,14 +572,14 @@ class _Search(Problem):
 
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
-        candidates: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         every = multistart.schedules(self.task(), () if known is None else (known,))
         if self.spacecraft.limits.tick is not None:
             every = [self.on_ticks(schedule) for schedule in every[:WAYS]]
         for schedule in every:
             left = self.left(self.flown(schedule))
             if keeps_limits(self.spacecraft, schedule.pulses):
-                candidates.append(_Found(0.0 if left <= LEFT else left, self.worth(schedule), schedule))
+                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.worth(schedule), schedule))
         return self.best(candidates)
 
     def on_ticks(self, schedule: Schedule) -> Schedule:
@@ -593,7 +593,7 @@ class _Search(Problem):
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
         program = self.program()
         program.haste = HASTE
-        candidates: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         for _ in range(CHOICES):
             if work.exhausted():
                 break
@@ -611,7 +611,7 @@ class _Search(Problem):
     def others(self, least: float) -> Schedule | None:
         """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
         names = {channel.name: channel for channel in self.channels}
-        candidates: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         flights: list[Flight] = []
         for schedule in by_other_schemes(self.spacecraft, shift=self.equations.shift):
             flights.append(self.flown(Schedule(schedule.pulses)))
@@ -619,7 +619,7 @@ class _Search(Problem):
                 break
         for way in sorted(flights, key=lambda flight: (self.left(flight) > LEFT, self.price(flight.schedule)))[:WAYS]:
             left = self.left(way)
-            candidates.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
             if work.exhausted():
                 continue
             program = self.program()
@@ -628,9 +628,9 @@ class _Search(Problem):
             candidates += self.corrected(program, program.solve(program.about(burns)), least)
         return self.best(candidates)
 
-    def corrected(self, program: Program, solution: Solution, least: float) -> list[_Found]:
+    def corrected(self, program: Program, solution: Solution, least: float) -> list[_FlownSchedule]:
         """Schedules from the burns of a solution, corrected along one flight after the other, unless they get lost."""
-        candidates: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         last = math.inf
         for turn in range(AIMS):
             if solution.unmet > LOST or not solution.burns or work.exhausted():
@@ -646,14 +646,14 @@ class _Search(Problem):
                 aside = self.equations.beside(solution.off)
                 schedule = refine(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
                 left, price = self.left(self.flown(schedule)), self.price(schedule)
-                candidates.append(_Found(0.0 if left <= LEFT else left, price, schedule))
+                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, price, schedule))
                 if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
                     break
                 last = price if left <= LEFT else math.inf
             solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
         return candidates
 
-    def best(self, candidates: list[_Found]) -> Schedule | None:
+    def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
         """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
 
         All that leave up to `DAMPED_ANGLE` leave as little.

@@ -28,7 +28,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
 from nutdamp.schemes.catalogue import Options
-from nutdamp.schemes.command_block import FLOWN, Flown, Found, Search
+from nutdamp.schemes.command_block import FLOWN, BlockSequence, FlownSequence, Search
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Block, Commands, SunSensor
@@ -137,7 +137,7 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     search = Search(body, usable(body), body.commands)
 
     def shares() -> Iterator[float]:
-        single = search._single(Found((), search.model.start, (math.inf,) * 3))
+        single = search._single(BlockSequence((), search.model.start, (math.inf,) * 3))
         for found in sorted(single, key=lambda one: one.share)[:200]:
             with suppress(Infeasible):
                 yield search.flown(found).rank[1]
@@ -158,7 +158,7 @@ def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(mo
     assert plan.severity <= single.severity
     severities, flown = list[float](), Search.flown
 
-    def counted(self: Search, found: Found) -> Flown:
+    def counted(self: Search, found: BlockSequence) -> FlownSequence:
         severities.append(flown(self, found).rank[1])
         return flown(self, found)
 
