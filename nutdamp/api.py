@@ -225,7 +225,7 @@ class Verified:
 class Budget:
     """Cost of holding the nutation against energy dissipation; ``core`` holds a row for each pair of thresholds."""
 
-    core: limit_cycle.Budget
+    core: limit_cycle.HoldingBudget
 
     def to_dict(self) -> dict[str, Any]:
         """The object of ``budget --json``."""

@@ -22,7 +22,7 @@ import click
 
 from nutdamp.cli.options import FILE, NameType
 from nutdamp.cli.screen import say, show
-from nutdamp.common.work import Watch, watched
+from nutdamp.common.work import BudgetMonitor, watched
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
 class _Doing:
     """Text of ``what`` is under way, with the search that a ``watch`` sees and its progress when shown."""
 
-    def __init__(self, what: str, watch: Watch) -> None:
+    def __init__(self, what: str, watch: BudgetMonitor) -> None:
         self.what, self.watch = what, watch
 
     def __rich__(self) -> str:

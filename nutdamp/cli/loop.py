@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.control_loop.evaluation import LoopPlan
-    from nutdamp.control_loop.limit_cycle import Budget
+    from nutdamp.control_loop.limit_cycle import HoldingBudget
 
 
 @click.command("loop")
@@ -156,7 +156,7 @@ def budget_command(
     leave(infeasible=not core.feasible, missed=core.meets_requirement is False)
 
 
-def _budget_picture(core: Budget) -> Figure:
+def _budget_picture(core: HoldingBudget) -> Figure:
     from nutdamp.figures.budget import budget_figure
 
     return budget_figure(core)

@@ -17,7 +17,7 @@ from click.shell_completion import CompletionItem
 
 from nutdamp.cli.screen import debug_option
 from nutdamp.errors import SenselessOption, nearest
-from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, Kind, Options, SchemeOptions, names_of
+from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, SchemeOptions, names_of
 
 if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -327,7 +327,7 @@ def scheme_options(command: Command) -> Command:
 
     wrapped: Any = gathered
     for name, field, schemes in reversed(list(_fields())):
-        kind: Kind = field.metadata["kind"]
+        kind: OptionKind = field.metadata["kind"]
         settings: dict[str, Any] = {"is_flag": True} if kind.flag else {"type": _type(kind), "default": field.default}
         if field.default is not None and not kind.flag:
             settings["show_default"] = True
@@ -354,7 +354,7 @@ def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:
         yield name, field, schemes
 
 
-def _type(kind: Kind) -> click.ParamType[Any]:
+def _type(kind: OptionKind) -> click.ParamType[Any]:
     if kind.names:
         return NameType(kind.names)
     return COUNT_FROM_ONE if kind.unit is None else UnitType(kind.unit)

@@ -1,4 +1,4 @@
-"""Quadrature, and rounding that is no result: the one place that says which numbers are shown as 0."""
+"""Gauss-Legendre quadrature, and removal of rounding noise from numbers that are shown."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 NOISE = 1e-13
-"""Part of its largest neighbour below which a component of a vector is rounding."""
+"""Part of the largest component below which another component of a vector counts as rounding."""
 
 SAME_ANGLE = 1e-11
-"""rad; angles that differ by less count as equal, and a direction this near a pole has no longitude."""
+"""rad; angles closer than this count as equal, and a direction this near a pole has no longitude."""
 
 
 @functools.cache
@@ -24,19 +24,19 @@ def gauss_legendre(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def cleaned(vectors: ArrayLike) -> NDArray[np.float64]:
-    """Vectors (..., n) with 0 for components that are rounding beside the largest one, and for -0."""
+    """Vectors (..., n) with 0 for components that are rounding beside the largest, and for -0."""
     values = np.asarray(vectors, dtype=float)
     largest = np.abs(values).max(axis=-1, keepdims=True, initial=0.0)
     return np.where(np.abs(values) < NOISE * largest, 0.0, values) + 0.0
 
 
 def cleaned_change(change: float, whole: float) -> float:
-    """A difference of two numbers of the size of ``whole``; 0 where it is rounding beside them."""
+    """Difference of two numbers of the size of ``whole``; 0 where it is rounding beside them."""
     return float(cleaned([change, whole])[0])
 
 
 def finite(data: dict[str, Any]) -> dict[str, Any]:
-    """The data with numbers that are not finite as None."""
+    """Data with None for numbers that are not finite."""
     return {key: _finite(entry) for key, entry in data.items()}
 
 

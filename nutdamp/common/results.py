@@ -1,7 +1,7 @@
-"""What files and screens make of results: declared here, below them all, and written in `nutdamp.page.results`.
+"""Public interface of results (to_dict, to_csv, figure ...), implemented per type in `nutdamp.page.results`.
 
-So a `Plan` writes itself as CSV although its module knows no files. What is written there is in place as soon as a
-public name of `nutdamp` is used; without it these functions raise TypeError.
+A `Plan` thus writes itself as CSV although its module knows no files. The implementations are registered as soon as a
+public name of `nutdamp` is used; without them these functions raise TypeError.
 """
 
 from __future__ import annotations
@@ -22,54 +22,54 @@ if TYPE_CHECKING:
 
 
 Table = NDArray[np.void]
-"""A structured array: one row a pulse or a sample, fields named as the columns of the CSV files."""
+"""Structured array: one row per pulse or sample, fields named as the columns of the CSV files."""
 
 
 @singledispatch
 def data(result: object) -> dict[str, Any]:
-    """What JSON files say of it."""
+    """Contents of the JSON file."""
     raise _missing(result)
 
 
 @singledispatch
 def table(result: object) -> Table:
-    """Its rows."""
+    """Rows of the CSV file."""
     raise _missing(result)
 
 
 @singledispatch
 def write_csv(result: object, path: str | PathLike[str]) -> None:  # noqa: ARG001
-    """Write its rows."""
+    """Write the rows as CSV."""
     raise _missing(result)
 
 
 @singledispatch
 def html(result: object) -> str | None:
-    """A small table, as notebooks show it; None without the extra plot, so that they show a line."""
+    """Small HTML table for notebooks; None without the extra plot, so that they show a line."""
     raise _missing(result)
 
 
 @singledispatch
 def figure(result: object, name: str | None) -> Figure:  # noqa: ARG001
-    """A picture of it."""
+    """Figure called ``name``."""
     raise _missing(result)
 
 
 @singledispatch
 def sentences(result: object) -> tuple[str, ...]:
-    """What a reader should know of it."""
+    """Notes for the reader."""
     raise _missing(result)
 
 
 @singledispatch
 def reason(result: object) -> str:
-    """Why it is so."""
+    """Reason for the outcome."""
     raise _missing(result)
 
 
 @singledispatch
 def line(result: object) -> str:
-    """It in one line."""
+    """Summary in one line."""
     return object.__repr__(result)
 
 
@@ -78,7 +78,7 @@ def _missing(result: object) -> TypeError:
 
 
 class Shown:
-    """A result that shows itself at a prompt and in notebooks."""
+    """Mixin of results that show themselves at a prompt and in notebooks."""
 
     def __repr__(self) -> str:
         return line(self)
@@ -88,15 +88,15 @@ class Shown:
 
 
 class Data:
-    """A result that JSON files hold."""
+    """Mixin of results that are written as JSON."""
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``plan --json`` gives, or says of it."""
+        """Contents of the file that ``plan --json`` writes, or the part of it that holds this result."""
         return finite(data(self))
 
 
 class Tabled(Shown):
-    """A result that has rows."""
+    """Mixin of results with rows."""
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
@@ -106,7 +106,7 @@ class Tabled(Shown):
         write_csv(self, path)
 
     def figure(self, name: str | None = None) -> Figure:
-        """A matplotlib figure: of a comparison ``schemes``, else ``overview``, the default, or one of the motion.
+        """Matplotlib figure: of a comparison ``schemes``, else ``overview`` (the default) or one of the motion.
 
         That is ``motion``, ``sphere``, ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra
         without matplotlib, Infeasible for a plan without a schedule.
@@ -114,7 +114,7 @@ class Tabled(Shown):
         return figure(self, name)
 
     def to_numpy(self) -> Table:
-        """The rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
+        """Rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
         return table(self)
 
     def to_pandas(self) -> DataFrame:

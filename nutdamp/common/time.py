@@ -1,4 +1,4 @@
-"""Moments of UTC, exact: leap seconds are counted, and nothing is rounded before it is written."""
+"""UTC epochs, exact: leap seconds are counted, and nothing is rounded before it is written."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ LEAP_DAYS = tuple(
         *((1994, 1), (1995, 2), (1997, 1), (1998, 2), (2005, 2), (2008, 2), (2012, 1), (2015, 1), (2016, 2)),
     )
 )
-"""Days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since, and none was taken out."""
+"""Ordinals of the days that ended with 23:59:60 (IERS, Bulletin C); none has been announced since 2016."""
 
 FIRST_DAY = datetime.date(1972, 1, 1).toordinal()
-"""UTC has whole leap seconds from here on; before, its seconds were of another length."""
+"""Ordinal of the first day of UTC with whole leap seconds; before it the UTC second had another length."""
 
 DIGITS = 9
-"""Digits of a second that are written: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond."""
+"""Digits of a second in texts: at 60 rpm a body turns by less than 1e-6 deg in a nanosecond."""
 
 _J2000 = Fraction(883_655_957_816, 1000)
 """Seconds from 1972-01-01T00:00:00 UTC, which was 00:00:42.184 TT, to 2000-01-01T12:00:00 TT."""
@@ -40,35 +40,35 @@ UNIFORM = {
     "TT": Fraction(42_184, 1000),
     "TDB": Fraction(42_184, 1000),
 }
-"""Times without leap seconds, and what their clocks showed, s, at 1972-01-01T00:00:00 UTC; GPS as if it had run."""
+"""Time systems without leap seconds, and their clock reading, s, at 1972-01-01T00:00:00 UTC; GPS extrapolated."""
 
 
 @dataclass(frozen=True, order=True, slots=True)
 class Epoch:
-    """A moment by the SI seconds since 1972-01-01T00:00:00 UTC."""
+    """Epoch as SI seconds since 1972-01-01T00:00:00 UTC."""
 
     elapsed: Fraction
 
     @classmethod
     def parse(cls, text: str, system: str = "UTC") -> Epoch:
-        """The moment that an ISO 8601 date and time names, with month and day or day of the year; UTC without a zone.
+        """Epoch of an ISO 8601 date and time, with month and day or day of the year; UTC without a zone.
 
         ``system``: UTC, or a time without leap seconds and zones, one of `UNIFORM`. Raises ValueError, which says what
         is wrong.
         """
-        found = _TIME.fullmatch(text)
-        if found is None:
+        match = _TIME.fullmatch(text)
+        if match is None:
             raise ValueError(f"{text!r} is no epoch; expected the form 2026-03-01T12:00:00.000")
         try:
-            day = _day(found)
+            day = _day(match)
         except ValueError as reason:
             raise ValueError(f"{text!r} is no epoch: {reason}") from None
-        hour, minute = int(found["hour"]), int(found["minute"])
-        second = Fraction(found["second"] or "0")
-        east = 60 * int(found["zone_hour"] or "0") + int(found["zone_minute"] or "0")
-        minutes = 60 * hour + minute - (-east if found["sign"] == "-" else east)
+        hour, minute = int(match["hour"]), int(match["minute"])
+        second = Fraction(match["second"] or "0")
+        east = 60 * int(match["zone_hour"] or "0") + int(match["zone_minute"] or "0")
+        minutes = 60 * hour + minute - (-east if match["sign"] == "-" else east)
         day, minutes = day + minutes // 1440, minutes % 1440
-        if system != "UTC" and (found["sign"] or text.endswith("Z")):
+        if system != "UTC" and (match["sign"] or text.endswith("Z")):
             raise ValueError(f"{text!r} has a zone, and {system} has none")
         within = 61 if system == "UTC" and minutes == 1439 and day in LEAP_DAYS else 60
         if hour > 23 or minute > 59 or second >= within:
@@ -79,11 +79,11 @@ class Epoch:
         return cls(elapsed + _leaps_before(day) if system == "UTC" else _of_uniform(elapsed, system))
 
     def plus(self, seconds: float | Fraction) -> Epoch:
-        """The moment so many SI seconds later; exact for the number as it is stored."""
+        """Epoch ``seconds`` SI seconds later; exact for the number as it is stored."""
         return Epoch(self.elapsed + Fraction(seconds))
 
     def since(self, earlier: Epoch) -> float:
-        """SI seconds from another moment to this one."""
+        """SI seconds from the ``earlier`` epoch to this one."""
         return float(self.elapsed - earlier.elapsed)
 
     @property
@@ -93,14 +93,15 @@ class Epoch:
 
     @property
     def text(self) -> str:
-        """``2026-03-01T12:00:00.000000000``: `rounded` to `DIGITS`."""
+        """ISO 8601 text, `rounded` to `DIGITS`: ``2026-03-01T12:00:00.000000000``."""
         return self.rounded(DIGITS)
 
     def rounded(self, digits: int) -> str:
-        """``2026-03-01T12:00:00.000`` for 3 ``digits`` of a second; within a leap second the seconds are 60.
+        """ISO 8601 text with ``digits`` digits of a second: ``2026-03-01T12:00:00.000``; 60 within a leap second.
+        second.
 
-        What rounds up to a whole minute or day is the next one. Raises ValueError after the year 9999, where no such
-        text can be written.
+        Rounding carries over to the next minute or day. Raises ValueError after the year 9999, where no such text can
+        be written.
         """
         day, second, part = self._calendar(digits)
         if day > datetime.date.max.toordinal():
@@ -110,7 +111,7 @@ class Epoch:
         return f"{date}T{clock // 60:02d}:{clock % 60:02d}:{second - 60 * clock:02d}.{part:0{digits}d}"
 
     def _calendar(self, digits: int) -> tuple[int, int, int]:
-        """Day (ordinal), whole second of the day, and the rest in units of the last of so many ``digits``."""
+        """Day (ordinal), whole second of the day, and the rest in units of the last of ``digits`` digits."""
         whole, part = divmod(round(self.elapsed * 10**digits), 10**digits)
         day = FIRST_DAY + whole // 86400
         while 86400 * (day - FIRST_DAY) + _leaps_before(day) > whole:  # the days before were longer
@@ -119,7 +120,7 @@ class Epoch:
 
 
 def _of_uniform(shown: Fraction, system: str) -> Fraction:
-    """Seconds since 1972-01-01T00:00:00 UTC where a clock without leap seconds shows so many since 1972-01-01."""
+    """Seconds since 1972-01-01T00:00:00 UTC for a ``shown`` clock reading of a ``system`` without leap seconds."""
     elapsed = shown - UNIFORM[system]
     if system == "TDB":  # Kaplan 2005, USNO Circular 179, (2.6): to 10 µs
         centuries = float(elapsed - _J2000) / 86400.0 / 36525.0
@@ -128,11 +129,11 @@ def _of_uniform(shown: Fraction, system: str) -> Fraction:
     return elapsed
 
 
-def _day(found: re.Match[str]) -> int:
-    if found["day_of_year"] is None:
-        return datetime.date(int(found["year"]), int(found["month"]), int(found["day"])).toordinal()
-    first = datetime.date(int(found["year"]), 1, 1)
-    day = first.toordinal() + int(found["day_of_year"]) - 1
+def _day(match: re.Match[str]) -> int:
+    if match["day_of_year"] is None:
+        return datetime.date(int(match["year"]), int(match["month"]), int(match["day"])).toordinal()
+    first = datetime.date(int(match["year"]), 1, 1)
+    day = first.toordinal() + int(match["day_of_year"]) - 1
     if not first.toordinal() <= day <= datetime.date(first.year, 12, 31).toordinal():
         raise ValueError("that year has no such day")
     return day

@@ -1,8 +1,8 @@
-"""Work, counted: what bounds a search on every machine alike, and tells how far it is.
+"""Computation budgets: machine-independent bounds on searches, with progress.
 
-One unit is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents `spend` what they
-take, by counts that do not depend on the clock; searches look whether the budget they run in is `exhausted` and end
-with the best found so far.
+One unit is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents `spend` units by
+counts that do not depend on the clock; searches test whether the open budget is `exhausted` and end with the best
+solution so far.
 """
 
 from __future__ import annotations
@@ -14,61 +14,61 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 
 SCHEME = 9_000.0
-"""Units that the search of one scheme may spend."""
+"""Units for the search of one scheme."""
 
 COMMAND = 10_000.0
-"""Units that the searches of one comparison may spend together."""
+"""Units for all searches of one comparison."""
 
 CASES = 20_000.0
-"""Units that the dispersed cases of one comparison may take together, by default so many; in proportion if more."""
+"""Units for the dispersed cases of one comparison with the default number of cases; more in proportion."""
 
 FRONTS = 30_000.0
-"""Units that the searches of all points of `trade` may spend together."""
+"""Units for the searches of all points of `trade`."""
 
 FIT, FITTED = 4_500.0, 600
 """Units that a fit may spend on a record of so many rows; in proportion if more."""
 
 
 @dataclass(eq=False)
-class Budget:
-    """Units of work that may be spent on ``what``, and those that are ``done``."""
+class WorkBudget:
+    """Budget of ``most`` units for the task ``what``, of which ``done`` are spent."""
 
     what: str
     most: float
     done: float = 0.0
-    around: Budget | None = None
+    around: WorkBudget | None = None
 
     @property
     def exhausted(self) -> bool:
-        """Whether nothing is left."""
+        """True if nothing is left."""
         return self.done >= self.most
 
     @property
     def share(self) -> float:
-        """How much of it is spent, 0 to 1."""
+        """Fraction spent, 0 to 1."""
         return min(self.done / self.most, 1.0) if self.most > 0.0 else 1.0
 
 
-class Watch:
-    """Shows from outside, as from another thread, which budget is being spent."""
+class BudgetMonitor:
+    """Handle by which another thread sees the budget being spent."""
 
-    budget: Budget | None = None
+    budget: WorkBudget | None = None
 
 
-_budget: ContextVar[Budget | None] = ContextVar("budget", default=None)
-_watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
+_budget: ContextVar[WorkBudget | None] = ContextVar("budget", default=None)
+_watch: ContextVar[BudgetMonitor | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
-def budget(what: str, most: float) -> Iterator[Budget]:
-    """A budget of ``most`` units for what runs within, no more than is left of the one around it."""
+def budget(what: str, most: float) -> Iterator[WorkBudget]:
+    """Open a budget of ``most`` units, but no more than is left of the enclosing one."""
     around, watch = _budget.get(), _watch.get()
-    one = Budget(what, most if around is None else min(most, max(around.most - around.done, 0.0)), around=around)
-    token = _budget.set(one)
+    inner = WorkBudget(what, most if around is None else min(most, max(around.most - around.done, 0.0)), around=around)
+    token = _budget.set(inner)
     if watch is not None:
-        watch.budget = one
+        watch.budget = inner
     try:
-        yield one
+        yield inner
     finally:
         _budget.reset(token)
         if watch is not None:
@@ -76,29 +76,29 @@ def budget(what: str, most: float) -> Iterator[Budget]:
 
 
 def spend(units: float) -> None:
-    """Count ``units`` of work towards the budgets that are open; without one nothing is counted."""
-    one = _budget.get()
-    while one is not None:
-        one.done += units
-        one = one.around
+    """Charge ``units`` to the open budgets; without a budget nothing is counted."""
+    current = _budget.get()
+    while current is not None:
+        current.done += units
+        current = current.around
 
 
 def left() -> float:
-    """Units that are left of the budget that is open; endless without one."""
-    one = _budget.get()
-    return math.inf if one is None else max(one.most - one.done, 0.0)
+    """Units left of the open budget; infinite without one."""
+    current = _budget.get()
+    return math.inf if current is None else max(current.most - current.done, 0.0)
 
 
 def exhausted() -> bool:
-    """Whether the budget that is open is spent; never without one."""
-    one = _budget.get()
-    return one is not None and one.exhausted
+    """True if the open budget is spent; False without one."""
+    current = _budget.get()
+    return current is not None and current.exhausted
 
 
 @contextmanager
-def watched() -> Iterator[Watch]:
-    """What shows the budgets opened within."""
-    watch = Watch()
+def watched() -> Iterator[BudgetMonitor]:
+    """Handle on the budgets opened within."""
+    watch = BudgetMonitor()
     token = _watch.set(watch)
     try:
         yield watch

@@ -1,7 +1,7 @@
-"""Many loops at once, each with its own body, sensor and noise: they decide one by one, and are moved together.
+"""Batch simulation of closed loops, each with its own body, sensor and noise.
 
-What one loop decides is a `Pilot`, the same that flies alone. Its coasts and the samples of them, closed forms of a
-symmetric body, are worked out together with those of all loops that have looked as often since they last fired.
+Each loop decides by its own `Pilot`, the same that flies alone. Coasts and their samples, closed forms of a
+symmetric body, are computed together for all loops that have looked as often since they last fired.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.control_loop.controller import SAMPLED, Course, Pilot, Scatter, Seen, Watch
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Noise, felt, stepped
 from nutdamp.control_loop.simulation import Alone, largest_since
 from nutdamp.errors import Infeasible
@@ -36,7 +36,7 @@ Rows = NDArray[np.int_]
 
 
 class Case(NamedTuple):
-    """A loop of its own: the spacecraft in truth, with its loop; the ``key`` of its noise, and what firings are off.
+    """Case of a loop: the true spacecraft with its loop; the ``key`` of its noise, and the errors of firings.
 
     ``tilt`` rad is by how much the attitude at t = 0 is off, about the body axes 1 and 2.
     """
@@ -48,8 +48,8 @@ class Case(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
-    """How the loops of ``cases`` end: what each ``pilots`` has fired and judged, and the motion at the end.
+class FlownLoops:
+    """End of the loops of ``cases``: firings and judgements of the ``pilots``, and the motion at the end.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) from the body axes of t = 0. ``quiet`` (n,) rad is the nutation as a
     loop first fell quiet, ``largest`` (n,) the largest of its coasts since; that of the end where it never did.
@@ -78,12 +78,12 @@ class _Group:
     lanes: list[Watch]
 
     def some(self, places: Any) -> _Group:
-        """Those at some of the places."""
+        """Subset at some of the places."""
         lanes = [self.lanes[place] for place in places.tolist()]
         return _Group(self.rows[places], self.watch.some(places), self.numbers[places], lanes)
 
     def parts(self, size: int) -> Iterator[_Group]:
-        """The same in parts of at most so many cases."""
+        """Parts of at most ``most`` cases."""
         if len(self.rows) <= size:
             yield self
             return
@@ -92,7 +92,7 @@ class _Group:
 
 
 def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
-    """Why loops of a law and a spacecraft can only be flown one by one; empty where they go together."""
+    """Reason why loops of a law and a spacecraft can only be flown alone; empty where they go together."""
     if law.loop.sensor.rate is None:
         return "a continuous signal"
     if spacecraft.disturbances:
@@ -100,16 +100,20 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
     return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
 
 
-def fly_together(law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None) -> Flown:
-    """The loops of ``cases``, flown to ``until`` s; ``watch`` is called with how many are over.
+def fly_together(
+    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
+) -> FlownLoops:
+    """Loops of ``cases``, flown to ``until`` s; ``watch`` is called with the number of finished ones.
 
     Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
     """
     return _Fleet(law, cases, until).fly(watch)
 
 
-def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None) -> Flown:
-    """The same, each loop by itself, whatever acts on its body and whatever its sensor shows."""
+def fly_alone(
+    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
+) -> FlownLoops:
+    """`fly_together`, each loop by itself, for any disturbance and sensor."""
     count = len(cases)
     rates, quaternion = np.empty((3, count)), np.empty((4, count))
     quiet, largest, pilots = np.full(count, math.nan), np.empty(count), []
@@ -127,10 +131,10 @@ def fly_alone(law: Law, cases: Sequence[Case], until: float, watch: Callable[[in
             quiet[row] = arc_cones(case.truth.inertia.moments, at, sense).nutation
         largest[row] = largest_since(run)[0]
         if law.spacecraft.keep:
-            seen = (one for one in end_state.aspects(run.flight, run.until) if one.keep in law.spacecraft.keep)
-            aspects[:, :, row] = [(one.least, one.largest) for one in seen]
+            seen = (aspect for aspect in end_state.aspects(run.flight, run.until) if aspect.keep in law.spacecraft.keep)
+            aspects[:, :, row] = [(aspect.least, aspect.largest) for aspect in seen]
         watch(row + 1)
-    return Flown(cases, pilots, rates, quaternion, quiet, largest, aspects)
+    return FlownLoops(cases, pilots, rates, quaternion, quiet, largest, aspects)
 
 
 class _Fleet:
@@ -138,30 +142,30 @@ class _Fleet:
 
     def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
         self.law, self.cases, self.until = law, cases, until
-        loops = [one.truth.loop for one in cases]
+        loops = [case.truth.loop for case in cases]
         self.pilots = [
-            Pilot(one.truth, loop or law.loop, until, law, free=True, scatter=one.scatter)
-            for one, loop in zip(cases, loops, strict=True)
+            Pilot(case.truth, loop or law.loop, until, law, free=True, scatter=case.scatter)
+            for case, loop in zip(cases, loops, strict=True)
         ]
-        sensors = [one.loop.sensor for one in self.pilots]
+        sensors = [pilot.loop.sensor for pilot in self.pilots]
         columns = 1 if law.loop.sensor.kind == ACCELEROMETER else 2
-        self.noises = [Noise(one.key, columns) for one in cases]
+        self.noises = [Noise(case.key, columns) for case in cases]
         self.scales, self.biases = (
             np.array(each) for each in zip(*((s.scales, s.biases) for s in sensors), strict=True)
         )
         self.noise, self.delays = (np.array(each) for each in zip(*((s.noise, s.delay) for s in sensors), strict=True))
-        moments = np.array([one.truth.inertia.moments for one in cases]).T
+        moments = np.array([case.truth.inertia.moments for case in cases]).T
         self.bodies = batch.Bodies(moments, np.zeros(3), Forcing(growth=law.growth))
-        self.rates = np.array([one.truth.omega0 for one in cases]).T.copy()
+        self.rates = np.array([case.truth.omega0 for case in cases]).T.copy()
         self.quaternion = np.zeros((4, len(cases)))
         self.quaternion[0] = 1.0
-        self.watch = watch_over(law.spacecraft, tuple(np.array([one.tilt for one in cases]).T), len(cases))
+        self.watch = watch_over(law.spacecraft, tuple(np.array([case.tilt for case in cases]).T), len(cases))
         self.now = np.zeros(len(cases))
         self.settled = np.full(len(cases), math.inf)
         self.quiet, self.largest = np.full(len(cases), math.nan), np.full(len(cases), -math.inf)
 
-    def fly(self, watch: Callable[[int], None]) -> Flown:
-        """All loops, to their ends."""
+    def fly(self, watch: Callable[[int], None]) -> FlownLoops:
+        """Fly all loops to their ends."""
         groups, over = [self._begun(np.arange(len(self.pilots)))], 0
         while groups:
             groups, fired, later = self._round(groups)
@@ -181,17 +185,17 @@ class _Fleet:
         unsettled = np.isinf(self.settled)
         self.largest[unsettled] = self._nutation(rows)[unsettled]
         ends = self.rates, self.quaternion, self.quiet, self.largest
-        return Flown(self.cases, self.pilots, *ends, self.watch.angles)
+        return FlownLoops(self.cases, self.pilots, *ends, self.watch.angles)
 
     def _begun(self, rows: Rows) -> _Group:
         """Coasts of cases that begin now."""
         since = self.now[rows]
         watch = Watch(self.law, since[:, None])
-        lanes = [Watch(self.law, one) for one in since.tolist()]
+        lanes = [Watch(self.law, start) for start in since.tolist()]
         return _Group(rows, watch, watch.first(since), lanes)
 
     def _round(self, groups: Iterable[_Group]) -> tuple[list[_Group], list[tuple[int, Pulse]], list[tuple[int, float]]]:
-        """Every coast looked at once more: those that go on, pulses, and times until which nothing is to be seen."""
+        """One look at every coast: those that go on, pulses, and times until which nothing is to be seen."""
         going: list[_Group] = []
         fired: list[tuple[int, Pulse]] = []
         later: list[tuple[int, float]] = []
@@ -214,15 +218,15 @@ class _Fleet:
         return going, fired, later
 
     def _decided(self, pilot: Pilot, lane: Watch, seen: Seen) -> Pulse | float | Course:
-        """What a loop does next; one that fires without end is over."""
+        """Next action of a loop; one that fires without end is over."""
         try:
             return pilot.step(lane, seen)
         except Infeasible:
-            pilot.ending = Stop.FULL, ""
+            pilot.ending = Ending.FULL, ""
             return Course.OVER
 
     def _look(self, group: _Group) -> Iterator[Seen | None]:
-        """The next samples of the coasts of a group, one after the other; None for those that come to no more."""
+        """Next samples of the coasts of a group, one after the other; None for those that are over."""
         rows, watch, sensor = group.rows, group.watch, self.law.loop.sensor
         assert sensor.rate is not None
         last = np.floor((self.until - self.delays[rows]) * sensor.rate + SAMPLED).astype(int)
@@ -282,7 +286,7 @@ class _Fleet:
 
     def _advance(self, rows: Rows, lasts: Vector, torque: Vector | None, slope: Vector | None) -> None:
         motion = self.now[rows], self.rates[:, rows], self.quaternion[:, rows]
-        here = batch.Stretch(self.bodies.some(rows), *motion, torque, slope)
+        here = batch.MotionStretch(self.bodies.some(rows), *motion, torque, slope)
         if self.law.spacecraft.keep:
             self.watch.some(rows).motion(here, lasts)
         batch.advance(here, lasts)
@@ -297,7 +301,7 @@ class _Fleet:
             self.pilots[row].take(pulse, size, spin)
         spans = [list(itertools.pairwise(sorted(set(pulse.edges)))) for _, pulse in fired]
         for number in range(max(map(len, spans))):
-            on = [place for place, one in enumerate(spans) if number < len(one)]
+            on = [place for place, span in enumerate(spans) if number < len(span)]
             pushes = [fired[place][1].push(*spans[place][number]) or (np.zeros(3), None) for place in on]
             lasts = np.array([spans[place][number][1] - spans[place][number][0] for place in on])
             torque = np.array([push for push, _ in pushes]).T

@@ -1,9 +1,4 @@
-"""On-board logic of one loop, sample by sample.
-
-The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
-
-The coast of a closed loop: what the law sees of it sample by sample, and when it decides to fire.
-"""
+"""On-board controller of one loop: samples of a coast, stretch by stretch, to firings."""
 
 from __future__ import annotations
 
@@ -16,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Firing, Glimpse, Law, Stop
+from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.propagation import Dynamics, Path, shed
@@ -28,7 +23,7 @@ from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 
 GRID = 64
-"""Moments in a nutation period at which a continuous signal is looked at, to find between which two it fires."""
+"""Moments per nutation period at which a continuous signal is examined for a firing in between."""
 
 LONGEST = 4096
 """Moments looked at together, at most."""
@@ -37,14 +32,14 @@ MOST = 20_000_000
 """Moments looked at in a flight, at most: two days of 100 Hz."""
 
 SAMPLED = 1e-6
-"""Part of the time between two samples by which one at the end of a pulse may come before it: rounding."""
+"""Part of a sampling interval by which a sample at the end of a pulse may come before it: rounding."""
 
 REFINED = 60
 """Steps, at most, in which the moment of a firing is found between two of the `GRID`."""
 
 
 class Seen(NamedTuple):
-    """Some of the moments of a coast: ``times`` (n,) s of the samples, and when they are decided on, ``now`` (n,) s.
+    """Some moments of a coast: ``times`` (n,) s of the samples, and of the decisions on them, ``now`` (n,) s.
 
     ``z`` is what the law takes for the transverse rate then, ``best`` what is known of it at ``times``; ``spin`` ω3.
     ``shown`` (n,) rad is the nutation by ``z``; ``fires`` (channels, n): whether each comes to fire. ``size`` rad/s is
@@ -61,8 +56,8 @@ class Seen(NamedTuple):
     size: float
 
 
-class Found(NamedTuple):
-    """A firing that the law decides on ``now`` s, row ``row`` of what was seen: it starts at ``start`` s."""
+class Decided(NamedTuple):
+    """Firing decided ``now`` s on row ``row`` of the samples: it starts at ``start`` s."""
 
     row: int
     now: float
@@ -72,7 +67,7 @@ class Found(NamedTuple):
 
 
 class Watch:
-    """What the law makes of the samples of coasts from ``since`` s on, which is (cases, 1) where there are many.
+    """Evaluation of the samples of coasts from ``since`` s on, which is (cases, 1) for many.
 
     ``reach``: samples that are looked at together next.
     """
@@ -86,7 +81,7 @@ class Watch:
 
     @property
     def ahead(self) -> float:
-        """How long before its start a firing is decided on, s: until the next sample, where the law predicts."""
+        """Time from decision to start of a firing, s: until the next sample, where the law predicts."""
         return self.estimator.step if self.law.loop.predict else 0.0
 
     @property
@@ -102,7 +97,7 @@ class Watch:
     def judged(
         self, times: Vector, values: Vector, spin: Vector, active: NDArray[np.bool_]
     ) -> tuple[ComplexArray, ComplexArray, Vector, NDArray[np.bool_]]:
-        """z on board, what is known of z, the nutation by it, and whether channels come to fire, (channels, ..., n).
+        """Estimates: z on board, best z, nutation by it, and triggers of channels, (channels, ..., n).
 
         The latter only where the loop is ``active``, or where it may become so: it matters nowhere else.
         """
@@ -124,31 +119,31 @@ class Watch:
         return z, best, shown, fires
 
     def some(self, cases: NDArray[Any]) -> Watch:
-        """That of some of the cases."""
-        found = copy.copy(self)
-        found.estimator = self.estimator.some(cases)
-        found._waits = None if self._waits is None else self._waits[:, cases]
-        return found
+        """Subset of the cases."""
+        subset = copy.copy(self)
+        subset.estimator = self.estimator.some(cases)
+        subset._waits = None if self._waits is None else self._waits[:, cases]
+        return subset
 
-    def found(self, seen: Seen, row: int, channels: list[int]) -> Found | None:
-        """The firing of those of the ``channels`` that comes first, decided on at ``row``."""
+    def first_firing(self, seen: Seen, row: int, channels: list[int]) -> Decided | None:
+        """First firing of the ``channels``, decided at ``row``."""
         fired = [self._firing(seen, row, self.law.actuators[index]) for index in channels]
-        made = [one for one in fired if one is not None]
-        return min(made, key=lambda one: one.start) if made else None
+        decided = [firing for firing in fired if firing is not None]
+        return min(decided, key=lambda candidate: candidate.start) if decided else None
 
-    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Found | None:
+    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
         now = float(seen.now[row])
         firing = self.law.firing(actuator, complex(seen.z[row]), float(seen.spin[row]))
         if firing is None:
             return None
-        return Found(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
+        return Decided(row, now, now + (max(firing.wait, 0.0) if self.law.loop.predict else 0.0), actuator, firing)
 
     def waits(self, z: ComplexArray, spin: Vector) -> Vector:
         """`Law.waits` of all channels, (channels, ..., n)."""
-        return np.array([self.law.waits(one, z, spin) for one in self.law.actuators])
+        return np.array([self.law.waits(actuator, z, spin) for actuator in self.law.actuators])
 
     def triggered(self, waits: Vector, ahead: float | None = None) -> NDArray[np.bool_]:
-        """Whether each channel comes to fire at each moment but the first: its wait falls below `ahead`."""
+        """True where a channel comes to fire at a moment after the first: its wait falls below `ahead`."""
         before, now, ahead = waits[..., :-1], waits[..., 1:], self.ahead if ahead is None else ahead
         falls = (now < ahead) & (before >= ahead) & (before - now < 0.5 * self.law.period)
         slack = 1e-12 * self.law.period
@@ -157,7 +152,7 @@ class Watch:
 
 
 class Coast(Watch):
-    """The motion of one body from ``state`` at ``since`` s on without firing, and what is seen of it."""
+    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples."""
 
     def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
         super().__init__(law, since)
@@ -168,7 +163,7 @@ class Coast(Watch):
         self._number = 0 if self.sensor.rate is None else int(self.first(np.float64(since)))
 
     def look(self, until: float, *, active: bool) -> Seen | None:
-        """The next moments of the coast; None where all have been looked at, up to a decision at ``until`` s."""
+        """Next moments of the coast; None where all have been seen, up to a decision at ``until`` s."""
         begins, end = self._until, until - self.signal.sensor.delay
         numbers: NDArray[np.int64] | None = None
         if self.sensor.rate is None:
@@ -205,7 +200,7 @@ class Coast(Watch):
         self._until = end
 
     def at(self, time: float) -> SpinState:
-        """The motion at ``time`` s, which has been looked at or lies within a nutation period behind that."""
+        """State at ``time`` s, which has been seen or lies within a nutation period after that."""
         if time == self.since or self.path is None:
             return self.state
         if time > self._until and not self.dynamics.free:
@@ -214,14 +209,14 @@ class Coast(Watch):
         first, second, third = rates[0].tolist()
         return SpinState(complex(first, second), third, quaternion[0])
 
-    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Found | None:
+    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
         if self.sensor.rate is not None:
             return super()._firing(seen, row, actuator)
         now, step = float(seen.now[row]), self.law.period / GRID
         return self._refined(row, now - 2.0 * step, now + step, now, actuator)
 
-    def _refined(self, row: int, low: float, high: float, now: float, actuator: Actuator) -> Found | None:
-        """The moment at which the wait of a continuous signal is over, by Newton's steps: it falls by 1 s a second."""
+    def _refined(self, row: int, low: float, high: float, now: float, actuator: Actuator) -> Decided | None:
+        """End of the wait of a continuous signal, by Newton's steps: it falls by 1 s a second."""
         low = max(low, self.estimator.since + self.signal.sensor.delay)
         firing = None
         for _ in range(REFINED):
@@ -238,7 +233,7 @@ class Coast(Watch):
                 break
             now = following
         assert firing is not None
-        return Found(row, now, now, actuator, firing)
+        return Decided(row, now, now, actuator, firing)
 
     def _wait_at(self, now: float, actuator: Actuator) -> Firing | None:
         time = now - self.signal.sensor.delay
@@ -249,17 +244,17 @@ class Coast(Watch):
 
 
 MOST_FIRINGS = 10_000
-"""Firings of one flight, at most."""
+"""Largest number of firings of one flight."""
 
 NO_NOISE = 8.0
 """Sigmas that noise does not reach: a chance of 1e-15 a sample."""
 
 WAVES = 40.0
-"""Time constants of the low-pass filter after which it has forgotten how it began."""
+"""Time constants of the low-pass filter after which it has forgotten its start."""
 
 
 class Fired(NamedTuple):
-    """A firing: the ``pulse`` as it acts, when it was ``decided`` on (s), and the nutation (rad) that was seen then.
+    """Firing: the ``pulse`` as it acts, the time of the decision (s), and the observed nutation (rad) then.
 
     ``true_nutation`` rad is what it was in truth as the pulse began.
     """
@@ -271,22 +266,22 @@ class Fired(NamedTuple):
 
 
 class Scatter(Protocol):
-    """By what single firings are off: the factor on the thrust of each, and by how many s it comes late."""
+    """Errors of single firings: a factor on the thrust, and a delay in s."""
 
     def of(self, number: int) -> tuple[float, float]:
-        """Of the firing of a ``number`` from 0."""
+        """Errors of the firing ``number``, from 0."""
         ...
 
 
 class Course(Enum):
-    """What a loop does next where it neither fires nor waits: looks on, or is over."""
+    """Next step of a loop that neither fires nor waits: looks on, or is over."""
 
     ON = "on"
     OVER = "over"
 
 
 class Pilot:
-    """The decisions of one loop: from what is seen of its coasts, stretch by stretch, to its firings.
+    """Controller of one loop: from samples of its coasts, stretch by stretch, to firings.
 
     The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
     ``free``: coasts are those of a symmetric body without torque from outside.
@@ -306,13 +301,13 @@ class Pilot:
         self.fired: list[Fired] = []
         self.quiet: list[float] = []
         self.active, self.looked_at = False, 0
-        self.ready, self.ending = truth.limits.earliest, (Stop.END, "")
-        self._found: Found | None = None
+        self.ready, self.ending = truth.limits.earliest, (Ending.END, "")
+        self._found: Decided | None = None
         self._pending: tuple[Pulse, Firing, Glimpse] | None = None
         self._seen: list[tuple[Vector, ComplexArray, Vector]] = []
 
     def step(self, coast: Watch, seen: Seen) -> Pulse | float | Course:
-        """What comes after a stretch of a coast: a pulse; nothing to be seen until a time, s; or `Course`."""
+        """Action after a stretch of a coast: a pulse; a time, s, until which nothing is to be seen; or `Course`."""
         self.looked_at += len(seen.times)
         if self.looked_at > MOST:
             raise Infeasible(
@@ -334,45 +329,45 @@ class Pilot:
 
     @property
     def lost(self) -> bool:
-        """Whether the loop does not comply, whatever it leaves: stopped, or fires and was never down to stop."""
-        return self.ending[0] is not Stop.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
+        """True if the loop fails whatever it leaves: stopped, or fires and was never down to stop."""
+        return self.ending[0] is not Ending.END or (self.active and not self.quiet and self.law.loop.stop > 0.0)
 
-    def _pulse(self, found: Found) -> Pulse | None:
-        """What the channel does in truth when it is commanded; None where it may not, or not before the end."""
-        known, channel = found.actuator.channel, self.channels[found.actuator.channel.name]
-        made = channel_pulse(known, found.start + found.firing.lead, found.firing.on_time)
+    def _pulse(self, decision: Decided) -> Pulse | None:
+        """True response of the channel to its command; None where not allowed, or not before the end."""
+        known, channel = decision.actuator.channel, self.channels[decision.actuator.channel.name]
+        pulse = channel_pulse(known, decision.start + decision.firing.lead, decision.firing.on_time)
         if known.valve is not None:
-            made = commandable(self.law.spacecraft, made)
+            pulse = commandable(self.law.spacecraft, pulse)
         factor, late = (1.0, 0.0) if self.scatter is None else self.scatter.of(len(self.fired))
         if channel is not known or late != 0.0:
-            begins, lasts = made.loaded
-            made = on_command(channel, max(begins + late, found.now), lasts)
-        if made.over > self.until:
+            begins, lasts = pulse.loaded
+            pulse = on_command(channel, max(begins + late, decision.now), lasts)
+        if pulse.over > self.until:
             return None
         if len(self.fired) == self.most:
-            self.ending = Stop.FULL, ""
+            self.ending = Ending.FULL, ""
             if self.most == MOST_FIRINGS:
-                raise Infeasible(f"more than {MOST_FIRINGS} firings by {made.start:.6g} s; an earlier end helps")
+                raise Infeasible(f"more than {MOST_FIRINGS} firings by {pulse.start:.6g} s; an earlier end helps")
             return None
-        made = self.supply.fire(made, channel)
+        pulse = self.supply.fire(pulse, channel)
         if self.supply.shortage is not None:
-            self.ending = Stop.EMPTY, ""
+            self.ending = Ending.EMPTY, ""
         sense = -factor if channel.name in self.loop.reversed else factor
-        return made if sense == 1.0 else weakened(made, sense)
+        return pulse if sense == 1.0 else weakened(pulse, sense)
 
     def take(self, pulse: Pulse, size: float, spin: float) -> None:
-        """Notes a firing, with |z| and ω3 (rad/s) in truth as it begins, and what was seen before it."""
-        found = self._found
-        assert found is not None
+        """Record a firing, with true |z| and ω3 (rad/s) at its start, and the samples before it."""
+        decision = self._found
+        assert decision is not None
         true = float(self.law.nutation(size, spin))
-        self.fired.append(Fired(pulse, found.now, float(self._shown[found.row]), true))
-        glimpse = self._glimpse(pulse.t, found.row, last=True)
-        self._pending = None if glimpse is None else (pulse, found.firing, glimpse)
+        self.fired.append(Fired(pulse, decision.now, float(self._shown[decision.row]), true))
+        glimpse = self._glimpse(pulse.t, decision.row, last=True)
+        self._pending = None if glimpse is None else (pulse, decision.firing, glimpse)
         self._seen = []
         self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
 
     def _forget(self) -> None:
-        """Keeps of what was seen the last period, or all since a firing that is not judged yet."""
+        """Discard samples older than a period, or than a firing that is not judged yet."""
         if self._pending is None:
             last = self._seen[-1][0]
             edge = last[-1] - self.law.period
@@ -384,7 +379,7 @@ class Pilot:
                 self._seen = self._seen[-3:]
 
     def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
-        """What was seen on this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
+        """Samples of this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
         times, best, spin = (
             self._seen[0] if len(self._seen) == 1 else map(np.concatenate, zip(*self._seen, strict=True))
         )
@@ -399,8 +394,8 @@ class Pilot:
         rate = complex(self.law.rate(float(spin[-1])), self.law.growth)
         return Glimpse.of(times[near], best[near], rate, centre)
 
-    def _decide(self, coast: Watch, seen: Seen) -> Found | None:
-        """The first firing among the moments of a stretch; thresholds and firings are judged in their order."""
+    def _decide(self, coast: Watch, seen: Seen) -> Decided | None:
+        """First firing among the moments of a stretch; thresholds and firings are judged in their order."""
         shown, fires, count, row = seen.shown, seen.fires, len(seen.times), 0
         while row < count:
             if not self.active:
@@ -419,21 +414,21 @@ class Pilot:
                 break
             if self._faulty(coast, seen, fire):
                 return None
-            found = self._allowed(coast, seen, fire, np.flatnonzero(fires[:, fire]).tolist())
-            if found is not None:
-                return found
+            decision = self._allowed(coast, seen, fire, np.flatnonzero(fires[:, fire]).tolist())
+            if decision is not None:
+                return decision
             row = fire + 1
         if count and (self._pending is None or seen.times[-1] >= self._known(coast)):
             self._faulty(coast, seen, count - 1)
         return None
 
     def _known(self, coast: Watch) -> float:
-        """The sample, s, by which enough has been seen of the coast after a firing to judge it."""
+        """Time of the sample, s, at which the coast after a firing suffices to judge it."""
         last = self.until - self.loop.sensor.delay - coast.estimator.step
         return min(float(coast.estimator.first) + self.law.period, last)
 
     def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
-        """Judges the last firing by what was seen since, up to a ``row``; whether the loop has to stop."""
+        """Judge the last firing by the samples since, up to a ``row``; True if the loop has to stop."""
         if self._pending is not None:
             pulse, firing, before = self._pending
             after = self._glimpse(pulse.t, row, last=False)
@@ -449,19 +444,19 @@ class Pilot:
                 self.ending = overdue
         return self.ending[0].fault
 
-    def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Found | None:
-        """The firing at a row, on a tick, if the limits allow it."""
+    def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Decided | None:
+        """Firing at a row, on a tick, if the limits allow it."""
         usable = [index for index in channels if self.law.actuators[index].channel.name != self.diagnosis.suspect]
-        found = coast.found(seen, row, usable)
-        if found is None:
+        decision = coast.first_firing(seen, row, usable)
+        if decision is None:
             return None
         windows = self.law.windows
-        start = windows.nearest_tick(found.start)
-        start = windows.tick_after(found.start) if start < found.now else start
-        return found._replace(start=start) if windows.allows(start, found.firing.lasts, self.ready) else None
+        start = windows.nearest_tick(decision.start)
+        start = windows.tick_after(decision.start) if start < decision.now else start
+        return decision._replace(start=start) if windows.allows(start, decision.firing.lasts, self.ready) else None
 
     def _idle_until(self, seen: Seen) -> float | None:
-        """When the sensor can first show the start threshold, less what it takes to be looking; None where soon."""
+        """Earliest time at which the sensor can show the start threshold, less the look-ahead; None where soon."""
         law, sensor = self.law, self.loop.sensor
         if not self.free:
             return None
@@ -478,12 +473,12 @@ class Pilot:
 
     @cached_property
     def _margin(self) -> float:
-        """By how much the sensor may show too much of |z|, rad/s."""
+        """Largest overestimate of |z| by the sensor, rad/s."""
         estimator = Estimator(self.law, self.loop.sensor, 0.0)
         return estimator.offset + NO_NOISE * estimator.doubt
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:
-    """Number of the first true one from ``row`` on."""
-    found = int(np.argmax(mask[row:]))
-    return row + found if mask[row + found] else None
+    """Index of the first true entry from ``row`` on."""
+    offset = int(np.argmax(mask[row:]))
+    return row + offset if mask[row + offset] else None

@@ -1,11 +1,7 @@
-"""Dispersed loops.
+"""Dispersed loops: settling, end states, propellant and worst cases of many dispersed closed loops.
 
-Loops of many dispersed cases: how many settle, when, where they end, what they use, and which are the worst.
-
-The dispersed cases of a loop: the body, the thrusters, the valves and the sensor as they are in truth.
-
-The law on board knows the spacecraft file alone. What a case differs in is drawn as for a schedule, by the same names
-from the same streams, and for the sensor: bias and scale of each gyro, noise and delay.
+The law on board knows the spacecraft file alone. Body, thrusters, valves and sensor of a case are drawn as for a
+schedule, by the same names from the same streams; of the sensor bias and scale of each gyro, noise and delay.
 """
 
 from __future__ import annotations
@@ -21,22 +17,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.batch import Case, Flown, expects_alone, fly_alone, fly_together
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.batch import Case, FlownLoops, expects_alone, fly_alone, fly_together
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.simulation import until_default
 from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.montecarlo.cases import Model, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple
 from nutdamp.montecarlo.closed_form import carried
 from nutdamp.montecarlo.inputs import (
     BLOCK,
     BY_VALVE,
     SCHEDULE_IDLE,
+    DispersedInput,
     Draws,
+    DrawSource,
     Group,
-    Input,
     Inputs,
-    Source,
     independent,
     list_inputs,
     of_sensor,
@@ -60,7 +56,7 @@ TAG = 1
 
 @dataclass(frozen=True)
 class Off:
-    """By what single firings of a case are off, drawn by the ``key`` of the case; ``late`` s is that of all of them."""
+    """Errors of single firings of a case, drawn by the ``key`` of the case; ``late`` s is common to all."""
 
     key: tuple[int, ...]
     thrust: Tolerance | None
@@ -68,11 +64,11 @@ class Off:
     late: float = 0.0
 
     def of(self, number: int) -> tuple[float, float]:
-        """Factor on the thrust of the firing of a ``number`` from 0, and by how many s it is late."""
+        """Thrust factor of the firing ``number``, from 0, and its delay in s."""
         if self.thrust is None and self.timing is None:
             return 1.0, self.late
         random = np.random.default_rng((*self.key, number, TAG))
-        thrust, timing = (_drawn(random, one) for one in (self.thrust, self.timing))
+        thrust, timing = (_drawn(random, part) for part in (self.thrust, self.timing))
         return max(1.0 + thrust, 0.0), self.late + timing
 
 
@@ -88,32 +84,38 @@ def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
 
 @dataclass(frozen=True, eq=False)
 class LoopModel:
-    """A spacecraft as its ``law`` on board knows it, ready to be dispersed; ``of_firings``: what each firing draws."""
+    """Spacecraft as known to its ``law`` on board, ready to be dispersed; ``of_firings``: inputs drawn per firing."""
 
     law: Law
     inputs: Inputs = field(init=False)
-    of_firings: tuple[Input, ...] = field(init=False)
-    _body: Model = field(init=False)
+    of_firings: tuple[DispersedInput, ...] = field(init=False)
+    _body: DispersedModel = field(init=False)
 
     def __post_init__(self) -> None:
         body = self.law.spacecraft
-        fired = Schedule(tuple(channel_pulse(one.channel, 0.0, one.shortest or 1.0) for one in self.law.actuators))
-        object.__setattr__(self, "_body", Model(body, fired))
+        fired = Schedule(
+            tuple(channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0) for actuator in self.law.actuators)
+        )
+        object.__setattr__(self, "_body", DispersedModel(body, fired))
         drawn, unused = list_inputs(body, fired)
         sensor, idle = of_sensor(body)
-        kept = [one for one in drawn if one.tolerance not in OF_FIRINGS]
-        rest = [one for one in unused if not one.name.startswith("sensor ")]
+        kept = [entry for entry in drawn if entry.tolerance not in OF_FIRINGS]
+        rest = [entry for entry in unused if not entry.name.startswith("sensor ")]
         idle = (
-            tuple(one._replace(reason=one.reason.replace(SCHEDULE_IDLE, "the loop does not fire")) for one in rest)
+            tuple(
+                entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "the loop does not fire")) for entry in rest
+            )
             + idle
         )
         object.__setattr__(self, "inputs", Inputs((*kept, *sensor), idle))
-        each = {one.tolerance: one._replace(name=one.tolerance) for one in drawn if one.tolerance in OF_FIRINGS}
+        each = {
+            entry.tolerance: entry._replace(name=entry.tolerance) for entry in drawn if entry.tolerance in OF_FIRINGS
+        }
         object.__setattr__(self, "of_firings", tuple(each.values()))
 
     @property
     def spacecraft(self) -> Spacecraft:
-        """The spacecraft as the law knows it."""
+        """Spacecraft as known to the law."""
         return self.law.spacecraft
 
     @property
@@ -123,17 +125,17 @@ class LoopModel:
 
     @property
     def target(self) -> Vector:
-        """Where H shall point, a unit vector (3,) in the body axes of t = 0 as they are known."""
+        """Target of H, a unit vector (3,) in the estimated body axes at t = 0."""
         return self._body.target
 
     @property
     def scattered(self) -> tuple[Tolerance | None, Tolerance | None]:
-        """What each firing draws anew: of its thrust, of its time."""
+        """Inputs drawn per firing: thrust, time."""
         requested = self.law.spacecraft.dispersions
         return (None, None) if requested is None else (requested.thrust_per_pulse, requested.timing)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """Which cases can be: those of the body, with a sensor that shows something and no signal before its time."""
+        """True where a case is possible: body, a sensor that sees something and no signal before its time."""
         good: Any = self._body.physical(draws)
         delay = self.law.loop.sensor.delay
         for name, draw in draws.items():
@@ -144,18 +146,22 @@ class LoopModel:
         return good  # type: ignore[no-any-return]
 
     def cases(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
-        """The cases of a study that have these ``numbers``, from 0, with their ``draws``, (n,) or one for all."""
+        """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for all."""
         count = len(numbers)
         body = self.law.spacecraft
         draws = _at_pressure(body, draws)
         whole = {name: np.broadcast_to(draw, count) for name, draw in draws.items()}
         model = self._body.cases(draws)
-        moments = np.array([np.broadcast_to(one, count) for one in model.moments]).T.tolist()
-        rates = np.array([np.broadcast_to(one, count) for one in model.omega0]).T
-        tilts = np.array([np.broadcast_to(one, count) for one in model.tilt]).T
+        moments = np.array([np.broadcast_to(moment, count) for moment in model.moments]).T.tolist()
+        rates = np.array([np.broadcast_to(component, count) for component in model.omega0]).T
+        tilts = np.array([np.broadcast_to(component, count) for component in model.tilt]).T
         attitudes = None if body.attitude is None else self._attitudes(tilts)
-        torques = {one.name: self._torques(one, draws, count) for channel in body.channels for one in channel.thrusters}
-        found = []
+        torques = {
+            thruster.name: self._torques(thruster, draws, count)
+            for channel in body.channels
+            for thruster in channel.thrusters
+        }
+        cases = []
         for row, number in enumerate(numbers.tolist()):
             draw = {name: float(values[row]) for name, values in whole.items()}
             key = (seed, number + 1)
@@ -175,8 +181,8 @@ class LoopModel:
                 truth = replace(truth, tank=tank_of(body, draw))
             off = Off(key, *self.scattered, draw.get("timing offset", 0.0))
             scatter = None if off == Off(key, None, None) else off
-            found.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
-        return found
+            cases.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
+        return cases
 
     def _attitudes(self, tilts: Vector) -> Vector:
         """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by ``tilts`` (n, 2) rad."""
@@ -188,24 +194,27 @@ class LoopModel:
 
     def _torques(self, thruster: Thruster, draws: Draws, count: int) -> Vector:
         """Torques (n, 3) N m at the thrust of each case."""
-        torque = np.array([np.broadcast_to(one, count) for one in self._body.thruster_torque(thruster, draws)]).T
+        torque = np.array(
+            [np.broadcast_to(component, count) for component in self._body.thruster_torque(thruster, draws)]
+        ).T
         return np.asarray(torque * (1.0 + np.broadcast_to(draws.get(f"thrust {thruster.name}", 0.0), count))[:, None])
 
     def _channels(self, draw: dict[str, float], torques: dict[str, Vector]) -> tuple[Channel, ...]:
-        """The channels of a case; those in which nothing is off are those of the file."""
+        """Channels of a case; undispersed ones are those of the file."""
         body = self.law.spacecraft
         names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
-        found = []
+        channels = []
         for channel in body.channels:
-            if not names & {one.name for one in channel.thrusters}:
-                found.append(channel)
+            if not names & {thruster.name for thruster in channel.thrusters}:
+                channels.append(channel)
                 continue
             valve = _valve(channel, draw)
             thrusters = tuple(
-                replace(one, torque=torques[one.name], valve=valve, **_thrust(one, draw)) for one in channel.thrusters
+                replace(thruster, torque=torques[thruster.name], valve=valve, **_thrust(thruster, draw))
+                for thruster in channel.thrusters
             )
-            found.append(replace(channel, thrusters=thrusters))
-        return tuple(found)
+            channels.append(replace(channel, thrusters=thrusters))
+        return tuple(channels)
 
 
 OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)
@@ -213,12 +222,12 @@ OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)
 
 
 def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
-    """The draws with the thrust of another tank, as the file gives it at its own pressure, in that of the thrusters."""
+    """Draws with the thrust at another tank pressure folded into that of the thrusters."""
     tank = tank_of(body, draws)
     if body.tank is None or tank is None or not {"tank pressure", "tank exponent"} & set(draws):
         return draws
     higher = (tank.pressure / body.tank.pressure) ** tank.exponent
-    names = {f"thrust {one.name}" for channel in body.channels for one in channel.thrusters}
+    names = {f"thrust {thruster.name}" for channel in body.channels for thruster in channel.thrusters}
     return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
 
 
@@ -229,13 +238,13 @@ def _thrust(thruster: Thruster, draw: dict[str, float]) -> dict[str, Any]:
 
 
 def _valve(channel: Channel, draw: dict[str, float]) -> Any:
-    """The valve of a channel: all of its thrusters open with the mean of their delays, none of them below zero."""
+    """Valve of a channel: all of its thrusters open with the mean of their delays, none below zero."""
     valve = channel.valve
     if valve is None:
         return None
 
     def off(key: str) -> float:
-        return float(np.mean([draw.get(f"{key} {one.name}", 0.0) for one in channel.thrusters]))
+        return float(np.mean([draw.get(f"{key} {thruster.name}", 0.0) for thruster in channel.thrusters]))
 
     from nutdamp.physics.thruster import Measured  # few spacecraft have any
 
@@ -246,7 +255,7 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
-    """The sensor of a case."""
+    """Sensor of a case."""
     axes = [""] if sensor.kind == ACCELEROMETER else [" 1", " 2"]
     scales = [sensor.scale * (1.0 + draw.get(f"sensor scale{axis}", 0.0)) for axis in axes]
     biases = [sensor.bias + draw.get(f"sensor bias{axis}", 0.0) for axis in axes]
@@ -272,7 +281,7 @@ OUTPUTS = (
     "propellant",
     "firings",
 )
-"""Of each case: when it first falls quiet (s), the nutation then and the largest since (rad), how far H has turned and
+"""Outputs of a case: first settling (s), nutation then and largest since (rad), by what H has turned and
 is off its target at the end (rad), by how much the spin has changed (rad/s), propellant (kg), firings.
 
 What is not known is not a number: the first two of a loop that never falls quiet, or that never sees its start."""
@@ -281,23 +290,23 @@ PORTION = 512
 """Cases that are flown together."""
 
 MOST_SAMPLES = 20_000_000_000
-"""Samples that a study may look at, by what its nominal case looks at."""
+"""Largest number of samples of a study, by those of its nominal case."""
 
 ALONE = 20
-"""Times as much that a sample costs where cases fly one by one."""
+"""Cost factor of a sample where cases fly alone."""
 
 FEW = 100
-"""Cases that fall quiet, at least, of which it is said what they depend on."""
+"""Least number of settled cases for sensitivities."""
 
 
-CollectLoops = Callable[[int, Array, list[Stop], Array], None]
+CollectLoops = Callable[[int, Array, list[Ending], Array], None]
 """Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
 least and largest angle (m, 2, n) rad to the direction of each cone."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopStudy:
-    """The loop of a ``spacecraft`` flown to ``until`` s in cases drawn from ``seed``; they count from 0 here."""
+    """Loop of a ``spacecraft`` flown to ``until`` s in cases drawn from ``seed``; they count from 0 here."""
 
     spacecraft: Spacecraft
     until: float
@@ -305,28 +314,28 @@ class LoopStudy:
 
     @cached_property
     def law(self) -> Law:
-        """The law on board, which knows the file."""
+        """Law on board, which knows the file."""
         assert self.spacecraft.loop is not None
         return Law(self.spacecraft, self.spacecraft.loop)
 
     @cached_property
     def model(self) -> LoopModel:
-        """What is dispersed."""
+        """Dispersed model."""
         return LoopModel(self.law)
 
     @cached_property
     def alone(self) -> str:
-        """Why the cases fly one by one, which takes longer; empty where they fly together."""
+        """Reason why the cases fly one by one, which takes longer; empty where they fly together."""
         return expects_alone(self.law, self.spacecraft)
 
     @cached_property
     def band(self) -> Band:
-        """The nutation that the loop is to leave, as it was built."""
+        """Nutation that the loop is designed to leave."""
         return dead_band(self.spacecraft, self.law.loop)
 
-    def source(self) -> Source:
-        """The draws."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+    def source(self) -> DrawSource:
+        """Source of the draws."""
+        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case, by input."""
@@ -334,22 +343,22 @@ class LoopStudy:
 
     def draws_from(self, first: int, count: int) -> dict[str, Array]:
         """Deviations (count,) of cases from ``first`` on, by input."""
-        found: dict[str, list[Array]] = {entry.name: [] for entry in self.model.inputs.drawn}
+        drawn: dict[str, list[Array]] = {entry.name: [] for entry in self.model.inputs.drawn}
         source = self.source()
         for block in range(first // BLOCK, math.ceil((first + count) / BLOCK)):
             draws, _ = source.block(block)
             rows = slice(max(first - block * BLOCK, 0), min(first + count - block * BLOCK, BLOCK))
-            for name, parts in found.items():
+            for name, parts in drawn.items():
                 parts.append(np.array(np.broadcast_to(draws[name], BLOCK)[rows]))
-        return {name: np.concatenate(parts) for name, parts in found.items()}
+        return {name: np.concatenate(parts) for name, parts in drawn.items()}
 
     def case(self, number: int) -> Case:
-        """One case."""
+        """Case of a number."""
         return self.model.cases(self.draws_of(number), np.array([number]), self.seed)[0]
 
     @cached_property
     def nominal(self) -> Array:
-        """The outputs (8,) of the file itself, with the noise of the seed."""
+        """Outputs (8,) of the file itself, with the noise of the seed."""
         return self.measured(self._nominal_flown)[0][:, 0]
 
     @property
@@ -358,16 +367,16 @@ class LoopStudy:
         return self._nominal_flown.aspects[:, :, 0]
 
     @cached_property
-    def _nominal_flown(self) -> Flown:
+    def _nominal_flown(self) -> FlownLoops:
         return self.fly(self.nominal_case)
 
     @property
     def nominal_case(self) -> list[Case]:
-        """The file itself, with the noise of the seed, as a case."""
+        """File itself, with the noise of the seed, as a case."""
         return [Case(self.spacecraft, (self.seed,))]
 
     def expect_affordable(self, samples: int) -> int:
-        """Samples that so many cases look at, by the nominal one; raises BadRequest where they are too many."""
+        """Number of samples of so many cases, by the nominal one; raises BadRequest where there are too many."""
         looked = self._nominal_flown.pilots[0].looked_at
         price = looked * samples * (ALONE if self.alone else 1)
         if price > MOST_SAMPLES:
@@ -379,18 +388,18 @@ class LoopStudy:
         return looked * samples
 
     def price_alone(self, samples: int) -> str:
-        """How long so many cases take one by one, in words, by the time that the nominal one takes here."""
+        """Time of so many cases one by one, in words, by that of the nominal one on this machine."""
         begin = time.perf_counter()
         self.fly(self.nominal_case)
         seconds = samples * (time.perf_counter() - begin)
         return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
 
-    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> Flown:
-        """The loops of ``cases``."""
+    def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
+        """Fly the loops of ``cases``."""
         return (fly_alone if self.alone else fly_together)(self.law, cases, self.until, watch)
 
-    def measured(self, flown: Flown) -> tuple[Array, Array]:
-        """Outputs (8, n) of loops, and how bad each is (n,): infinitely where it does not end quiet, or was stopped."""
+    def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
+        """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
         moments = np.array([case.truth.inertia.moments for case in cases]).T
         before = np.array([case.truth.omega0 for case in cases]).T
@@ -402,8 +411,11 @@ class LoopStudy:
         out[3] = angle(triple(moments * before), triple(np.array(momentum)))
         out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
-        used = [[math.nan if one.pulse.propellant is None else one.pulse.propellant for one in p.fired] for p in pilots]
-        out[6] = [math.fsum(one) for one in used]
+        used = [
+            [math.nan if firing.pulse.propellant is None else firing.pulse.propellant for firing in p.fired]
+            for p in pilots
+        ]
+        out[6] = [math.fsum(consumption) for consumption in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
         shares = list(cones_used(body.keep, flown.aspects))
@@ -413,7 +425,7 @@ class LoopStudy:
 
 
 def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1) -> LoopStudy:
-    """The study of the loop of a spacecraft with dispersions; raises BadRequest for one without either of them.
+    """Study of the loop of a spacecraft with dispersions; raises BadRequest for one without either of them.
 
     Raises Infeasible as `plan.loop_of` does.
     """
@@ -429,7 +441,7 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
 
 @dataclass(eq=False)
 class LoopResults(Counted):
-    """What has been found of a study so far: the cases from 0 to ``done``.
+    """Results of a study so far: the cases from 0 to ``done``.
 
     Those that comply settle too. ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end,
     or were stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and
@@ -441,7 +453,7 @@ class LoopResults(Counted):
     done: int = 0
     redrawn: int = 0
     met: int = 0
-    stops: Counter[Stop] = field(default_factory=Counter)
+    stops: Counter[Ending] = field(default_factory=Counter)
     worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     values: Array = field(init=False)
     angles: Array = field(init=False)
@@ -453,25 +465,25 @@ class LoopResults(Counted):
 
     @property
     def broken(self) -> NDArray[np.int64]:
-        """By cone (m,): how many cases break it."""
+        """Number of cases that break each cone, (m,)."""
         used = cones_used(self.study.spacecraft.keep, self.angles[:, :, : self.done])
         return np.asarray(np.count_nonzero(used > 1.0, axis=1))
 
     @property
     def aspects(self) -> Array:
-        """By cone the least and the largest angle (m, 2) rad in all cases."""
+        """Least and largest angle (m, 2) rad of all cases, by cone."""
         seen = self.angles[:, :, : self.done]
         return np.stack([seen[:, 0].min(axis=1), seen[:, 1].max(axis=1)], axis=1)
 
     def of(self, output: str) -> Array:
-        """The known values of an output, (m,)."""
+        """Known values of an output, (m,)."""
         values = self.values[OUTPUTS.index(output), : self.done]
         return values[~np.isnan(values)]
 
     def distribution(self, output: str) -> Exact | None:
-        """Of those values; None where there are none."""
-        found = self.of(output)
-        return Exact(found) if len(found) else None
+        """Distribution of the known values of an output; None where there are none."""
+        values = self.of(output)
+        return Exact(values) if len(values) else None
 
     @property
     def settled(self) -> int:
@@ -488,7 +500,7 @@ class LoopResults(Counted):
         """Cases that fall quiet with no more nutation than the dead band of the file."""
         return int(np.count_nonzero(self.of("quiet") <= self.study.band.most))
 
-    def take(self, values: Array, severity: Array, angles: Array, stops: list[Stop]) -> None:
+    def take(self, values: Array, severity: Array, angles: Array, stops: list[Ending]) -> None:
         """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
         first, last = self.done, self.done + values.shape[1]
         self.values[:, first:last], self.angles[:, :, first:last] = values, angles

@@ -1,8 +1,6 @@
-"""A flown loop judged; the same by DOP853.
+"""Evaluation of a closed loop: as a plan, and against DOP853 firing by firing.
 
-The same loop flown by DOP853, its events found on the interpolants of that: firing by firing, do they agree?
-
-A closed loop as a plan: what it fired, judged by the motion from when it was first down to its stop threshold.
+The plan is judged by the motion from the time at which the loop was first down to its stop threshold.
 """
 
 from __future__ import annotations
@@ -13,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from nutdamp.control_loop.simulation import SEED, Run, fly, largest_since
+from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
 from nutdamp.flight.propagation import Dynamics, Flight, Path, Push
-from nutdamp.flight.verification import Equations
+from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
@@ -36,7 +34,7 @@ EVALUATIONS = 1_000_000
 class _Solved:
     """A stretch that was integrated, by its interpolant."""
 
-    equations: Equations
+    equations: EulerEquations
     solution: Any
     steps: int
 
@@ -49,11 +47,11 @@ class _Solved:
 class _Independent(Dynamics):
     """Moves a body by DOP853 on Euler's equations with the full tensor; evaluations of these are counted, not steps."""
 
-    equations: Equations = field(kw_only=True)
+    equations: EulerEquations = field(kw_only=True)
 
     @property
     def free(self) -> bool:
-        """Whether coasts are known in closed form: none is."""
+        """Always False: no coast is known in closed form."""
         return False
 
     def _path(
@@ -68,27 +66,29 @@ class _Independent(Dynamics):
         if end <= start:
             return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
         torque = (np.asarray(sum(push.torques, np.zeros(3))), push.slope)
-        found = self.equations.solved(first, start, end, [torque], dense=True)
-        rates, quaternion = self.equations.motion(found.y[:, -1:].T)
-        one, two, three = rates[0].tolist()
-        return _Solved(self.equations, found.sol, len(found.t)), SpinState(complex(one, two), three, quaternion[0])
+        solution = self.equations.solved(first, start, end, [torque], dense=True)
+        rates, quaternion = self.equations.motion(solution.y[:, -1:].T)
+        first_rate, second_rate, spin = rates[0].tolist()
+        return _Solved(self.equations, solution.sol, len(solution.t)), SpinState(
+            complex(first_rate, second_rate), spin, quaternion[0]
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class LoopVerification:
     """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
 
-    run: Run
-    other: Run | None
+    run: LoopRun
+    other: LoopRun | None
     missing: str = ""
     evaluations: int = 0
     pairs: tuple[tuple[float, float, float], ...] = field(default=())
-    """Of each firing the differences of start and on-time, s, and of the nutation before it, rad."""
+    """Differences of each firing: start and on-time, s, and nutation before it, rad."""
 
     @property
     def same(self) -> bool:
-        """Whether the same channels fire, in the same order."""
-        names = [[one.pulse.channel for one in run.fired] for run in (self.run, self.other) if run is not None]
+        """True if the same channels fire in the same order."""
+        names = [[firing.pulse.channel for firing in run.fired] for run in (self.run, self.other) if run is not None]
         return len(names) == 2 and names[0] == names[1]
 
     @property
@@ -98,7 +98,7 @@ class LoopVerification:
 
     @property
     def agree(self) -> bool:
-        """Whether DOP853 confirms every firing to `AGREE`, and why the loop ended."""
+        """True if DOP853 confirms every firing to `AGREE`, and the reason for the end."""
         return self.same and self.worst <= AGREE and self.other is not None and self.other.stop is self.run.stop
 
 
@@ -107,7 +107,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     loop = spacecraft.loop
     assert loop is not None
     run = fly(spacecraft, loop, until, seed=seed)
-    equations, inertia = Equations(spacecraft, EVALUATIONS), spacecraft.inertia
+    equations, inertia = EulerEquations(spacecraft, EVALUATIONS), spacecraft.inertia
     mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
     try:
         other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
@@ -115,11 +115,11 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
         return LoopVerification(run, None, str(reason), equations.evaluations)
     pairs = tuple(
         (
-            one.pulse.loaded[0] - two.pulse.loaded[0],
-            one.pulse.loaded[1] - two.pulse.loaded[1],
-            one.true_nutation - two.true_nutation,
+            fired.pulse.loaded[0] - two.pulse.loaded[0],
+            fired.pulse.loaded[1] - two.pulse.loaded[1],
+            fired.true_nutation - two.true_nutation,
         )
-        for one, two in zip(run.fired, other.fired, strict=False)
+        for fired, two in zip(run.fired, other.fired, strict=False)
     )
     return LoopVerification(run, other, "", equations.evaluations, pairs)
 
@@ -130,55 +130,55 @@ LOOP = "loop"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
-    """The pulses that a loop fired in a ``run``; its flight is the one in which it fired them, to the end of the run.
+    """Pulses fired by a loop in a ``run``; its flight is the one in which it fired them, to the end of the run.
 
     ``known`` is the spacecraft as the law knows it, where that is not the truth.
     With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
     """
 
-    run: Run | None = None
+    run: LoopRun | None = None
     known: Spacecraft | None = None
 
     @property
-    def flown_run(self) -> Run:
-        """The run."""
+    def flown_run(self) -> LoopRun:
+        """Run of the loop."""
         assert self.run is not None
         return self.run
 
     @cached_property
     def flight(self) -> Flight:
-        """The motion to the end of the run."""
+        """Motion to the end of the run."""
         return replace(seen_at(self.flown_run.flight, self.flown_run.until), scheme=LOOP)
 
     @cached_property
     def largest(self) -> tuple[float, float]:
-        """The largest nutation from when the loop was first quiet, rad, and when, s; of the end where it never was."""
+        """Largest nutation since the loop first settled, rad, and its time, s; at the end where it never did."""
         return largest_since(self.flown_run)
 
     @property
     def left(self) -> Left:
-        """The largest nutation since it was first quiet; direction of H and spin at the end."""
+        """Largest nutation since the loop first settled; direction of H and spin at the end."""
         return left_by(self.flight)._replace(nutation=self.largest[0])
 
     @property
     def meets_requirement(self) -> bool | None:
-        """As of any plan; not where the loop was stopped or never quiet."""
-        found = super().meets_requirement
-        return False if found is not None and self.flown_run.lost else found
+        """Compliance as of any plan; False where the loop was stopped or never settled."""
+        meets = super().meets_requirement
+        return False if meets is not None and self.flown_run.lost else meets
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
-        """How near the spin axis comes to each direction that is watched, to the end of the run."""
+        """Extreme angles of the spin axis from each watched direction, to the end of the run."""
         return aspects(self.flight, self.flown_run.until)
 
     @cached_property
     def margins(self) -> tuple[Margin, ...]:
-        """How far each channel is from feeding the nutation, at the start threshold."""
+        """Stability margin of each channel at the start threshold."""
         return margins(self._known, self._known.loop or self.flown_run.loop)
 
     @cached_property
     def band(self) -> Band:
-        """How much nutation the loop leaves by what it was built for."""
+        """Dead band of the nutation by design."""
         return dead_band(self._known, self._known.loop or self.flown_run.loop)
 
     @property
@@ -189,7 +189,7 @@ class LoopPlan(Plan):
 def loop_of(
     spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED, case: int | None = None
 ) -> LoopPlan:
-    """The loop of the file flown to ``until`` s with the noise of ``seed``; as dispersed in a ``case`` of it, from 0.
+    """Loop of the file flown to ``until`` s with the noise of ``seed``; as dispersed in a ``case`` of it, from 0.
 
     Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
     """
@@ -204,7 +204,9 @@ def loop_of(
     from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
 
     study = loop_study(spacecraft, until, seed=seed)
-    one = study.case(case)
-    assert one.truth.loop is not None
-    run = fly(one.truth, one.truth.loop, study.until, seed=one.key, law=study.law, scatter=one.scatter)
-    return LoopPlan(one.truth, LOOP, run.schedule, from_file=True, run=run, known=spacecraft)
+    dispersed = study.case(case)
+    assert dispersed.truth.loop is not None
+    run = fly(
+        dispersed.truth, dispersed.truth.loop, study.until, seed=dispersed.key, law=study.law, scatter=dispersed.scatter
+    )
+    return LoopPlan(dispersed.truth, LOOP, run.schedule, from_file=True, run=run, known=spacecraft)

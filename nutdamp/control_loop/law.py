@@ -1,11 +1,10 @@
-"""Firing law, fault detection.
+"""Firing law and fault detection.
 
-Whether firings do what they shall: what each added to the rate that is seen, against what it was to add.
-
-When to fire, and for how long: a channel of torque direction d while arg ω = arg d + π (Magnus 1970, section 4).
+A channel of torque direction d fires while arg ω = arg d + π (Magnus 1970, section 4). The diagnosis compares the
+change of the observed rate by each firing with the expected one.
 
 The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 + iω2. With
-I1 ≠ I2 a small ω runs on an ellipse; what turns evenly there is z = g1 ω1 + i g2 ω2 with gj in proportion to
+I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2 ω2 with gj in proportion to
 sqrt(Ij |Ij - I3|), at `Inertia.body_rate` times the spin: the law works on z, which is ω itself where I1 = I2.
 """
 
@@ -37,11 +36,11 @@ ComplexArray = NDArray[np.complex128]
 
 
 LEADS = 100
-"""On-times of a channel for which it is worked out what its valve does."""
+"""On-times of a channel for which the valve response is tabulated."""
 
 
 class Firing(NamedTuple):
-    """A firing that the law decides on: ``wait`` s until its command (negative: it should have begun).
+    """Firing decided by the law: ``wait`` s until its command (negative: overdue).
 
     ``on_time`` s is that of full thrust, about its centre ``lead`` s after the beginning of the command, which with its
     thrust ``lasts`` so many s; without a valve half and all of the on-time. ``acts`` rad/s is what it adds to z there.
@@ -56,7 +55,7 @@ class Firing(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Actuator:
-    """A channel as the law sees it: ``kick`` rad/s² is what a second of it adds to z, ``spin_rate`` rad/s² to ω3.
+    """Channel as the law sees it: ``kick`` rad/s² is the change of z per second, ``spin_rate`` rad/s² that of ω3.
 
     Its pulses last from ``shortest`` to ``longest`` s; ``leads`` are those of its valve: see `_leads`.
     """
@@ -70,7 +69,7 @@ class Actuator:
 
 
 class Law:
-    """The law of a ``spacecraft`` as it is known on board, and of its `Loop`; raises Infeasible where none can work."""
+    """Law of a ``spacecraft`` as known on board, and of its `Loop`; raises Infeasible where none can work."""
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop) -> None:
         inertia = spacecraft.inertia
@@ -103,7 +102,7 @@ class Law:
         return omega if first == second == 1.0 else first * omega.real + 1j * second * omega.imag
 
     def rate(self, spin: Any) -> Any:
-        """How fast z turns back in the body, rad/s, signed; numbers or arrays."""
+        """Rate at which z turns back in the body, rad/s, signed; numbers or arrays."""
         return self.inertia.body_rate * spin
 
     def nutation(self, size: Any, spin: Any) -> Array:
@@ -115,7 +114,7 @@ class Law:
         return self.inertia.C * abs(spin) / self.inertia.A * math.tan(nutation)
 
     def firing(self, actuator: Actuator, z: complex, spin: float) -> Firing | None:
-        """The next firing of a channel against ``z`` at this moment; None where it would not help."""
+        """Next firing of a channel against ``z`` now; None where it would not help."""
         rate = self.inertia.body_rate
         needed = response.on_time_for(abs(z), abs(actuator.kick), rate, spin, actuator.spin_rate, actuator.longest)
         on_time = actuator.longest if needed is None else max(needed, actuator.shortest)
@@ -156,11 +155,11 @@ class Law:
 
 
 def _leads(valve: Valve | None, shortest: float, longest: float) -> tuple[Array, Array] | None:
-    """Effective on-times (n,) s from ``shortest`` to ``longest``, and how long before their centres commands begin."""
+    """Effective on-times (n,) s from ``shortest`` to ``longest``, and the lead of the commands to their centres."""
     if valve is None:
         return None
     on_times = np.linspace(shortest, longest, LEADS)
-    return on_times, np.array([valve.thrust(valve.on_time_for(one)).centroid for one in on_times.tolist()])
+    return on_times, np.array([valve.thrust(valve.on_time_for(on_time)).centroid for on_time in on_times.tolist()])
 
 
 def _gauge(moments: tuple[float, float, float]) -> tuple[float, float]:
@@ -174,35 +173,35 @@ def _gauge(moments: tuple[float, float, float]) -> tuple[float, float]:
 
 
 WORKS = 0.25
-"""Share of what it was to add above which a firing works, and below whose negative it works backwards."""
+"""Fraction of the expected effect above which a firing works, and below whose negative it works backwards."""
 
 SIGMAS = 5.0
-"""A firing is judged by what so many sigma of the noise leave open."""
+"""Sigmas of noise within which a firing is not judged."""
 
 WHICH = 3.0
-"""The same, where it is known that something works backwards, to tell a channel from the sensor."""
+"""Sigmas to tell a channel from the sensor, where it is known that one works backwards."""
 
 FED = 0.5
-"""Share of its first size by which the nutation may grow while it is fired at: then firings feed it."""
+"""Growth of the nutation under fire, as a share of its first size, from which firings feed it."""
 
 PHASED = 1e-3
-"""Doubt of the phase of z (rad) from which on sizes tell more of what a firing did."""
+"""Phase uncertainty of z (rad) from which on sizes tell more of the effect of a firing."""
 
 LOST = 1.0
-"""Doubt of the phase of a firing (rad) from which on nothing can be said of what it was to do."""
+"""Phase uncertainty of a firing (rad) from which on its expected effect is unknown."""
 
 LARGE = 100.0
-"""Exponent of growth beyond which it does not matter by how much more it grows."""
+"""Exponent of growth beyond which further growth does not matter."""
 
 STEPPED = math.sqrt(3.0)
-"""The most by which a value in steps is off over its root mean square."""
+"""Largest error of a quantised value over its root mean square."""
 
 ALIKE = 1e-9
-"""Share of the samples below which what they tell of the bias is rounding."""
+"""Share of the samples below which their information on the bias is rounding."""
 
 
-class Stop(Enum):
-    """Why the loop was flown no further, or that it was flown to the end."""
+class Ending(Enum):
+    """Reason for the end of the flight of a loop."""
 
     END = "the end of the time"
     FULL = "limits.max_pulses"
@@ -216,12 +215,12 @@ class Stop(Enum):
 
     @property
     def fault(self) -> bool:
-        """Whether the loop was stopped before it could feed the nutation, or has nothing left to fire."""
-        return self not in (Stop.END, Stop.FULL)
+        """True if the loop was stopped before it could feed the nutation, or has nothing left to fire."""
+        return self not in (Ending.END, Ending.FULL)
 
 
 class Doubt(NamedTuple):
-    """What may be off in estimates of z: ``noise`` rad/s (one sigma) of a sample, ``white`` its part at the rate of z.
+    """Uncertainty of estimates of z: ``noise`` rad/s (one sigma) of a sample, ``white`` its part at the rate of z.
 
     Both fall with the root of the number of samples, but to ``least``: of fits that share theirs. At rest the noise
     counts ``lift`` times. ``bias`` is a constant of the coasts, ``steps`` of the quantisation are at most off by that.
@@ -238,38 +237,38 @@ class Doubt(NamedTuple):
     scale: float = 0.0
 
     def of(self, seen: Glimpse) -> float:
-        """One sigma of what was ``seen`` on a coast, for a bias that is known."""
+        """One sigma of the estimate from the samples ``seen`` on a coast, for a known bias."""
         mixed = self.white * math.sqrt((1.0 + abs(seen.leak) ** 2 * (self.lift**2 - 1.0)) / seen.samples)
         return math.hypot(max(min(mixed, self.noise), self.least), self.steps / STEPPED)
 
 
 @dataclass(slots=True)
 class Glimpse:
-    """The rates z seen on one coast, carried to the centre of a firing by the nutation ``rate`` (1/s), with a bias b.
+    """Rates z of one coast, carried to the centre of a firing by the nutation ``rate`` (1/s), with a bias b.
 
-    z = ``z`` - b ``leak``, the least squares fit; b by what is left of it: ``rest`` = b ``told``. ``apart``: time from
-    the samples to the firing, s.
+    z = ``z`` - b ``leak``, the least squares fit; b by what is left of it: ``rest`` = b ``information``. ``apart``:
+    time from the samples to the firing, s.
     """
 
     z: complex
     samples: int
     leak: complex
     rest: complex
-    told: float
+    information: float
     apart: float
 
     @classmethod
     def of(cls, times: Vector, best: ComplexArray, rate: complex, centre: float) -> Glimpse:
-        """Of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
+        """Glimpse of estimates ``best`` (n,) at ``times`` (n,) s; ``rate`` is complex where the nutation grows."""
         course = np.exp(-1j * rate * (times - centre))  # of z = 1 at the centre
         power, total, count = float((abs(course) ** 2).sum()), complex(course.sum()), len(times)
         z = complex(np.vdot(course, best)) / power
-        rest, told = complex(best.sum()) - z * total, count - abs(total) ** 2 / power
-        return cls(z, count, total.conjugate() / power, rest, told, abs(float(times.mean()) - centre))
+        rest, information = complex(best.sum()) - z * total, count - abs(total) ** 2 / power
+        return cls(z, count, total.conjugate() / power, rest, information, abs(float(times.mean()) - centre))
 
 
-class Change(NamedTuple):
-    """z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
+class RateChange(NamedTuple):
+    """Values z rad/s ``before`` and ``after`` a firing, carried to its centre, and one ``sigma`` of their difference.
 
     ``bound``: by how much it may be off beside that, in every firing alike.
     """
@@ -280,31 +279,31 @@ class Change(NamedTuple):
     bound: float
 
     @classmethod
-    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> Change:
-        """By two coasts of the same bias, which is estimated with them where that tells more than how large it can be.
+    def of(cls, before: Glimpse, after: Glimpse, doubt: Doubt) -> RateChange:
+        """Change between two coasts of the same bias, which is estimated too where its limits are wider.
 
         What of it stays open counts by how unlike the coasts are.
         """
         sigma, unlike = math.hypot(doubt.of(before), doubt.of(after)), abs(after.leak - before.leak)
-        told, bias, open_ = before.told + after.told, 0j, doubt.bias
-        if doubt.bias > 0.0 and told > ALIKE * (before.samples + after.samples):
-            noise = doubt.white * doubt.lift / math.sqrt(told)
+        information, bias, open_ = before.information + after.information, 0j, doubt.bias
+        if doubt.bias > 0.0 and information > ALIKE * (before.samples + after.samples):
+            noise = doubt.white * doubt.lift / math.sqrt(information)
             bends = math.pi * doubt.turn * max(abs(before.z), abs(after.z))  # by turning from the middle to the ends
             if max(noise, bends) < doubt.bias:
-                bias, open_, sigma = (before.rest + after.rest) / told, bends, math.hypot(sigma, unlike * noise)
+                bias, open_, sigma = (before.rest + after.rest) / information, bends, math.hypot(sigma, unlike * noise)
         return cls(before.z - bias * before.leak, after.z - bias * after.leak, sigma, unlike * open_)
 
 
 @dataclass(slots=True)
 class Effect:
-    """What the firings of one channel have added, as a factor on what they were to add: least squares over them."""
+    """Effect of the firings of one channel, as a factor on the expected one: least squares over them."""
 
     did: complex = 0.0
     wanted: float = 0.0
     noise: float = 0.0
     bound: float = 0.0
 
-    def add(self, change: Change, expected: complex, phase: float) -> None:
+    def add(self, change: RateChange, expected: complex, phase: float) -> None:
         """A firing that was to add ``expected`` and made a ``change``, in which z may be off by a ``phase`` (rad).
 
         Where that matters, and the firing was to change the size, by sizes alone: |z| after it lies between |z + e| of
@@ -323,19 +322,19 @@ class Effect:
 
     @property
     def factor(self) -> complex:
-        """1 for what works, -1 for what works backwards, 0 for what does nothing."""
+        """Factor: 1 for full effect, -1 for reversed effect, 0 for none."""
         return self.did / self.wanted if self.wanted > 0.0 else 1.0
 
     def open(self, sigmas: float = SIGMAS) -> float:
-        """By how much noise, and what is off in every firing, may change the factor."""
+        """Uncertainty of the factor by noise, and by errors common to all firings."""
         return (sigmas * math.sqrt(self.noise) + self.bound) / self.wanted if self.wanted > 0.0 else math.inf
 
     def works(self, sigmas: float = SIGMAS) -> bool:
-        """Whether the firings surely do what they shall, not the contrary."""
+        """True if the firings surely have the expected effect."""
         return self.factor.real >= WORKS and self.factor.real - self.open(sigmas) > -WORKS
 
     def backwards(self, sigmas: float = SIGMAS) -> bool:
-        """Whether they surely do the contrary."""
+        """True if they surely have the opposite effect."""
         return self.factor.real <= -WORKS and self.factor.real + self.open(sigmas) < WORKS
 
 
@@ -358,12 +357,13 @@ class Diagnosis:
 
     def judge(
         self, channel: str, now: float, before: Glimpse, after: Glimpse, expected: complex, doubt: Doubt
-    ) -> tuple[Stop, str] | None:
-        """Why to stop after a firing of ``channel`` that was to add ``expected``, and the channel to name; else None.
+    ) -> tuple[Ending, str] | None:
+        """Reason to stop after a firing of ``channel`` expected to add ``expected``, and the channel to name; else
+        None.
 
         Another may be fired from ``now`` s on.
         """
-        change, effect = Change.of(before, after, doubt), self.effects.setdefault(channel, Effect())
+        change, effect = RateChange.of(before, after, doubt), self.effects.setdefault(channel, Effect())
         size, turns = max(abs(change.before), abs(change.after)), 2.0 * math.pi / self.period
         falls = abs(self.growth) * (before.apart + after.apart) * (self.slope * size) ** 2  # of the spin, as cos θ
         half = math.pi * doubt.turn  # by which z may have turned from the middle of a period to its ends
@@ -375,31 +375,31 @@ class Diagnosis:
         return cause or self._fed(channel, now, change, doubt)
 
     def _cause(
-        self, channel: str, now: float, change: Change, expected: complex, doubt: Doubt
-    ) -> tuple[Stop, str] | None:
-        """What the effects of firings show to be wrong, with the channel to name; None where nothing or not yet."""
+        self, channel: str, now: float, change: RateChange, expected: complex, doubt: Doubt
+    ) -> tuple[Ending, str] | None:
+        """Fault shown by the effects of firings, with the channel to name; None where there is none or not yet."""
         effect = self.effects[channel]
         if self.suspect is None and effect.backwards():
             self.suspect, self.deadline = channel, now + self.period
         if self.suspect is not None:
-            others = [one for name, one in self.effects.items() if name != self.suspect]
-            if any(one.backwards(WHICH) for one in others):
-                return Stop.SENSOR, channel
-            return (Stop.CHANNEL, self.suspect) if any(one.works(WHICH) for one in others) else None
+            others = [effect for name, effect in self.effects.items() if name != self.suspect]
+            if any(other.backwards(WHICH) for other in others):
+                return Ending.SENSOR, channel
+            return (Ending.CHANNEL, self.suspect) if any(other.works(WHICH) for other in others) else None
         if effect.open() >= WORKS:
             return None
         if abs(effect.factor) < WORKS:
-            return Stop.IDLE, channel
+            return Ending.IDLE, channel
         size = abs(change.before)
         lowers = size - abs(size - abs(expected)) > 0.5 * abs(expected)  # by a firing that comes at its moment
         grown = abs(change.after) - size
         seen_wrong = SIGMAS * doubt.noise + doubt.steps + doubt.bias  # the law fired at what it saw, not at what was
         if lowers and grown > SIGMAS * change.sigma + change.bound + 2.0 * seen_wrong + 1e-9 * size:
-            return Stop.FEEDS, channel
+            return Ending.FEEDS, channel
         return None
 
-    def _fed(self, channel: str, now: float, change: Change, doubt: Doubt) -> tuple[Stop, str] | None:
-        """That the nutation has grown while it was fired at, by more than what hides it can make a firing add."""
+    def _fed(self, channel: str, now: float, change: RateChange, doubt: Doubt) -> tuple[Ending, str] | None:
+        """True if the nutation has grown under fire by more than observation errors explain."""
         if self.first is None:
             self.first = abs(change.before), now
             return None
@@ -408,23 +408,26 @@ class Diagnosis:
         size, since = self.first
         most = (1.0 + FED) * size * math.exp(min(self.growth * (now - since), LARGE))
         most += SIGMAS * (change.sigma + doubt.noise) + 2.0 * (doubt.steps + doubt.bias)
-        return (Stop.FED, channel) if abs(change.after) > most else None
+        return (Ending.FED, channel) if abs(change.after) > most else None
 
     def rest(self) -> None:
-        """The loop has fallen quiet: from what size the nutation grows is noted anew."""
+        """Reset at rest: the growth of the nutation counts from here."""
         self.first = None
 
-    def overdue(self, now: float) -> tuple[Stop, str] | None:
-        """That no other channel has fired in time to tell which of the two it is."""
-        return None if self.suspect is None or now <= self.deadline else (Stop.UNCLEAR, self.suspect)
+    def overdue(self, now: float) -> tuple[Ending, str] | None:
+        """True if no other channel has fired in time to tell which of the two is faulty."""
+        return None if self.suspect is None or now <= self.deadline else (Ending.UNCLEAR, self.suspect)
 
 
 def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
-    """By what shares the nutation rate and the scale of the sensor may be off, two sigma of the dispersions."""
+    """Relative errors of nutation rate and sensor scale, two sigma of the dispersions."""
     given, inertia = spacecraft.dispersions, spacecraft.inertia
     if given is None:
         return 0.0, 0.0
     pairs = ((given.A, inertia.A), (given.C, inertia.C))
-    moments = [0.0 if one is None else one.size / (1.0 if one.relative else nominal) for one, nominal in pairs]
+    moments = [
+        0.0 if dispersion is None else dispersion.size / (1.0 if dispersion.relative else nominal)
+        for dispersion, nominal in pairs
+    ]
     scale = 0.0 if given.sensor_scale is None else given.sensor_scale.size
     return 2.0 * math.hypot(*moments) * inertia.C / (inertia.A * abs(inertia.a)), 2.0 * abs(scale)

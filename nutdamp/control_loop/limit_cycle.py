@@ -1,23 +1,14 @@
-"""Limit cycle, propellant a year.
+"""Limit cycle of a closed loop: pulses a day, propellant a year, lifetime.
 
-The limit cycle of a closed loop from event to event: coasts in closed form, the firings by the law itself.
+The loop is followed from event to event: coasts in closed form, the firings by the law itself. Between two events z
+grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ. Noise decides in which sample a
+threshold is first reached: see `Odds`. Only the few samples in which a channel may come to fire are computed one by
+one. Many cycles are followed side by side, from random phases, until their mean is known.
 
-Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ. Noise decides in
-which sample a threshold is first reached: see `Odds`. Only the few samples in which a channel may come to fire are
-worked out one by one. Many cycles are followed side by side, from random phases, until their mean is known.
+Without firing tan θ = tan θ0 e^{κt} gives the time at which damping must begin; `Map` the limit cycle after it.
 
-What it takes to hold the nutation against energy dissipation: pulses a day, propellant a year, how long it lasts.
-
-tan θ = tan θ0 e^{κt} says when damping must begin; the limit cycle of a closed loop (`cycles.Map`) what follows then.
-
-What a `Law` takes for z, as a filter over the samples of its sensor: of the nutation a factor, of noise weights.
-
-On a coast z runs as e^{(κ - iω)t}, ω the rate at which it turns back in the body. An estimate is Σ h_j s_{k-j} of the
-samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant offset, and of white noise w the sum Σ h_j w_{k-j}.
-
-When a sensor first shows more, or less, than a threshold, by its noise: chances of samples along a coast.
-
-Many cycles of a closed loop that are followed side by side: where each is, and what it has added up.
+An estimate of the `Law` is Σ h_j s_{k-j} of the samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant
+offset, and of white noise w the sum Σ h_j w_{k-j}.
 """
 
 from __future__ import annotations
@@ -73,7 +64,7 @@ class Transfer(NamedTuple):
     first: float
 
     def mean(self, z: Any) -> Any:
-        """What is seen of z without noise, numbers or arrays."""
+        """Observed z without noise, numbers or arrays."""
         return self.direct * z + self.mirrored * np.conj(z) + self.offset
 
     def noise(self, white: ComplexArray) -> ComplexArray:
@@ -89,11 +80,11 @@ class Transfer(NamedTuple):
         real, other = self.scatter
         if real == other == 0.0:
             return np.zeros((rows, count), dtype=complex)
-        found = (real * rng.standard_normal((rows, count))).astype(complex)
-        return found + 1j * other * rng.standard_normal((rows, count)) if other > 0.0 else found
+        noise = (real * rng.standard_normal((rows, count))).astype(complex)
+        return noise + 1j * other * rng.standard_normal((rows, count)) if other > 0.0 else noise
 
     def stepped(self, seen: ComplexArray) -> ComplexArray:
-        """What is seen, in steps of a gyro."""
+        """Observed z quantised by the steps of a gyro."""
         if not any(self.grain):
             return seen
         raw, (first, second) = seen / self.weights[0], self.grain
@@ -102,17 +93,17 @@ class Transfer(NamedTuple):
         )
 
     def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
-        """What makes the noise of the newest estimate ``level`` rad/s in a direction, as likely as it can be."""
+        """Most likely change of the noise that makes the newest estimate ``level`` rad/s in a direction."""
         newest = self.weights[::-1]
         pull = newest.conj() * towards
-        real, other = (one * one for one in self.scatter)
+        real, other = (part * part for part in self.scatter)
         missing = level - (complex(newest @ white) * towards.conjugate()).real
         along = real * pull.real + 1j * other * pull.imag
         return np.asarray(missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along)
 
 
 def transfer(law: Law, spin: float) -> Transfer:
-    """The estimates of a law at a spin of ``spin`` rad/s."""
+    """Transfer of the estimates of a law at a spin of ``spin`` rad/s."""
     sensor, rate = law.loop.sensor, float(law.rate(spin))
     estimator, accelerometer = Estimator(law, sensor, 0.0), sensor.kind == ACCELEROMETER
     every = 1
@@ -163,7 +154,7 @@ def _smoothing(sensor: Sensor, step: float) -> ComplexArray:
 
 
 def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
-    """Weights of the sine that is fitted to ``size`` samples of an accelerometer, over what it shows of z."""
+    """Weights of the sine fitted to ``size`` samples of an accelerometer, over its gain for z."""
     angle = -float(law.rate(spin)) * step * np.arange(size)
     orders = (1, 2) if size >= HARMONIC else (1,)
     waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
@@ -172,7 +163,7 @@ def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
 
 
 FINE = 1500
-"""Sizes of z for which it is worked out how likely an event is, far off and again near the threshold."""
+"""Sizes of z at which the probability of an event is computed, far off and again near the threshold."""
 
 FARTHEST = 1e-12
 """Share of a threshold below which a nutation is none."""
@@ -188,7 +179,7 @@ CURVED = 12.0
 
 
 class Odds:
-    """The chance that an estimate shows at least ``limit`` rad/s, or at most that (``below``), while z grows.
+    """First passage: probability of an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows.
 
     ``growth`` (1/s) is that of z. The chances of the samples add up along a coast: an event is there where the sum has
     come to an exponential number.
@@ -212,10 +203,10 @@ class Odds:
         self.sum = np.concatenate([[0.0], np.cumsum(pieces)])
 
     def size(self, now: Any, drawn: Any) -> Any:
-        """|z| (rad/s) at which the event comes, from ``now`` on, by exponential numbers; infinite where it does not."""
+        """Size |z| (rad/s) at the event, from ``now`` on, by exponential numbers; infinite where it does not come."""
         reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
-        found = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
-        return np.where(reached > self.sum[-1], math.inf, found)
+        sizes = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
+        return np.where(reached > self.sum[-1], math.inf, sizes)
 
 
 def _clustered(fresh: float, apart: Vector) -> Any:
@@ -234,20 +225,20 @@ def _clustered(fresh: float, apart: Vector) -> Any:
 
 
 def _exceeds(limit: float, shown: Vector) -> Vector:
-    """Chance that |``shown`` + n| >= ``limit`` with n normal, of one sigma in each direction (Rice's distribution)."""
+    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice)."""
     from scipy.special import chndtr, ndtr
 
-    found, near = np.asarray(ndtr(shown - limit)), shown < CURVED
+    chances, near = np.asarray(ndtr(shown - limit)), shown < CURVED
     if limit < 3.0 * CURVED and near.any():
-        found[near] = 1.0 - chndtr(limit * limit, 2.0, shown[near] ** 2)
-    return np.clip(found, 0.0, 1.0)
+        chances[near] = 1.0 - chndtr(limit * limit, 2.0, shown[near] ** 2)
+    return np.clip(chances, 0.0, 1.0)
 
 
 Rows = NDArray[np.int64]
 
 
 class Cycle(NamedTuple):
-    """What goes on in the limit cycle; rates are 1/s.
+    """Limit cycle; rates are 1/s.
 
     ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
     kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
@@ -266,7 +257,7 @@ class Cycle(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What a chain has added up by a moment: time (s) of the last pulse, and its largest and last |z|, rad/s."""
+    """Sums of a chain up to the last pulse: its time (s), and its largest and last |z|, rad/s."""
 
     time: float = 0.0
     pulses: float = 0.0
@@ -284,7 +275,7 @@ ADDED = 6
 
 @dataclass(eq=False)
 class Chains:
-    """Where each chain is: z at the sample ``number``, what its channels waited before, the noise of its samples.
+    """State of each chain: z at the sample ``number``, previous waits of its channels, noise of its samples.
 
     ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
     """
@@ -301,42 +292,42 @@ class Chains:
     cycles: list[list[Sums]]
 
     def some(self, rows: list[int]) -> Chains:
-        """What some of them have added up."""
+        """Sums of some of the chains."""
         return replace(self, firings=[self.firings[row] for row in rows], cycles=[self.cycles[row] for row in rows])
 
 
 CHAINS, CYCLES, SETTLING = 64, 16, 2
-"""Cycles that are followed side by side, how many of each count, and how many come before those."""
+"""Cycles followed side by side, counted cycles of each, and cycles before those."""
 
 FIRINGS = 200
 """Firings of each, at most."""
 
 FEW = 4
-"""Cycles in so many firings, below which firings are counted instead."""
+"""Cycles per so many firings below which firings are counted instead."""
 
 MOST_STEPS = 100_000
 """Stretches in all, at most."""
 
 ROWS = 128
-"""Samples worked out one by one at a time, at most."""
+"""Largest number of samples computed one by one at a time."""
 
 EARLY, LATE = 0.003, 3.0
-"""Chances of the start threshold between which it is awaited sample by sample, where these depend on each other."""
+"""Probabilities of the start threshold between which samples are examined one by one."""
 
 LONGEST_LOOKED = 10_000
-"""Samples looked at one by one for that, at most."""
+"""Largest number of samples examined one by one."""
 
 SIGMAS = 5.0
 """Reach of noise, sigmas, in which a channel may come to fire."""
 
 OUTGROWN = 4.0
-"""Times all that a loop should leave, at which it does not hold the nutation."""
+"""Multiple of the expected dead band at which a loop does not hold the nutation."""
 
 OVERSHOOT = 0.82
 """Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times."""
 
 RISING = 1.1
-"""Factor by which nutation grows from the first of many firings to the middle, and on, where they do not hold it."""
+"""Growth of the nutation from the first of many firings to the middle, and on, where it is not held."""
 
 TOO_FAST = "the nutation grows faster than the firings damp it"
 
@@ -364,7 +355,7 @@ class Map:
         self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
         self.near = self._near()
         reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
-        acts = [abs(one.kick) * abs(math.sin(half * one.shortest)) / half for one in self.law.actuators]
+        acts = [abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half for actuator in self.law.actuators]
         self.smallest = min(acts)
         self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
         self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
@@ -372,13 +363,13 @@ class Map:
         self.shapes: dict[tuple[str, float], complex] = {}
 
     def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
-        """The limit cycle; raises Infeasible where the loop does not hold the nutation."""
+        """Limit cycle; raises Infeasible where the loop does not hold the nutation."""
         at = self._begin(chains)
         self._follow(at, SETTLING + cycles, FIRINGS)
         return self._summed(at)
 
     def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
-        """The limit cycles that chains come to, by how many do: with pauses, and without.
+        """Limit cycles that chains converge to, by their number: with pauses, and without.
 
         They begin as for `cycle`, or fire already at ``z`` rad/s. Raises Infeasible as that does.
         """
@@ -388,26 +379,26 @@ class Map:
             at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
         # Until each has paused or fires on at the same size.
         self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
-        at.sums = [one._replace(pulses=0.0, cycles=0.0) for one in at.sums]
+        at.sums = [total._replace(pulses=0.0, cycles=0.0) for total in at.sums]
         at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
         self._follow(at, SETTLING + CYCLES, FIRINGS)
-        parts = [[row for row, one in enumerate(at.cycles) if bool(one) is pauses] for pauses in (True, False)]
+        parts = [[row for row, cycle in enumerate(at.cycles) if bool(cycle) is pauses] for pauses in (True, False)]
         return tuple(self._summed(at.some(part)) for part in sorted(parts, key=len, reverse=True) if part)
 
     def _follow(self, at: Chains, cycles: int, firings: int) -> None:
-        """Every chain until it has paused more than so many times, or fired so often."""
+        """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
         going = np.ones(len(at.z), dtype=bool)
         for _ in range(MOST_STEPS):
             self._wake(at, np.flatnonzero(going & ~at.active))
             self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
             self._look(at, np.flatnonzero(going))
-            going = np.array([one.cycles <= cycles and one.pulses < firings for one in at.sums])
+            going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
             if not going.any():
                 return
         raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
 
     def _near(self) -> float | None:
-        """Size of z from which on every sample is looked at until one shows the start threshold.
+        """Size of z from which on every sample is examined until one shows the start threshold.
 
         None where the chances of the samples add up: where the noise of each is new, or z grows little while it lasts.
         """
@@ -439,7 +430,7 @@ class Map:
         return self.watch.waits(seen, np.full(seen.shape, self.spin))
 
     def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
-        """Coasts go on by so many samples, and the noise of those before is forgotten."""
+        """Advance coasts by some samples, and forget the noise of those before."""
         at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
         at.number[rows] += samples
         at.white[rows] = self._drawn(len(rows))
@@ -447,8 +438,8 @@ class Map:
 
     def _until(self, size: Vector | float, now: Vector) -> Rows:
         """Samples until |z| has grown from ``now`` to ``size``."""
-        found = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
-        return np.asarray(np.ceil(found - SAMPLED), dtype=np.int64)
+        samples = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
+        return np.asarray(np.ceil(samples - SAMPLED), dtype=np.int64)
 
     def _wake(self, at: Chains, rows: Rows) -> None:
         """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
@@ -500,11 +491,11 @@ class Map:
 
     @property
     def _ahead(self) -> float:
-        """How long before its start a firing is decided on, s."""
+        """Lead of the decision on a firing before its start, s."""
         return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
 
     def _look(self, at: Chains, rows: Rows) -> None:
-        """The next samples one by one, up to the first event of each."""
+        """Examine the next samples one by one, up to the first event of each."""
         step = self.seen.step
         count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
         white = np.concatenate([at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1)
@@ -533,21 +524,23 @@ class Map:
             at.carried[:, row], at.fresh[row] = waits[:, index, passed - 1], False
 
     def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
-        """Whether one of the moments at which a channel comes to fire leads to a firing, and that firing."""
+        """First firing at one of the moments at which a channel triggers, if any."""
         for moment in np.flatnonzero(fires.any(axis=0)).tolist():
             time = (int(at.number[row]) + moment) * self.seen.step
             actuators = (self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist())
-            found = [made for one in actuators if (made := self._firing(one, complex(seen[moment]), time)) is not None]
-            if not found:
+            firings = [
+                firing for each in actuators if (firing := self._firing(each, complex(seen[moment]), time)) is not None
+            ]
+            if not firings:
                 continue
-            start, lasts, pulse, actuator = min(found, key=lambda one: one[0])
+            start, lasts, pulse, actuator = min(firings, key=lambda firing: firing[0])
             if self.law.windows.allows(start, lasts, float(at.ready[row])):
                 self._fire(at, row, pulse, actuator)
                 return True
         return False
 
     def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
-        """When a firing that is decided on by what is ``seen`` at ``time`` s begins, how long it lasts, what it is."""
+        """Start, length and pulse of a firing decided on z ``seen`` at ``time`` s."""
         now, law = time + self.law.loop.sensor.delay, self.law
         firing = law.firing(actuator, seen, self.spin)
         for _ in range(REFINED if law.loop.sensor.rate is None else 0):  # a continuous signal shows the moment itself
@@ -560,13 +553,13 @@ class Map:
         begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
         start = law.windows.nearest_tick(begins)
         start = law.windows.tick_after(begins) if start < now else start
-        made = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
-        return start, firing.lasts, made if made.command is None else commandable(self.truth, made), actuator
+        pulse = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
+        return start, firing.lasts, pulse if pulse.command is None else commandable(self.truth, pulse), actuator
 
     def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
-        """The motion through a pulse, and on to the first estimate after it."""
-        made = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
-        level = made.magnitude / pulse.magnitude
+        """Propagate through a pulse, and on to the first estimate after it."""
+        given = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
+        level = given.magnitude / pulse.magnitude
         (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
         before, sums = complex(at.z[row]), at.sums[row]
         size = abs(before) * math.exp(self.turn.real * (begins - time))
@@ -575,11 +568,11 @@ class Map:
         acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
         after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
         spin = actuator.spin_rate * level * pulse.on_time - self._slowed(sums.last, size)
-        spent = math.nan if made.propellant is None else made.propellant
+        spent = math.nan if given.propellant is None else given.propellant
         at.sums[row] = Sums(
             pulse.t,
             sums.pulses + 1.0,
-            sums.impulse + made.magnitude,
+            sums.impulse + given.magnitude,
             sums.propellant + spent,
             sums.spin + spin,
             sums.cycles,
@@ -595,11 +588,11 @@ class Map:
 
     def _slowed(self, last: float, size: float) -> float:
         """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
-        before, after = (math.cos(float(self.law.nutation(one, self.spin))) for one in (last, size))
+        before, after = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (last, size))
         return self.spin * (1.0 - after / before)
 
     def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
-        """What a pulse loses on z by its width, with the growth in it."""
+        """Factor on the effect of a pulse on z by its width, with the growth in it."""
         key = (pulse.channel, round(pulse.on_time, 9))
         if key not in self.shapes:
             ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
@@ -609,7 +602,7 @@ class Map:
         return self.shapes[key]
 
     def _rest(self, at: Chains, row: int) -> None:
-        """A cycle is over, if anything was fired in it: what it has added up is noted."""
+        """Record the sums of a finished cycle, if anything was fired in it."""
         sums = at.sums[row]
         if sums.largest > 0.0:
             sums = sums._replace(cycles=sums.cycles + 1.0)
@@ -617,21 +610,21 @@ class Map:
             at.sums[row] = sums._replace(largest=0.0)
 
     def _summed(self, at: Chains) -> Cycle:
-        """Of all chains, between the first and the last cycle, or firing, that counts."""
-        if all(len(one) >= SETTLING + FEW for one in at.cycles):
-            counted = [one[SETTLING:] for one in at.cycles]
+        """Mean of all chains, between the first and the last counted cycle, or firing."""
+        if all(len(cycle) >= SETTLING + FEW for cycle in at.cycles):
+            counted = [cycle[SETTLING:] for cycle in at.cycles]
         else:
-            counted = [one[len(one) // 4 :] for one in at.firings]
+            counted = [firing[len(firing) // 4 :] for firing in at.firings]
             sizes = np.array([[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]).mean(
                 axis=0
             )
             if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
                 raise Infeasible(TOO_FAST)
-        spans = np.array([np.subtract(one[-1], one[0])[:ADDED] for one in counted])
+        spans = np.array([np.subtract(cycle[-1], cycle[0])[:ADDED] for cycle in counted])
         total = spans.sum(axis=0)
         rates = (total / total[0]).tolist()
         apart = spans[:, 1] - rates[1] * spans[:, 0]
-        angles = self.law.nutation(np.concatenate([np.array(one[1:])[:, ADDED:] for one in counted]), self.spin)
+        angles = self.law.nutation(np.concatenate([np.array(cycle[1:])[:, ADDED:] for cycle in counted]), self.spin)
         return Cycle(
             pulses=rates[1],
             cycles=rates[5],
@@ -650,11 +643,11 @@ YEAR = 365.25 * DAY
 """s."""
 
 NOISY, WIDENED = 0.1, 0.2
-"""Noise of what is seen (one sigma), over the start threshold, above which firings are more than the map has, and the
+"""Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the
 share by which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start."""
 
 DIFFERENT = 0.3
-"""Share of the pulses by which one limit cycle differs from another."""
+"""Relative difference of pulses by which one limit cycle differs from another."""
 
 STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
 """Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.
@@ -670,8 +663,8 @@ class Thresholds(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """The nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
+class HeldNutation:
+    """Nutation held between ``thresholds``: the limit ``cycle`` at the present spin; ``why`` there is none.
 
     It is the one that the loop falls into from the nutation of the file; ``other`` is a second one, None without.
     ``noisy``: its noise is above `NOISY` of start.
@@ -692,7 +685,7 @@ class Held:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether the nutation stays within what is required; None where nothing is, False without a limit cycle."""
+        """True if the nutation stays within the requirement; None without one, False without a limit cycle."""
         required = self.spacecraft.requirement
         if required is None or required.nutation is None:
             return None
@@ -700,20 +693,20 @@ class Held:
 
     @property
     def slows(self) -> float | None:
-        """Share of its spin by which a year of this changes it, at the present rate; signed."""
+        """Relative change of the spin in a year of the cycle, at the present rate; signed."""
         return None if self.cycle is None else self.cycle.spin_rate * YEAR / self.spacecraft.spin
 
 
 @dataclass(frozen=True, eq=False)
-class Budget:
-    """How nutation grows in a ``spacecraft``, and what it takes to hold it, for each pair of thresholds in ``held``.
+class HoldingBudget:
+    """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``.
 
     ``largest``: θ_max, rad, of which `until_largest` tells when it is reached; None where none is named.
     """
 
     spacecraft: Spacecraft
     largest: float | None
-    held: tuple[Held, ...]
+    held: tuple[HeldNutation, ...]
 
     @property
     def until_largest(self) -> float | None:
@@ -722,18 +715,18 @@ class Budget:
 
     @property
     def feasible(self) -> bool:
-        """Whether some pair of thresholds has a limit cycle, or none is needed."""
-        return not self.held or any(one.cycle is not None for one in self.held)
+        """True if some pair of thresholds has a limit cycle, or none is needed."""
+        return not self.held or any(pair.cycle is not None for pair in self.held)
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether some pair of thresholds meets it; None where nothing is required of a loop."""
-        found = [one.meets_requirement for one in self.held]
-        return None if not found or None in found else any(found)
+        """True if some pair of thresholds meets the requirement; None where nothing is required of a loop."""
+        meets = [pair.meets_requirement for pair in self.held]
+        return None if not meets or None in meets else any(meets)
 
 
 def expect_dissipation(spacecraft: Spacecraft) -> None:
-    """Raises BadRequest, which shows what to write, for a spacecraft whose nutation neither grows nor decays."""
+    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor decays."""
     if spacecraft.dissipation is None:
         raise BadRequest(
             "the spacecraft file has no dissipation: it does not say how fast the nutation grows. For example:\n\n"
@@ -748,8 +741,8 @@ def budget(
     *,
     seed: int = 1,
     progress: Callable[[int], None] = lambda _: None,
-) -> Budget:
-    """The budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
+) -> HoldingBudget:
+    """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
 
     ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
     has no loop. ``progress`` is called with the number of pairs done.
@@ -760,52 +753,52 @@ def budget(
         largest = required.nutation
     loop = spacecraft.loop
     if loop is None or spacecraft.growth <= 0.0:
-        return Budget(spacecraft, largest, ())
+        return HoldingBudget(spacecraft, largest, ())
     held = []
     for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
         held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
-    return Budget(spacecraft, largest, tuple(held))
+    return HoldingBudget(spacecraft, largest, tuple(held))
 
 
-def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> Held:
+def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     body = replace(spacecraft, loop=loop)
     pair = Thresholds(loop.start, loop.stop)
-    found = Held(body, pair, requirements.reached(body, loop.start))
+    result = HeldNutation(body, pair, requirements.reached(body, loop.start))
     try:
-        found = replace(found, band=dead_band(body, loop))
+        result = replace(result, band=dead_band(body, loop))
         _expect_damping(body, loop)
-        made = Map(body, loop, seed=seed)
-        cycle, *others = _attractors(body, loop, made)
-        if made.seen.sigma > NOISY * made.start:
-            found, cycle = replace(found, noisy=True), cycle._replace(doubt=max(cycle.doubt, WIDENED))
-        found = replace(found, cycle=cycle, other=others[0] if others else None)
-        return replace(found, lasts=_lasts(body, loop, seed))
+        cycles = Map(body, loop, seed=seed)
+        cycle, *others = _attractors(body, loop, cycles)
+        if cycles.seen.sigma > NOISY * cycles.start:
+            result, cycle = replace(result, noisy=True), cycle._replace(doubt=max(cycle.doubt, WIDENED))
+        result = replace(result, cycle=cycle, other=others[0] if others else None)
+        return replace(result, lasts=_lasts(body, loop, seed))
     except Infeasible as reason:
-        return replace(found, why=str(reason))
+        return replace(result, why=str(reason))
 
 
-def _attractors(body: Spacecraft, loop: Loop, made: Map) -> list[Cycle]:
-    """The limit cycle that the loop falls into from the nutation of the file, and others that differ from it.
+def _attractors(body: Spacecraft, loop: Loop, cycles: Map) -> list[Cycle]:
+    """Limit cycle of the loop from the nutation of the file, and others that differ from it.
 
     There may be others where a firing can leave more than the stop threshold that no smaller pulse lowers.
     """
-    band, law = dead_band(body, loop), made.law
+    band, law = dead_band(body, loop), cycles.law
     if not 0.5 * band.step > loop.stop > 0.0:
-        return [made.cycle()]
+        return [cycles.cycle()]
     now = complex(law.seen(body.initial.omega))
     starts = [now] * (body.nutation >= loop.start) + [None, complex(law.size(0.5 * band.step, body.spin))]
-    found: list[Cycle] = []
+    distinct: list[Cycle] = []
     for z in starts:
-        for one in made.attractors(z=z):
-            if all(abs(one.pulses - each.pulses) > DIFFERENT * each.pulses for each in found):
-                found.append(one)
-    return found
+        for cycle in cycles.attractors(z=z):
+            if all(abs(cycle.pulses - each.pulses) > DIFFERENT * each.pulses for each in distinct):
+                distinct.append(cycle)
+    return distinct
 
 
 def _expect_damping(body: Spacecraft, loop: Loop) -> None:
-    """Raises Infeasible where firings feed the nutation: by faults in the file, or by how late they come."""
-    turned = [one.channel for one in margins(body, loop) if one.cause.turned]
+    """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
+    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
     if turned:
         raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
     late = feeding(body, loop)
@@ -814,7 +807,7 @@ def _expect_damping(body: Spacecraft, loop: Loop) -> None:
 
 
 def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:
-    """How long the limit cycle can go on, s: ∫ dm over what it uses a second, as the pressure in the tank falls."""
+    """Lifetime of the limit cycle, s: ∫ dm over the flow, as the pressure in the tank falls."""
     if body.tank is None:
         return None
     mass, total = body.tank.propellant, 0.0

@@ -1,4 +1,4 @@
-"""What a gyro or an accelerometer shows of the motion, and what the law on board makes of it.
+"""Sensor samples of a gyro or an accelerometer, and the on-board estimator.
 
 A rate gyro shows ω1 and ω2. An accelerometer at r from the centre of mass, along the unit vector u, shows
 
@@ -46,7 +46,7 @@ BLIND = 1e-6
 
 
 def gain(moments: Sequence[float], position: Vector, axis: Vector) -> tuple[float, float]:
-    """(K1, K2)/ω3 of an accelerometer, m: what it shows of ω1 and ω2 in free motion."""
+    """Gain (K1, K2)/ω3 of an accelerometer, m, for ω1 and ω2 in free motion."""
     first, second, third = moments
     (x, y, z), (u1, u2, u3) = position.tolist(), axis.tolist()
     p, q = (first - third) / second, (second - third) / first
@@ -54,24 +54,24 @@ def gain(moments: Sequence[float], position: Vector, axis: Vector) -> tuple[floa
 
 
 def is_blind(moments: Sequence[float], position: Vector, axis: Vector) -> bool:
-    """Whether an accelerometer shows nothing of a small nutation."""
+    """True if an accelerometer does not see a small nutation."""
     return math.hypot(*gain(moments, position, axis)) <= BLIND * math.hypot(*position.tolist())
 
 
 class Noise:
-    """Normal numbers for samples, the same for the same sample however it is come by; ``key`` is seed and case."""
+    """Normal numbers by sample number, independent of the order of access; ``key`` is seed and case."""
 
     def __init__(self, key: tuple[int, ...], columns: int) -> None:
         self.key, self.columns = key, columns
         self._blocks: dict[int, Vector] = {}
 
     def of(self, first: int, count: int) -> Vector:
-        """Those of ``count`` samples from number ``first`` on, (count, columns)."""
+        """Numbers of ``count`` samples from number ``first`` on, (count, columns)."""
         begin, end = first // BLOCK, max(first + count - 1, first) // BLOCK
         for block in range(begin, end + 1):
             if block not in self._blocks:
                 self._blocks[block] = np.random.default_rng((*self.key, block)).normal(size=(BLOCK, self.columns))
-        for block in [one for one in self._blocks if one < begin]:
+        for block in [block for block in self._blocks if block < begin]:
             del self._blocks[block]
         drawn = self._blocks[begin]
         if end > begin:
@@ -80,7 +80,7 @@ class Noise:
 
 
 def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[Any, ...]:
-    """What there is to be shown, by columns: rad/s of two gyros, or m/s² of an accelerometer in free motion.
+    """True signal, by columns: rad/s of two gyros, or m/s² of an accelerometer in free motion.
 
     Of principal ``moments`` and body ``rates``, three numbers or arrays each; a ``torque`` N m changes the rates.
     """
@@ -95,12 +95,12 @@ def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[
     # u·(dω/dt × r) = dω/dt·(r × u), and u·(ω × (ω × r)) = (ω·u)(ω·r) - (u·r)ω².
     arm = np.cross(sensor.position, sensor.axis).tolist()
     value = sum(change * part for change, part in zip(changes, arm, strict=True))
-    along, out = (sum(rate * part for rate, part in zip(rates, one, strict=True)) for one in (axis, at))
+    along, out = (sum(rate * part for rate, part in zip(rates, vector, strict=True)) for vector in (axis, at))
     return (value + along * out - float(sensor.position @ sensor.axis) * (x * x + y * y + z * z),)
 
 
 class Signal:
-    """The samples of a sensor on a ``spacecraft``, as it is in truth, with the noise of a ``seed`` (and a case)."""
+    """Samples of a sensor on a true ``spacecraft``, with the noise of a ``seed`` (and a case)."""
 
     def __init__(self, spacecraft: Spacecraft, sensor: Sensor, seed: int | tuple[int, ...]) -> None:
         self.sensor = sensor
@@ -109,7 +109,7 @@ class Signal:
         self.noise = Noise(seed if isinstance(seed, tuple) else (seed,), columns)
 
     def shown(self, rates: Vector, torque: Vector | None = None, force: Vector | None = None) -> Vector:
-        """The signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3)."""
+        """Signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3)."""
         sensor = self.sensor
         values = np.column_stack(felt(sensor, self.moments, rates.T, torque))
         if force is not None and self.mass is not None and sensor.kind == ACCELEROMETER:
@@ -144,13 +144,13 @@ class Estimator:
         self._fit: _Fit | None = None
 
     def some(self, cases: NDArray[Any]) -> Estimator:
-        """That of some of the cases."""
-        found = copy.copy(self)
-        found.since = self.since[cases]
-        found._filtered = None if self._filtered is None else self._filtered[cases]
-        found._kept = None if self._kept is None else _Kept(*(part[cases] for part in self._kept))
-        found._fit = None if self._fit is None else _Fit(self._fit.rate[cases], self._fit.weights[cases])
-        return found
+        """Subset of the cases."""
+        subset = copy.copy(self)
+        subset.since = self.since[cases]
+        subset._filtered = None if self._filtered is None else self._filtered[cases]
+        subset._kept = None if self._kept is None else _Kept(*(part[cases] for part in self._kept))
+        subset._fit = None if self._fit is None else _Fit(self._fit.rate[cases], self._fit.weights[cases])
+        return subset
 
     @property
     def window(self) -> int:
@@ -159,7 +159,7 @@ class Estimator:
 
     @property
     def first(self) -> Any:
-        """When the first estimate is there after the last firing, s."""
+        """Time of the first estimate after the last firing, s."""
         return self.since + (self.law.period if self.sensor.kind == ACCELEROMETER else 0.0)
 
     def feed(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
@@ -176,7 +176,7 @@ class Estimator:
         return np.asarray(np.where(times >= self.since, seen, math.nan))
 
     def on_board(self, z: ComplexArray, spin: Vector) -> ComplexArray:
-        """What the law takes for z as it decides, the delay after the sample: brought up to then where it predicts."""
+        """Estimate of z at the decision, the delay after the sample: propagated to then where the law predicts."""
         if not self.law.loop.predict:
             return z
         best = self.best(z, spin)
@@ -185,7 +185,7 @@ class Estimator:
         return np.asarray(best * np.exp(-1j * self.law.rate(spin) * self.sensor.delay))
 
     def best(self, z: Any, spin: Any) -> ComplexArray:
-        """z without what the filter does to it in the steady state."""
+        """Estimate of z corrected for the steady-state response of the filter."""
         if self.sensor.low_pass == 0.0:
             return np.asarray(z)
         fresh = 1.0 - self._memory
@@ -193,26 +193,26 @@ class Estimator:
 
     @property
     def _memory(self) -> float:
-        """What the filter keeps of its value from sample to sample."""
+        """Share of the filter value kept from sample to sample."""
         return math.exp(-self.step / self.sensor.low_pass)
 
     def _low_pass(self, values: Vector) -> Vector:
-        """y = βy' + (1 - β)x over the samples; it begins anew with the first one after a firing."""
+        """Low-pass filter y = βy' + (1 - β)x over the samples; restarted with the first one after a firing."""
         count = values.shape[-2]
         if self.sensor.low_pass == 0.0 or not count:
             return values
         memory = self._memory
         before = values[..., :1, :] if self._filtered is None else self._filtered
-        found = np.empty_like(values)
+        filtered = np.empty_like(values)
         size = max(int(FILTERED * self.sensor.low_pass / self.step), 1)
         for begin in range(0, count, size):
             part = values[..., begin : begin + size, :]
             weights = memory ** -np.arange(1.0, part.shape[-2] + 1.0)[:, None]
             sums = np.cumsum(part * (1.0 - memory) * weights, axis=-2)
-            found[..., begin : begin + size, :] = (before + sums) / weights
-            before = found[..., begin + part.shape[-2] - 1 : begin + part.shape[-2], :]
+            filtered[..., begin : begin + size, :] = (before + sums) / weights
+            before = filtered[..., begin + part.shape[-2] - 1 : begin + part.shape[-2], :]
         self._filtered = before
-        return found
+        return filtered
 
     def _fitted(self, times: Vector, values: Vector, spin: Vector) -> ComplexArray:
         """z by an offset and a sine of the nutation rate, fitted to the samples of the last period.
@@ -240,15 +240,15 @@ class Estimator:
             both = _windows(values * turned, size, fresh) * turned[..., -fresh:].conj()
             sums += [both.real, -both.imag]
         weights = self._fit.weights
-        sine = sum(one * weights[..., place, None] for place, one in enumerate(sums))
-        found = sine / (np.conj(self.seen_gain) * spin)
-        return np.asarray(np.where(used >= size, found, math.nan))
+        sine = sum(total * weights[..., place, None] for place, total in enumerate(sums))
+        estimate = sine / (np.conj(self.seen_gain) * spin)
+        return np.asarray(np.where(used >= size, estimate, math.nan))
 
     @property
     def seen_gain(self) -> complex:
-        """What the accelerometer shows of z, over ω3."""
-        one, other = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
-        return complex(one / self.law.gauge[0], other / self.law.gauge[1])
+        """Gain of the accelerometer for z, over ω3."""
+        first, second = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
+        return complex(first / self.law.gauge[0], second / self.law.gauge[1])
 
     @property
     def doubt(self) -> float:
@@ -264,19 +264,19 @@ class Estimator:
 
     @property
     def offset(self) -> float:
-        """By how much |z| may be off in every estimate, rad/s: by bias and steps of the sensor."""
+        """Largest common error of |z| in all estimates, rad/s: by bias and steps of the sensor."""
         return self._bias + self._steps
 
     @property
     def doubts(self) -> Doubt:
-        """All of that, for a `Diagnosis`."""
+        """Uncertainties for a `Diagnosis`."""
         least = self.doubt if self.sensor.kind == ACCELEROMETER else 0.0
         off = known_to(self.law.spacecraft)
         return Doubt(self.doubt, self._white, least, self._lift, self._bias, self._steps, *off)
 
     @property
     def _lift(self) -> float:
-        """By how much `best` makes a constant larger, and noise at most: it undoes what the filter does to z."""
+        """Factor of `best` on a constant, and on noise at most: it inverts the filter for z."""
         if self.sensor.low_pass == 0.0:
             return 1.0
         return max(abs(complex(self.best(1.0, self.law.spacecraft.spin))), 1.0)
@@ -299,7 +299,7 @@ class Estimator:
 
 
 class _Kept(NamedTuple):
-    """The last samples of a coast, and how many there were that may be used."""
+    """Last samples of a coast, and the number of usable ones."""
 
     times: Vector
     values: Vector
@@ -314,7 +314,7 @@ class _Fit(NamedTuple):
 
 
 def _fit(rate: Vector, step: float, size: int) -> _Fit:
-    """The least-squares fit of an offset and sines to so many even samples, as weights of their sums."""
+    """Least-squares fit of an offset and sines to ``size`` even samples, as weights of their sums."""
     angle = rate[..., None] * (step * np.arange(1.0 - size, 1.0))[:, None]
     powers = np.arange(1.0, 3.0 if size >= HARMONIC else 2.0)
     turns = np.stack([np.cos(angle * powers), np.sin(angle * powers)], axis=-1)
@@ -327,11 +327,11 @@ def _windows(values: Any, size: int, fresh: int) -> Any:
     """Sums of the last ``size`` values at each of the last ``fresh``; of fewer, where there are no more."""
     sums = np.cumsum(values, axis=-1)
     count = sums.shape[-1]
-    found = sums[..., count - fresh :].copy()
+    sums_of = sums[..., count - fresh :].copy()
     later = max(count - fresh, size)
     if later < count:
-        found[..., later - count :] -= sums[..., later - size : count - size]
-    return found
+        sums_of[..., later - count :] -= sums[..., later - size : count - size]
+    return sums_of
 
 
 def lag(law: Law, sensor: Sensor, spin: float) -> float:

@@ -1,4 +1,4 @@
-"""Fly the closed loop event by event: coast in closed form, decide by samples, fire through the real width, judge."""
+"""Simulation of the closed loop event by event: coast in closed form, decide by samples, fire real widths, judge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Pilot, Scatter
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.flight.propagation import Dynamics, Flight, Leg, Path, make_dynamics
@@ -21,7 +21,7 @@ from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 SEED = 1
-"""Of the noise, where none is named."""
+"""Default seed of the noise."""
 
 LEFT = 0.1
 """Share of the stop threshold that a last firing leaves, about."""
@@ -30,15 +30,15 @@ SMALLEST = 1e-3
 """Share of the start threshold from which a cycle of growing nutation is counted at least."""
 
 REGROWN = 2_000_000
-"""Samples for which it is waited that the nutation grows again."""
+"""Largest number of samples in a wait for the nutation to grow again."""
 
 ROWS = 2000
 """Even moments at which the largest nutation of a run is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """A loop flown to ``until`` s: its firings, why it ended, and the channel to blame.
+class LoopRun:
+    """Loop flown to ``until`` s: its firings, the reason of its end, and the channel to blame.
 
     ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
     ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start; ``lost``: see
@@ -50,7 +50,7 @@ class Run:
     until: float
     key: tuple[int, ...]
     fired: tuple[Fired, ...]
-    stop: Stop
+    stop: Ending
     channel: str | None
     quiet: tuple[float, ...]
     lost: bool
@@ -59,7 +59,7 @@ class Run:
 
     @property
     def schedule(self) -> Schedule:
-        """The pulses that were fired."""
+        """Fired pulses."""
         return self.flight.schedule
 
     @property
@@ -74,12 +74,12 @@ class Run:
 
     @property
     def settled(self) -> float | None:
-        """When it was first down to the stop threshold, s; None where it never was."""
+        """Time at which the loop was first down to the stop threshold, s; None where it never was."""
         return self.quiet[0] if self.quiet else None
 
 
 def until_default(spacecraft: Spacecraft, loop: Loop) -> float:
-    """End of a flight where none is named, s: the horizon, and before it the time until the nutation starts it.
+    """Default end of a flight, s: the horizon, and before it the time until the nutation starts the loop.
 
     Where the nutation grows again from what is left, a cycle longer, in which at most `REGROWN` samples are looked at.
     """
@@ -102,8 +102,8 @@ def fly(
     law: Law | None = None,
     scatter: Scatter | None = None,
     dynamics: Dynamics | None = None,
-) -> Run:
-    """The loop of a ``spacecraft`` flown to ``until`` s; ``dynamics`` flies it by another integrator.
+) -> LoopRun:
+    """Fly the loop of a ``spacecraft`` to ``until`` s; ``dynamics`` flies it by another integrator.
 
     ``law`` is that on board, where it does not know spacecraft and sensor as they are in truth, and ``scatter`` what
     its firings are off by. Raises Infeasible where no law can work, or the flight takes too many samples or firings.
@@ -113,13 +113,13 @@ def fly(
     return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
 
 
-def largest_since(run: Run) -> tuple[float, float]:
-    """The largest nutation from when a loop was first quiet, rad, and when, s; of the end where it never was."""
-    made = run.flight
+def largest_since(run: LoopRun) -> tuple[float, float]:
+    """Largest nutation since a loop first settled, rad, and its time, s; at the end where it never did."""
+    flight = run.flight
     if run.settled is None:
-        rates = made.motion(np.array([run.until]))[0][0]
-        return arc_cones(made.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
-    track = widest(made.sampled(ROWS, run.until), np.asarray(made.moments), run.spacecraft.spin)
+        rates = flight.motion(np.array([run.until]))[0][0]
+        return arc_cones(flight.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
+    track = widest(flight.sampled(ROWS, run.until), np.asarray(flight.moments), run.spacecraft.spin)
     later = track.t >= run.settled
     most = float(track.nutation[later].max())
     row = int(np.argmax(later & (track.nutation >= most * (1.0 - 1e-9))))  # not where rounding has its largest
@@ -127,7 +127,7 @@ def largest_since(run: Run) -> tuple[float, float]:
 
 
 class Alone:
-    """One flight in the making, each stretch by itself."""
+    """Single flight in progress, stretch by stretch."""
 
     def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, key: tuple[int, ...]) -> None:
         self.pilot, self.signal, self.dynamics, self.key = pilot, signal, dynamics, key
@@ -144,13 +144,13 @@ class Alone:
         scatter: Scatter | None = None,
         dynamics: Dynamics | None = None,
     ) -> Alone:
-        """That of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
+        """Flight of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
         moves = dynamics or make_dynamics(spacecraft)
         free = make_dynamics(spacecraft).free  # the body's, so that any integrator flies the same decisions
         pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
         return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
 
-    def fly(self) -> Run:
+    def fly(self) -> LoopRun:
         """Coast and fire until the end, or until something is wrong."""
         pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
         coast = self._coast(state, now)
@@ -174,7 +174,7 @@ class Alone:
         return Coast(self.pilot.law, self.signal, self.dynamics, state, since)
 
     def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
-        """The motion through the thrust of a pulse, from its beginning to its end."""
+        """Motion through the thrust of a pulse, from its beginning to its end."""
         for start, end in itertools.pairwise(sorted(set(pulse.edges))):
             push = pulse.push(start, end)
             torque, slope = ([], None) if push is None else ([push[0]], push[1])
@@ -186,14 +186,14 @@ class Alone:
         done = len(self.pilot.fired) - firing
         self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
 
-    def _run(self, settled: SpinState) -> Run:
-        """The run, which ends its firings with the motion ``settled``."""
+    def _run(self, settled: SpinState) -> LoopRun:
+        """Run that ends its firings with the motion ``settled``."""
         pilot = self.pilot
-        schedule = Schedule(tuple(one.pulse for one in pilot.fired))
+        schedule = Schedule(tuple(firing.pulse for firing in pilot.fired))
         spans = tuple(pulse.thrust for pulse in schedule)
         moments = self.dynamics.moments
-        made = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
-        return Run(
+        flight = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
+        return LoopRun(
             pilot.truth,
             pilot.loop,
             pilot.until,
@@ -204,5 +204,5 @@ class Alone:
             tuple(pilot.quiet),
             pilot.lost,
             pilot.looked_at,
-            made,
+            flight,
         )

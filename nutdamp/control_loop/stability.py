@@ -1,4 +1,4 @@
-"""Whether a firing takes away more nutation than grows until the next: before the flight, channel by channel.
+"""Stability of the loop channel by channel: nutation removed by a firing against its growth until the next.
 
 A firing that comes ε late against z leaves |z - J e^{iε}|: its gain is that over |z|, below 1 while cos ε > J/(2|z|).
 Meanwhile energy dissipation lets the nutation grow by e^{κT} in a period T: the loop damps where the
@@ -24,24 +24,24 @@ HALVINGS = 60
 """Steps in which the largest lateness that still damps is found."""
 
 NEVER = 1e3
-"""e^{κT} from which on it does not matter by how much more it grows."""
+"""Growth e^{κT} from which on further growth does not matter."""
 
 
 class Cause(NamedTuple):
-    """What turns firings of a channel about in truth: the sensor, or that the channel is ``backwards``."""
+    """Causes that reverse firings of a channel: the sensor, or that the channel is ``backwards``."""
 
     sensor: bool
     backwards: bool
 
     @property
     def turned(self) -> bool:
-        """Whether a firing feeds what it is to damp: two errors undo each other."""
+        """True if a firing feeds the nutation: two errors cancel."""
         return self.sensor != self.backwards
 
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """A channel at a ``nutation`` (rad): how ``late`` it fires at most (rad), and what share (``gain``) that leaves.
+    """Channel at a ``nutation`` (rad): its largest delay ``late`` (rad), and the share (``gain``) that this leaves.
 
     It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
     later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
@@ -59,26 +59,26 @@ class Margin:
 
     @property
     def damps(self) -> bool:
-        """Whether a firing takes away more than grows in a period."""
+        """True if a firing removes more than grows in a period."""
         return self.gain * self.growth < 1.0
 
 
 def margins(spacecraft: Spacecraft, loop: Loop, nutation: float | None = None) -> tuple[Margin, ...]:
-    """The margin of each channel at a ``nutation`` (rad), default the start threshold; raises Infeasible as `Law`."""
+    """Margin of each channel at a ``nutation`` (rad), default the start threshold; raises Infeasible as `Law`."""
     law = Law(spacecraft, loop)
     theta = loop.start if nutation is None else nutation
     return tuple(_margin(law, actuator, theta, spacecraft.spin) for actuator in law.actuators)
 
 
 def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
-    """A channel that does not damp, at the start threshold or, where that is more, at the nutation at t = 0."""
+    """Channel that does not damp, at the start threshold or, if larger, at the nutation at t = 0."""
     angles = [loop.start, spacecraft.nutation] if spacecraft.nutation > loop.start else [loop.start]
-    found = (one for theta in angles for one in margins(spacecraft, loop, theta))
-    return next((one for one in found if not one.damps), None)
+    all_margins = (margin for theta in angles for margin in margins(spacecraft, loop, theta))
+    return next((margin for margin in all_margins if not margin.damps), None)
 
 
 def too_late(margin: Margin) -> str:
-    """Why a loop does not damp, before it is flown: what to say of one of its channels."""
+    """Message on a channel of a loop that does not damp."""
     degrees = np.degrees(margin.late)
     theta = np.degrees(margin.nutation)
     what = f"a firing of {margin.channel} leaves {100.0 * margin.gain:.4g} % of a nutation of {theta:.4g} deg"
@@ -107,7 +107,7 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
 
 
 def _most_late(pull: float, growth: float) -> float:
-    """The largest ε in [0, π] with which a firing that takes ``pull`` (of |z|) off damps; -inf where none does."""
+    """Largest ε in [0, π] with which a firing that takes ``pull`` (of |z|) off damps; -inf where none does."""
     if abs(1.0 - pull) * growth >= 1.0:
         return -math.inf
     low, high = 0.0, math.pi
@@ -119,7 +119,7 @@ def _most_late(pull: float, growth: float) -> float:
 
 
 class Band(NamedTuple):
-    """The nutation, rad, that a loop leaves as it falls quiet: at most ``most`` in `SURELY` of the cases.
+    """Nutation, rad, left by a loop as it settles: at most ``most`` in `SURELY` of the cases.
 
     ``noise`` is what the sensor adds to it, ``step`` what the smallest pulse takes away.
     """
@@ -134,7 +134,7 @@ SURELY = 0.99
 
 
 def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
-    """The nutation that is left as the loop falls quiet; raises Infeasible as `Law`.
+    """Nutation that is left as the loop settles; raises Infeasible as `Law`.
 
     The sensor shows no more than the stop threshold in one sample of a period: |z| is that and bias, steps, and noise
     of which one of N samples exceeds σ sqrt(2 ln(N/p)) in a share p. Where half the smallest pulse
@@ -145,7 +145,7 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
     noise = estimator.offset + estimator.doubt / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
     noise /= abs(loop.sensor.scale)
-    steps = [abs(one.kick) * _shortest(spacecraft, one) for one in law.actuators]
+    steps = [abs(actuator.kick) * _shortest(spacecraft, actuator) for actuator in law.actuators]
     stop = law.size(loop.stop, spin) / abs(loop.sensor.scale)
     floor = 0.5 * max(steps)
     most = stop + noise if floor <= stop else floor + 3.0 * noise

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, Budget, Held
+from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.figures import style
 from nutdamp.figures.legends import heading, legend
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
@@ -32,7 +32,7 @@ ROWS = 600
 
 
 @style.styled
-def budget_figure(budget: Budget) -> Figure:
+def budget_figure(budget: HoldingBudget) -> Figure:
     """Nutation without and with firings; below, pulses a day and propellant a year."""
     held = [row for row in budget.held if row.cycle is not None]
     figure = style.sheet(7.4, 3.4 + (1.1 + 0.22 * len(held)) * bool(held))
@@ -59,11 +59,11 @@ def budget_figure(budget: Budget) -> Figure:
     return figure
 
 
-def _named(row: Held) -> str:
+def _named(row: HeldNutation) -> str:
     return f"{math.degrees(row.thresholds.start):.3g} to {math.degrees(row.thresholds.stop):.3g} deg"
 
 
-def _courses(axes: Axes, budget: Budget, held: list[Held]) -> None:
+def _courses(axes: Axes, budget: HoldingBudget, held: list[HeldNutation]) -> None:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
     body = budget.spacecraft
     size = max([PERIODS / _pace(row) + _begins(row) for row in held], default=0.0)
@@ -93,18 +93,18 @@ def _courses(axes: Axes, budget: Budget, held: list[Held]) -> None:
     axes.grid()
 
 
-def _begins(row: Held) -> float:
+def _begins(row: HeldNutation) -> float:
     """Time of the first firing, s; with no nutation that of the first that could grow at once."""
     return row.begins if math.isfinite(row.begins) else 0.0
 
 
-def _pace(row: Held) -> float:
+def _pace(row: HeldNutation) -> float:
     """Cycles, or pulses of a loop that never pauses, 1/s."""
     assert row.cycle is not None
     return row.cycle.cycles or row.cycle.pulses
 
 
-def _sawtooth(growth: float, row: Held, size: float) -> tuple[np.ndarray, np.ndarray]:
+def _sawtooth(growth: float, row: HeldNutation, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Times (s) and nutation (deg) of a limit cycle, by its means, from when it first fires."""
     assert row.cycle is not None
     period, low, high = 1.0 / _pace(row), math.degrees(row.cycle.low), math.degrees(row.cycle.high)

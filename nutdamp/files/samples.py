@@ -11,7 +11,7 @@ import numpy as np
 
 from nutdamp.errors import CannotWrite
 from nutdamp.files.tabular import STDOUT, csv_text
-from nutdamp.montecarlo.inputs import BLOCK, Input
+from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array
 from nutdamp.montecarlo.study import Study
 from nutdamp.spacecraft.model import Spacecraft
@@ -31,7 +31,7 @@ def cone_columns(spacecraft: Spacecraft) -> list[str]:
     return [f"{name}_{angle}" for name in names for angle in ("least_deg", "largest_deg")]
 
 
-def column(entry: Input) -> str:
+def column(entry: DispersedInput) -> str:
     """Heading of an input: its name with the unit as suffix."""
     return f"{entry.name.replace(' ', '_')}_{SUFFIXES.get(entry.unit, entry.unit)}"
 
@@ -67,7 +67,7 @@ class SamplesWriter:
             self._stream.write(("\r\n".join(lines) + "\r\n").encode())
 
 
-def _shown(entry: Input, draw: Array) -> Array:
+def _shown(entry: DispersedInput, draw: Array) -> Array:
     truth = entry.nominal + draw
     return np.degrees(truth) if entry.unit == "rad" else truth
 

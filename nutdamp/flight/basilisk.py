@@ -1,9 +1,9 @@
-"""The same flight by Basilisk, an independent simulator (extra ``verify``): a check from outside the project.
+"""Flight by Basilisk, an independent simulator (extra ``verify``): a check from outside the project.
 
 Basilisk's clock counts whole nanoseconds, its tasks run on a grid of equal steps, and a stop off the grid is made
-early. So every stretch of constant torque is flown in a unit of time of its own, κ seconds, in which it lasts a whole
-number of steps: the rates go in as κω, the torque as κ²M, which leaves Euler's equations as they are. Pulses thereby
-begin and end exactly when they should; nothing is rounded to nanoseconds, neither their times nor their impulses.
+early. Every stretch of constant torque is therefore flown in a unit of time of its own, κ seconds, in which it lasts a
+whole number of steps: the rates go in as κω, the torque as κ²M, which leaves Euler's equations as they are. Pulses
+begin and end exactly; neither their times nor their impulses are rounded to nanoseconds.
 
 The hub is integrated by Runge-Kutta-Fehlberg 7(8) at a fixed step, attitude in modified Rodrigues parameters (MRPs).
 At the default step the flight agrees with `propagation.flown` to some 1e-12 rad over hundreds of radians.
@@ -24,7 +24,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
 TURN = 0.1
-"""rad; the body turns by no more within one default step, which leaves no more error than rounding does."""
+"""Largest turn of the body within a default step, rad: its error is below rounding."""
 
 TURN_TURNING = 0.05
 """rad; the same where a torque turns in the body: held constant for half of each pair of steps, to fourth order."""
@@ -33,7 +33,7 @@ MOST_STEPS = 200_000
 """Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
 
 ACCEPT_ALL = 1e30
-"""Tolerance that no step fails, so that the integrator keeps the step it is given."""
+"""Tolerance that no step fails, so that the integrator keeps its step."""
 
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of the two Gauss nodes from the middle of an interval, over its length."""
@@ -41,7 +41,7 @@ GAUSS = math.sqrt(3.0) / 6.0
 
 @dataclass(frozen=True, eq=False)
 class BasiliskFlight:
-    """The motion as Basilisk flew it, in principal axes; where the rates jump, the row is just after the jump.
+    """Motion flown by Basilisk, in principal axes; where the rates jump, the row is just after the jump.
 
     ``t`` (n,) s, ``rates`` (n, 3) rad/s, ``quaternion`` (n, 4) body -> inertial with scalar part not negative;
     ``step`` is the longest step of integration taken, s.
@@ -97,11 +97,11 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
     """
     moments, rates = np.asarray(spacecraft.inertia.moments), spacecraft.initial.rates
     pushes = schedule.total_impulse + until * math.fsum(
-        math.hypot(abs(one.transverse), one.axial) for one in spacecraft.disturbances
+        math.hypot(abs(disturbance.transverse), disturbance.axial) for disturbance in spacecraft.disturbances
     )
     least = math.sqrt(float(moments.min()))
     pace = (math.sqrt(float(moments @ rates**2)) + pushes / least) / least
-    turning = [abs(one.rate) for one in spacecraft.disturbances if one.rate != 0.0]
+    turning = [abs(disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0]
     angle, pace = (TURN_TURNING, pace + max(turning)) if turning else (TURN, pace)
     return angle / pace if pace > 0.0 else 1.0
 
@@ -109,7 +109,7 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
 def stretches(
     spacecraft: Spacecraft, schedule: Schedule, start: float, end: float, longest: float
 ) -> Iterator[tuple[float, Vector]]:
-    """Durations (s) and constant torques (3,) (N m) that make up one stretch between edges of pulses.
+    """Durations (s) and constant torques (3,) (N m) that make up a stretch between edges of pulses.
 
     One that turns, rises or falls becomes two constant ones an interval, mixed from its values at the Gauss nodes so
     that the mean and the first moment over time are kept: the commutator-free Magnus method of fourth order (Celledoni,
@@ -120,11 +120,13 @@ def stretches(
         if push is not None:
             constant += push[0]
             slope += 0.0 if push[1] is None else push[1]
-    for one in spacecraft.disturbances:
-        constant[2] += one.axial
-        if one.rate == 0.0:
-            constant[:2] += (one.transverse.real, one.transverse.imag)
-    turning = [(one.transverse, one.rate) for one in spacecraft.disturbances if one.rate != 0.0]
+    for disturbance in spacecraft.disturbances:
+        constant[2] += disturbance.axial
+        if disturbance.rate == 0.0:
+            constant[:2] += (disturbance.transverse.real, disturbance.transverse.imag)
+    turning = [
+        (disturbance.transverse, disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0
+    ]
     if not turning and not slope.any():
         yield end - start, constant
         return
@@ -143,7 +145,7 @@ def stretches(
 
 
 class _Hub:
-    """A rigid hub in Basilisk with a torque on it, at the motion of ``spacecraft`` at t = 0, in principal axes."""
+    """Rigid hub in Basilisk with a torque on it, in the state of ``spacecraft`` at t = 0, in principal axes."""
 
     def __init__(self, spacecraft: Spacecraft, longest: float) -> None:
         basilisk = _Modules()
@@ -197,7 +199,7 @@ class _Hub:
 
 
 class _Modules:
-    """The modules of Basilisk that a flight needs, loaded when it flies."""
+    """Modules of Basilisk for a flight, loaded on demand."""
 
     def __init__(self) -> None:
         try:
@@ -212,7 +214,7 @@ class _Modules:
 
 
 def _column(vector: Vector) -> list[list[float]]:
-    """A vector as Basilisk takes it."""
+    """Vector as a Basilisk column."""
     return [[float(component)] for component in vector]
 
 

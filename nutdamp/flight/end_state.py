@@ -1,11 +1,4 @@
-"""End state, extreme angles to exclusion cones, velocity change.
-
-How near the spin axis comes to directions such as the Sun's, and how far from them, nutation included.
-
-What has become of a body by a given time, and how far two models of the same flight are apart.
-
-What pulses add to the velocity: the integral of their forces as the body turns.
-"""
+"""End state of a flight, differences between models, extreme angles to exclusion cones."""
 
 from __future__ import annotations
 
@@ -58,20 +51,20 @@ def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
             continue
         corners = [(ramp.begin, ramp.first) for ramp in pulse.command.ramps]
         corners += [(ramp.end, ramp.last) for ramp in pulse.command.ramps]
-        places, levels = np.array(sorted(corners, key=lambda one: one[0])).T
+        places, levels = np.array(sorted(corners, key=lambda corner: corner[0])).T
         total = total + np.interp(times, places, levels)[:, None] * pulse.force
     return np.asarray(total)
 
 
 SHARE = 0.1
-"""Of a bound of the requirement, by which the impulse sum may err."""
+"""Tolerance of the impulse sum, as a fraction of a bound of the requirement."""
 
 ANGLE = math.radians(0.01)
-"""rad by which it may err where nothing is required."""
+"""Tolerance where nothing is required, rad."""
 
 
 class Deviation(NamedTuple):
-    """By how much the impulse sum errs in a part, and the ``most`` by which it may (rad, rad/s)."""
+    """Error of the impulse sum in a part, and the ``most`` that is tolerated (rad, rad/s)."""
 
     part: Part
     error: float
@@ -84,14 +77,14 @@ class Deviation(NamedTuple):
 
 
 def seen_at(flight: Flight, time: float) -> Flight:
-    """The flight as it has come by ``time`` s, which it must reach: residual, final state and rows end there.
+    """Flight truncated at ``time`` s, which it must reach: residual, final state and rows end there.
 
     Of the pulses those that have begun; what is after one that is still on is the motion at ``time``.
     """
     rates, quaternion = flight.motion(np.array([time]))
     first, second, third = rates[0].tolist()
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
-    kept = [index for index, one in enumerate(begun) if one]
+    kept = [index for index, flag in enumerate(begun) if flag]
     return replace(
         flight,
         schedule=flight.schedule
@@ -124,13 +117,13 @@ def spin_phases(flight: Flight, times: Vector) -> Vector:
 
 
 def left_by(flight: Flight) -> Left:
-    """What a flight leaves, as `compliance` takes it."""
+    """Residual of a flight for `requirements`."""
     residual = flight.residual
     return Left(residual.nutation, residual.axis_error, flight.settled.spin)
 
 
 def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
-    """By how much models may differ in nutation, in the direction of H, and in the spin where the goal names one.
+    """Tolerated difference between models in nutation, direction of H, and spin where the goal names one.
 
     A tenth of what is required; `ANGLE` for a part that nothing bounds.
     """
@@ -138,30 +131,30 @@ def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
 
-def deviations(one: Flight, other: Flight) -> tuple[Deviation, ...]:
-    """In what two flights of one spacecraft end farther apart than is `tolerated`."""
-    body = one.spacecraft
-    ends = [left_by(flight) for flight in (one, other)]
-    found = []
+def deviations(flown: Flight, other: Flight) -> tuple[Deviation, ...]:
+    """Parts in which two flights of one spacecraft end farther apart than `tolerated`."""
+    body = flown.spacecraft
+    ends = [left_by(flight) for flight in (flown, other)]
+    differences = []
     for part, most in tolerated(body).items():
         first, second = (end.spin if part is Part.SPIN else requirements.left_of(part, end, body) for end in ends)
         if abs(first - second) > most:
-            found.append(Deviation(part, abs(first - second), most))
-    return tuple(found)
+            differences.append(Deviation(part, abs(first - second), most))
+    return tuple(differences)
 
 
 ROWS = 48
-"""Rows in each nutation period; between them the moment is found by a parabola, and then looked for about it."""
+"""Rows in each nutation period; between them the extreme is estimated by a parabola and then searched about it."""
 
 CLOSE, LOOKS, FINER = 3, 3, 9
-"""About so many moments it is looked so many times, at so many places: a pulse on its way bends the curve there."""
+"""Extremes that are refined, rounds of refinement, points of each: a pulse on the way bends the curve."""
 
 TRIED = 8
-"""Of the turns of the axis those at which it is looked at closely."""
+"""Turns of the axis that are examined closely."""
 
 
 class Aspect(NamedTuple):
-    """The ``least`` and the ``largest`` angle, rad, from the direction of ``keep`` to the spin axis, and when (s)."""
+    """Angles ``least`` and ``largest``, rad, from the direction of ``keep`` to the spin axis, with their times (s)."""
 
     keep: Keep
     least: float
@@ -171,12 +164,12 @@ class Aspect(NamedTuple):
 
     @property
     def too_near(self) -> bool:
-        """Whether the axis comes nearer than it may."""
+        """True if the axis comes nearer than allowed."""
         return self.least < self.keep.least - SLACK
 
     @property
     def kept(self) -> bool:
-        """Whether the axis stays as near and as far as it is to."""
+        """True if the axis keeps both bounds."""
         return bool(self.keep.used(self.least, self.largest) <= 1.0)
 
 
@@ -198,7 +191,7 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
     times = np.concatenate([piece.t for piece in pieces])
     axis = np.concatenate([piece.axis for piece in pieces])
-    found = []
+    observed = []
     for keep in body.watched:
         nearness = axis @ keep.direction
         tops = [
@@ -208,25 +201,25 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
         looked = np.concatenate(tops)
         angles = attitude.angle_between(flown.axis(looked), keep.direction)
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
-        found.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
-    return tuple(found)
+        observed.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
+    return tuple(observed)
 
 
 def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
-    """The first of the directions to which the axis comes too near, or from which too far; None where there is none."""
-    return next((one for one in aspects(flown) if not one.kept), None) if spacecraft.keep else None
+    """First violated cone; None where there is none."""
+    return next((aspect for aspect in aspects(flown) if not aspect.kept), None) if spacecraft.keep else None
 
 
 def at_target(spacecraft: Spacecraft) -> Aspect | None:
-    """The first cone that an axis on the target breaks, at no time; None where there is none, or no target."""
+    """First cone violated by an axis on the target; None where there is none, or no target."""
     if spacecraft.goal.axis is None:
         return None
-    found = (_seen(spacecraft.goal.axis, keep, math.inf) for keep in spacecraft.keep)
-    return next((one for one in found if not one.kept), None)
+    angles = (_seen(spacecraft.goal.axis, keep, math.inf) for keep in spacecraft.keep)
+    return next((aspect for aspect in angles if not aspect.kept), None)
 
 
 def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
-    """Each direction that the spacecraft watches, from the spin axis at t = 0."""
+    """Angles of the watched directions from the spin axis at t = 0."""
     return tuple(_seen(spacecraft.axis, keep, 0.0) for keep in spacecraft.watched)
 
 
@@ -256,7 +249,7 @@ def _closer(flown: Flight, direction: Vector, times: Vector, width: float, end: 
 
 
 def _peaks(times: Vector, values: Vector) -> Vector:
-    """The times at which ``values`` (n,) may be largest: of the largest row, and on parabolas through three in a row.
+    """Times of possible maxima of ``values`` (n,): the largest row, and vertices of parabolas through three rows.
 
     Of the parabolas with their top between the three the `TRIED` highest count. Rows at the same time, before and after
     a jump, are no neighbours.
@@ -266,7 +259,7 @@ def _peaks(times: Vector, values: Vector) -> Vector:
         rise, fall = np.diff(values)[:-1] / before, np.diff(values)[1:] / after
         way = 0.5 * (rise * after + fall * before) / (rise - fall)
         peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
-    before, after, rise, fall, way = (one[peaked] for one in (before, after, rise, fall, way))
+    before, after, rise, fall, way = (values[peaked] for values in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
     highest = np.argsort(-heights)[:TRIED]
     return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

@@ -1,15 +1,8 @@
-"""A schedule propagated: impulse sum, and real pulse widths.
+"""Propagation of schedules: impulse sum, and real pulse widths.
 
-Flying a schedule: exact arcs between impulses, or Euler's equations through the real widths.
-
-Two flights answer two questions. `by_impulses` is the plan's own model, the impulse sum (17) with effective
-impulses. `flown` is the judge: real widths, true moments. Both give legs that tell the motion at any time.
-
-How a body moves from one moment to the next: the arcs and Taylor pieces of which flights are made.
-
-Motion without jumps between two moments: the coast of a symmetric body in closed form, or Taylor pieces.
-
-How light the propellant that is used leaves the body: principal moments that fall along a schedule.
+`by_impulses` is the plan's own model, the impulse sum (17) with effective impulses. `flown` is the judge: real
+widths, true moments. Both give legs that evaluate the motion at any time: coasts of a symmetric body in closed form,
+else Taylor pieces. The principal moments fall along a schedule with the propellant that is used.
 """
 
 from __future__ import annotations
@@ -29,7 +22,7 @@ from nutdamp.common import work
 from nutdamp.common.results import Tabled
 from nutdamp.flight.track import PIECE, Track, even_times, in_file_axes, make_track, widest
 from nutdamp.physics import attitude, energy_sink, response, taylor
-from nutdamp.physics.taylor import Falling, Forcing, Piece
+from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
@@ -40,7 +33,7 @@ class Path(Protocol):
 
     @property
     def steps(self) -> int:
-        """Steps of integration that it took."""
+        """Steps of integration."""
         ...
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
@@ -77,7 +70,7 @@ class Arc:
         return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
 
     def end(self, time: float) -> SpinState:
-        """The motion at ``time`` s."""
+        """State at ``time`` s."""
         A, C, state, since = self.A, self.C, self.state, time - self.start
         if self.growth != 0.0:
             return SpinState(*energy_sink.arc_end(A, C, self.growth, state.quaternion, state.omega, state.spin, since))
@@ -90,11 +83,11 @@ class Arc:
 class Integrated:
     """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[TaylorPiece, ...]
 
     @property
     def steps(self) -> int:
-        """Steps of integration that it took."""
+        """Steps of integration."""
         return len(self.pieces)
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
@@ -110,7 +103,7 @@ class Integrated:
 
 
 LEG, PULSE = 0.03, 0.4
-"""Units of `work` of a leg of a flight, and of one that is integrated besides its steps."""
+"""Units of `work` of a leg of a flight, and additional ones of an integrated leg."""
 
 SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
 """Units of a step of a symmetric body, of any other, and of one with dissipation."""
@@ -120,7 +113,7 @@ REMEMBERED = 1000
 
 
 class Push(NamedTuple):
-    """What acts on a leg besides what always does; see `Dynamics.path`."""
+    """Torque on a leg besides the permanent ones; see `Dynamics.path`."""
 
     torques: Sequence[Vector]
     slope: Vector | None
@@ -129,7 +122,7 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
-    """The body as one of the two models flies it, and what acts on it besides the pulses.
+    """Body as flown by one of the two models, with all torques besides the pulses.
 
     ``known``: the legs flown before, where they are remembered: see `remembering`.
     """
@@ -140,12 +133,12 @@ class Dynamics:
     known: dict[bytes, tuple[Path, SpinState]] | None = None
 
     def remembering(self) -> Dynamics:
-        """The same, for the flights of trial schedules: each flies anew only from the first pulse that has changed."""
+        """Copy with a cache for trial schedules: each flies anew only from the first changed pulse."""
         return replace(self, known={})
 
     @property
     def free(self) -> bool:
-        """Whether coasts are arcs of a symmetric body without torque from outside, known in closed form."""
+        """True if coasts are arcs of a symmetric body without external torque, known in closed form."""
         return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
 
     @property
@@ -166,7 +159,7 @@ class Dynamics:
         most: int,
         falling: Falling | None = None,
     ) -> tuple[Path, SpinState]:
-        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and the state it ends in.
+        """Motion from ``state`` at ``start`` to ``end`` s under the sum of ``torques``, and its final state.
 
         With a ``slope`` (3,) N m/s the torque runs evenly from that sum; the moments may be ``falling``. Raises
         Infeasible where it takes more than ``most`` steps of integration.
@@ -176,12 +169,12 @@ class Dynamics:
             return self._path(state, start, end, push, most)
         more = (*(() if slope is None else (slope,)), *(falling or ()))
         leg = np.concatenate([self.moments, state.rates, state.quaternion, (start, end), *torques, *more]).tobytes()
-        found = self.known.get(leg)
-        if found is None or found[0].steps > most:
+        path = self.known.get(leg)
+        if path is None or path[0].steps > most:
             if len(self.known) >= REMEMBERED:
                 self.known.clear()
-            found = self.known[leg] = self._path(state, start, end, push, most)
-        return found
+            path = self.known[leg] = self._path(state, start, end, push, most)
+        return path
 
     def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
         work.spend(LEG)
@@ -198,39 +191,43 @@ class Dynamics:
         return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
 
     def with_moments(self, moments: Vector) -> Dynamics:
-        """The same with these principal moments (3,) kg m²."""
+        """Copy with these principal moments (3,) kg m²."""
         first, second, third = moments.tolist()
         return replace(self, moments=(first, second, third))
 
     def kicked(self, state: SpinState, impulse: Vector) -> SpinState:
-        """The state after an ``impulse`` (3,) N m s."""
+        """State after an ``impulse`` (3,) N m s."""
         body = state.rates + impulse / np.asarray(self.moments)
         return SpinState(complex(body[0], body[1]), float(body[2]), state.quaternion)
 
 
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
-    """What is flown: the true principal moments, and what acts besides the pulses."""
+    """Dynamics of the true principal moments and disturbances."""
     disturbances = spacecraft.disturbances
     fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
     transverse = sum(disturbance.transverse for disturbance in fixed)
     return Dynamics(
         moments=spacecraft.inertia.moments,
-        constant=np.array([transverse.real, transverse.imag, math.fsum(one.axial for one in disturbances)]),
+        constant=np.array(
+            [transverse.real, transverse.imag, math.fsum(disturbance.axial for disturbance in disturbances)]
+        ),
         forcing=Forcing(
-            turning=tuple((one.transverse, one.rate) for one in disturbances if one.rate != 0.0),
+            turning=tuple(
+                (disturbance.transverse, disturbance.rate) for disturbance in disturbances if disturbance.rate != 0.0
+            ),
             growth=spacecraft.growth,
         ),
     )
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:
-    """By how much the principal moments fall with each kg of propellant used, (3,) m²; None where they stay."""
+    """Decrease of the principal moments per kg of propellant used, (3,) m²; None where they stay."""
     per_kg = None if spacecraft.tank is None else spacecraft.tank.inertia_per_kg
     return None if per_kg is None else np.array(per_kg)
 
 
 def lightened(spacecraft: Spacecraft, used: float) -> Inertia:
-    """The inertia once so many kg of propellant are ``used``."""
+    """Inertia once ``used`` kg of propellant are gone."""
     per_kg, inertia = shed(spacecraft), spacecraft.inertia
     if per_kg is None or used == 0.0:
         return inertia
@@ -239,22 +236,22 @@ def lightened(spacecraft: Spacecraft, used: float) -> Inertia:
 
 
 class Lightening:
-    """How the moments of the body fall along a flight, as the propellant of the pulses is used."""
+    """Mass-property change along a flight, as the propellant of the pulses is used."""
 
     def __init__(self, dynamics: Dynamics, spacecraft: Spacecraft, schedule: Schedule, edges: Sequence[float]) -> None:
         self.first, self.per_kg = dynamics.moments, shed(spacecraft)
-        times = np.array([*edges, *(0.5 * (one + other) for one, other in pairwise(edges))])
+        times = np.array([*edges, *(0.5 * (start + other) for start, other in pairwise(edges))])
         self.used = {} if self.per_kg is None else dict(zip(times.tolist(), schedule.used_by(times), strict=True))
 
     def halfway(self, dynamics: Dynamics, time: float) -> Dynamics:
-        """The body amid what is used all at once at ``time`` s."""
+        """Body with half of the propellant gone that is used at once at ``time`` s."""
         if self.per_kg is None:
             return dynamics
         before = max((used for when, used in self.used.items() if when < time), default=0.0)
         return dynamics.with_moments(self.first - 0.5 * (before + self.used[time]) * self.per_kg)
 
     def between(self, dynamics: Dynamics, start: float, end: float) -> tuple[Dynamics, Falling | None]:
-        """The body at ``start`` s, and how its moments fall until ``end`` s, with no edge of a pulse in between.
+        """Body at ``start`` s, and the fall of its moments until ``end`` s, with no edge of a pulse in between.
 
         As no more than a quadratic of time: what is used by start, middle and end says all.
         """
@@ -271,24 +268,24 @@ class Lightening:
 
 IMPULSE_SUM = "impulse sum (17)"
 REAL_WIDTHS = "real pulse widths"
-"""The two models by which a schedule is flown."""
+"""Models of the flight of a schedule."""
 
 IDEAL_IMPULSES = "exact motion, ideal impulses"
-"""How the second model is named to people where no pulse has a width."""
+"""Name of the second model for people where no pulse has a width."""
 
 PLANNED_STEPS = 30_000
 """Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
 
 
 def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:
-    """By which model ``schedules`` are flown, as people read it: widths are named where a pulse has one."""
+    """Name of the model of ``schedules`` for people; widths are named where a pulse has one."""
     wide = model != REAL_WIDTHS or any(pulse.on_time for schedule in schedules for pulse in schedule)
     return model if wide else IDEAL_IMPULSES
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """What remains after the last pulse, rad.
+    """Residual after the last pulse, rad.
 
     ``nutation`` is the largest on the following arc (constant for a symmetric body), ``body_cone`` and ``space_cone``
     (signed) are those of that instant, so that they add up to it.
@@ -306,7 +303,7 @@ class Residual:
 
 @dataclass(frozen=True, slots=True)
 class Final:
-    """How the last pulse leaves the body: where it points, and what it does from then on.
+    """Final pointing and subsequent motion of the body.
 
     ``axis`` spin axis and ``momentum`` direction of H, inertial unit vectors (3,), just after the last pulse;
     ``spin`` ω3 rad/s; ``nutation`` rad, as in `Residual`: the half-angle at which the axis goes round H from then on.
@@ -320,7 +317,7 @@ class Final:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A stretch of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped as it began.
+    """Leg of the flight from ``start`` to ``end`` s; ``jump``: the rates jumped at its start.
 
     ``completed`` pulses are over along it, ``completed_at_end`` at its very end (one more where a width ends).
     """
@@ -339,7 +336,7 @@ Motion = tuple[Vector, Vector, Vector, NDArray[np.int64]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight(Tabled):
-    """A schedule flown by one ``model``: its legs in order, and the motion as the last pulse ends.
+    """Flight of a schedule by one ``model``: its legs in order, and the state at the end of the last pulse.
 
     ``moments`` are those at t = 0; ``settled`` is the motion just after the end of the last pulse; ``spans`` are
     the times (s) between which each pulse acts, its centre twice in the impulse sum. The rows that it is shown by are
@@ -360,7 +357,7 @@ class Flight(Tabled):
 
     @property
     def steps(self) -> int:
-        """Steps of integration that it took."""
+        """Steps of integration."""
         return sum(leg.path.steps for leg in self.legs)
 
     @property
@@ -378,7 +375,7 @@ class Flight(Tabled):
 
     @property
     def final(self) -> Final:
-        """Where spin axis and angular momentum end."""
+        """Final direction of spin axis and angular momentum."""
         state = self.settled
         momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.last_moments))
         return Final(
@@ -405,7 +402,7 @@ class Flight(Tabled):
         return first, second, third
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after the jump where there is one."""
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s; just after a jump."""
         times = np.asarray(times, dtype=float)
         owner = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
         body, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
@@ -425,18 +422,18 @@ class Flight(Tabled):
 
     @property
     def track(self) -> Track:
-        """The rows as arrays: SI and rad, body rates and quaternion in the axes of the file."""
+        """Rows as arrays: SI and rad, body rates and quaternion in the axes of the file."""
         return in_file_axes(self.sampled(self.samples, self.shown_to), self.spacecraft.inertia)
 
     def sampled(self, samples: int, until: float) -> Track:
-        """The motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
+        """Motion at ``samples`` even times from 0 to ``until`` s, and just before and after each pulse.
 
         The flight must have been made to reach ``until``.
         """
         return self._joined(self._motions(samples, until))
 
     def pieces(self, samples: int, until: float) -> Iterator[Track]:
-        """The rows of `sampled` in order, about `track.PIECE` at a time, so that many of them take no more memory."""
+        """Rows of `sampled` in order, about `track.PIECE` at a time, to bound memory."""
         motions: list[Motion] = []
         count = 0
         for motion in self._motions(samples, until):
@@ -453,7 +450,7 @@ class Flight(Tabled):
         return make_track(self.moments_at(t), self.spacecraft.spin, t, body, quaternion, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
-        """The rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
+        """Rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
         for leg in self.legs:
             if leg.start > until:
                 break
@@ -467,7 +464,7 @@ class Flight(Tabled):
                 yield times, body, quaternion, completed
 
     def around_pulses(self) -> tuple[Track, Track]:
-        """The motion just before and just after each pulse, one row a pulse; cone angles as in `Residual`."""
+        """Motion just before and after each pulse, a row per pulse; cone angles as in `Residual`."""
         before, after = [], []
         starts, overs = [leg.start for leg in self.legs], [leg.end for leg in self.legs]
         for begins, ends in self.spans:
@@ -482,8 +479,8 @@ class Flight(Tabled):
         quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
         numbers = completed + np.arange(len(t), dtype=np.int64)
         moments = self.moments_at(t)
-        made = make_track(moments, self.spacecraft.spin, t, body, quaternion, numbers)
-        return widest(made, moments, self.spacecraft.spin)
+        track = make_track(moments, self.spacecraft.spin, t, body, quaternion, numbers)
+        return widest(track, moments, self.spacecraft.spin)
 
     @property
     def _sense(self) -> float:
@@ -492,7 +489,7 @@ class Flight(Tabled):
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
-    """The impulse-sum solution, Magnus 1970 (17), pulse by pulse.
+    """Impulse-sum solution, Magnus 1970 (17), pulse by pulse.
 
     Each pulse acts at its centre with its effective impulse (`effective_impulses`). Between them the motion is that of
     the true moments: exact arcs for I1 = I2, as (17) has them, else Taylor series. Disturbances and dissipation act
@@ -515,7 +512,7 @@ def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) 
     last = max(until, schedule.end)
     path, _ = dynamics.path(state, now, last, most=allowed)
     legs.append(Leg(now, last, path, len(schedule), jump=True, completed_at_end=len(schedule)))
-    spans = tuple((one.t, one.t) for one in schedule)
+    spans = tuple((pulse.t, pulse.t) for pulse in schedule)
     return Flight(spacecraft, schedule, tuple(legs), state, spacecraft.inertia.moments, spans, IMPULSE_SUM)
 
 
@@ -526,16 +523,16 @@ def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np
     """
     arcs = by_impulses(spacecraft, schedule).legs[:-1]  # each up to its pulse
     spins = [float(leg.path.motion(np.array([leg.end]))[0][0, 2]) for leg in arcs]
-    found, used = [], 0.0
+    impulses, used = [], 0.0
     for pulse, spin in zip(schedule, spins, strict=True):
         taken = pulse.propellant or 0.0
-        found.append(_effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin))
+        impulses.append(_effective_impulse(spacecraft, lightened(spacecraft, used + 0.5 * taken), pulse, spin))
         used += taken
-    return np.array(found, dtype=complex)
+    return np.array(impulses, dtype=complex)
 
 
 def _effective_impulse(spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float) -> complex:
-    """What ``pulse`` acts like on ω at its centre, N m s, with the ``inertia`` and ω3 before it acts, rad/s, there."""
+    """Effect of ``pulse`` on ω at its centre, N m s, with the ``inertia`` and ω3 (rad/s) before it."""
     drift = spacecraft.spin_drift
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
     if pulse.command is not None and pulse.command.ramps:

@@ -1,4 +1,4 @@
-"""How strong each pulse of a schedule is: cold nozzles and falling pressure, pulse after pulse."""
+"""Propellant supply: strength of each pulse with cold nozzles and falling tank pressure."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ EVEN = 0.01
 """Share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse."""
 
 NODES = 6
-"""Of the quadrature in each of them."""
+"""Nodes of the quadrature in each of them."""
 
 REPEATED, CLOSE = 60, 1e-14
-"""Repetitions, and the share by which an on-time may still change, where one is found for an impulse."""
+"""Iterations, and relative tolerance of the on-time for an impulse."""
 
 
 class Supply:
-    """What has been commanded so far: pulses by channel, and propellant, kg: one number, or an array of cases.
+    """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
 
     By default what was fired before t = 0. ``used`` is what the pulses would take of a tank that lasts: with an empty
     one nothing fires, and the last pulse before that only as far as the propellant goes.
@@ -42,10 +42,10 @@ class Supply:
         self.fired = Counter(before) if fired is None else fired
         self.used = (0.0 if tank is None else tank.used) if used is None else used
         self.steady = not {COLD, BLOWDOWN} & set(spacecraft.thrust_laws)
-        """Whether every pulse is as strong as the file says."""
+        """True if every pulse is as strong as the file says."""
 
     def behind(self, later: Spacecraft) -> Spacecraft:
-        """The spacecraft ``later``, with what has been fired so far before its t = 0."""
+        """Spacecraft ``later``, with all firings so far before its t = 0."""
         cold, tank = later.cold, later.tank
         return replace(
             later,
@@ -56,7 +56,7 @@ class Supply:
 
     @property
     def since(self) -> Any:
-        """What of it has been used since t = 0, kg."""
+        """Propellant used since t = 0, kg."""
         tank = self.spacecraft.tank
         return self.used if tank is None else np.minimum(self.used, tank.propellant) - tank.used
 
@@ -67,21 +67,21 @@ class Supply:
         return level if tank is None else level * tank.thrust_factor(self.used)
 
     def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
-        """The pulse as strong as it really is, taken into account for those after it."""
+        """Fire a pulse; returns it at its real strength."""
         if channel is None or pulse.torque is None or self.steady:
             share = self.draw(pulse.propellant or 0.0)
             return pulse if share == 1.0 else weakened(pulse, share)
-        made = pulse if pulse.command is None else on_command(channel, *pulse.loaded)
+        commanded = pulse if pulse.command is None else on_command(channel, *pulse.loaded)
         before, flow = self.used, self.full_flow(channel)
-        level, propellant = self.take(channel, made.on_time)
+        level, propellant = self.take(channel, commanded.on_time)
         torque, force = channel.torque * level, channel.force
         if self.spacecraft.tank is not None and flow is not None and propellant:
             cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
-            made = falling(made, self.spacecraft.tank, before, flow * cold)
+            commanded = falling(commanded, self.spacecraft.tank, before, flow * cold)
         return replace(
-            made,
+            commanded,
             torque=torque,
-            impulse=torque * made.on_time,
+            impulse=torque * commanded.on_time,
             force=None if force is None else force * level,
             propellant=propellant,
         )
@@ -105,14 +105,14 @@ class Supply:
     def full_flow(self, channel: Channel) -> Any:
         """Propellant of a second of the thrust of the file, kg; times the specific impulse where the tank has it."""
         tank = self.spacecraft.tank
-        if tank is None or tank.isp is None or any(one.thrust is None for one in channel.thrusters):
+        if tank is None or tank.isp is None or any(thruster.thrust is None for thruster in channel.thrusters):
             return channel.mass_flow
         if channel.mass_flow is None:
             return None
-        return sum(one.thrust or 0.0 for one in channel.thrusters) / STANDARD_GRAVITY
+        return sum(thruster.thrust or 0.0 for thruster in channel.thrusters) / STANDARD_GRAVITY
 
     def draw(self, propellant: Any) -> Any:
-        """Draws so many kg; returns the share of them that there is."""
+        """Consume propellant; return the available fraction."""
         tank, before = self.spacecraft.tank, self.used
         self.used = before + propellant
         return 1.0 if tank is None else tank.share(before, propellant)
@@ -134,15 +134,15 @@ class Supply:
         share = self.draw(0.0 if propellant is None else propellant)
         return level * share, None if propellant is None else propellant * share
 
-    def count(self, made: Iterable[Pulse]) -> None:
+    def count(self, pulses: Iterable[Pulse]) -> None:
         """Take pulses into account that are as strong as they really are."""
-        for pulse in made:
+        for pulse in pulses:
             self.fired[pulse.channel] += 1
             self.used += pulse.propellant or 0.0
 
     @property
     def shortage(self) -> str | None:
-        """That more has been fired than the tank has; None where it has not."""
+        """Message if more has been fired than the tank has; else None."""
         tank = self.spacecraft.tank
         if tank is None or self.used <= tank.propellant:
             return None
@@ -155,14 +155,14 @@ class Supply:
 
 
 def weakened(pulse: Pulse, factor: float) -> Pulse:
-    """A pulse of so many times the thrust; backwards where that is negative."""
-    torque, force = (None if one is None else factor * one for one in (pulse.torque, pulse.force))
+    """Pulse at ``factor`` times the thrust; reversed where that is negative."""
+    torque, force = (None if vector is None else factor * vector for vector in (pulse.torque, pulse.force))
     used = None if pulse.propellant is None else abs(factor) * pulse.propellant
     return replace(pulse, impulse=factor * pulse.impulse, torque=torque, force=force, propellant=used)
 
 
 def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
-    """A pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone as it began.
+    """Pulse whose thrust falls with the pressure of the ``tank``, of which ``used`` kg were gone at its start.
 
     ``flow`` as `Tank.burn` takes it. Its ramps are straight pieces, each with the impulse and the centroid of the
     thrust there; its mean level is left to the torque.
@@ -170,7 +170,7 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     start, on_time = pulse.loaded
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
     gone, mean = tank.burn(used, flow, pulse.on_time)
-    first, last = (float(tank.thrust_factor(used + one) / mean) for one in (0.0, gone))
+    first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
     pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
     nodes, weights = gauss_legendre(NODES)
     for ramp in command.ramps:
@@ -192,7 +192,7 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
 
 
 def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ...]:
-    """The ``pulses`` as strong as they really are, in the order of their commands."""
+    """Pulses at their real strength, in the order of their commands."""
     supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
     if supply.steady:
         return tuple(pulses)
@@ -201,7 +201,7 @@ def supplied(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> tuple[Pulse, ..
 
 
 def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Spacecraft, Schedule]:
-    """The body without one ``law`` of `Spacecraft.thrust_laws`, and what the commands of ``schedule`` give then."""
+    """Body without one ``law`` of `Spacecraft.thrust_laws`, and the response to the commands of ``schedule``."""
     if law == VALVES:
         body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
     elif law == LIGHTER and spacecraft.tank is not None:

@@ -1,4 +1,4 @@
-"""The motion as arrays: rates, attitude, spin axis, angular momentum and cone angles over time."""
+"""Track: rates, attitude, spin axis, angular momentum and cone angles over time, as arrays."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BINS = 7200
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The motion over n rows, in principal axes.
+    """Motion over n rows, in principal axes.
 
     ``t`` (n,) s; ``rates`` (n, 3) rad/s; ``quaternion`` (n, 4) body -> inertial; ``axis`` (n, 3) spin axis and
     ``momentum`` (n, 3) N m s in the inertial frame; ``nutation``, ``body_cone``, ``space_cone`` (n,) rad;
@@ -75,23 +75,23 @@ def make_track(
 
 
 def widest(track: Track, moments: Array, spin0: float) -> Track:
-    """The track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
+    """Track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
     sense, rows = math.copysign(1.0, spin0), np.broadcast_to(moments, track.rates.shape).tolist()
-    found = [arc_cones((row[0], row[1], row[2]), rates, sense) for row, rates in zip(rows, track.rates, strict=True)]
-    nutation, body_cone = np.array(found, dtype=float).reshape(-1, 2).T
+    cones = [arc_cones((row[0], row[1], row[2]), rates, sense) for row, rates in zip(rows, track.rates, strict=True)]
+    nutation, body_cone = np.array(cones, dtype=float).reshape(-1, 2).T
     return replace(track, nutation=nutation, body_cone=body_cone, space_cone=nutation - body_cone)
 
 
 def in_file_axes(track: Track, inertia: Inertia) -> Track:
-    """The track with rates and quaternion in the axes of the file."""
+    """Track with rates and quaternion in the axes of the file."""
     rates, quaternion = inertia.in_file_axes(track.rates, track.quaternion)
     return replace(track, rates=rates, quaternion=quaternion)
 
 
 class EvenTimes(NamedTuple):
-    """Some of the even times (n,) s within a stretch; ``first`` and ``last`` part of it."""
+    """Part of the even times (n,) s within a stretch; ``first`` and ``last`` part of it."""
 
     times: Array
     first: bool
@@ -99,7 +99,7 @@ class EvenTimes(NamedTuple):
 
 
 def even_times(samples: int, until: float, start: float, end: float) -> Iterator[EvenTimes]:
-    """Those of ``samples`` even times from 0 to ``until`` s that lie between ``start`` and ``end``, `PIECE` at a time.
+    """Members of ``samples`` even times from 0 to ``until`` s between ``start`` and ``end``, `PIECE` at a time.
 
     There is one part at least, which may be empty. The times are those of np.linspace.
     """
@@ -116,7 +116,7 @@ def even_times(samples: int, until: float, start: float, end: float) -> Iterator
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """How far the spin axis strays over ``rows`` rows from 0 to ``until`` s, rad and s.
+    """Excursion of the spin axis over ``rows`` rows from 0 to ``until`` s, rad and s.
 
     ``farthest`` and ``nearest`` are angles from H at t = 0 with their times; ``x`` and ``y`` the range of the axis
     direction in the inertial frame, as angles from its y-z and x-z planes; ``right_ascension`` (the
@@ -134,7 +134,7 @@ class Extremes:
 
 
 def extremes(pieces: Iterable[Track]) -> Extremes:
-    """Extremes of the axis track over the rows of its pieces, of which there is one at least."""
+    """Extremes of the axis track over the rows of its pieces, at least one."""
     rows, until, start = 0, 0.0, np.zeros(3)
     far, near = _Record(), _Record()
     ranges, ascension = _Range(3), _Circle()
@@ -155,7 +155,7 @@ def extremes(pieces: Iterable[Track]) -> Extremes:
 
 
 class _Record:
-    """The largest of many values, and when it was first reached, all but for rounding.
+    """Running maximum, and the first time it was reached, but for rounding.
 
     After the last pulse of a good plan nothing moves any more: values that differ by rounding are one.
     """
@@ -164,7 +164,7 @@ class _Record:
         self.values, self.times = np.empty(0), np.empty(0)
 
     def add(self, values: Array, times: Array) -> None:
-        """Keep each value that is larger than all before it, as long as it is the largest but for rounding."""
+        """Update by the values of further rows."""
         before = self.values[-1] if len(self.values) else -math.inf
         so_far = np.maximum.accumulate(np.concatenate([[before], values]))
         new = values > so_far[:-1]
@@ -192,7 +192,7 @@ class _Range:
 
 
 class _Circle:
-    """The shortest arc that holds many angles: what is outside is the widest gap between neighbours.
+    """Shortest arc that holds many angles: its complement is the widest gap between neighbours.
 
     Of the angles in each `BINS`-th of a turn the least and the largest are kept; gaps within one are not looked at.
     """

@@ -1,11 +1,8 @@
-"""Cross-check by DOP853, conservation, error budget.
+"""Verification: cross-check by DOP853, conservation laws, error budget.
 
-Fly a schedule by independent means, and tell what each imperfection costs: an error budget a reviewer can sign.
-
-Euler's equations by scipy's DOP853: written apart from everything else that flies, so that it can judge it.
-
-Cross products, a matrix for the tensor, in the axes of the file, and restarts at every edge of a pulse. Where the
-moments fall with the propellant, what is used of it is one number more to be integrated.
+Euler's equations by scipy's DOP853 are written independently of everything else that flies: cross products, a matrix
+for the tensor, in the axes of the file, and restarts at every edge of a pulse. Where the moments fall with the
+propellant, its use is one more integrated number.
 """
 
 from __future__ import annotations
@@ -34,7 +31,7 @@ Push = tuple[Vector, Vector | None]
 """Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
 
 
-class Equations:
+class EulerEquations:
     """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
 
     A state (7,) holds the rates, rad/s, and the quaternion, both of the axes of the file; where the moments fall, (8,),
@@ -51,7 +48,7 @@ class Equations:
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
-        """The state of a motion."""
+        """State vector of a motion."""
         turned = attitude.multiply(motion.quaternion, attitude.from_matrix(self.axes.T))
         return np.concatenate([self.axes @ motion.rates, turned, [] if self.shed is None else [0.0]])
 
@@ -61,12 +58,12 @@ class Equations:
         return states[:, :3] @ self.axes, attitude.multiply(quaternion, attitude.from_matrix(self.axes))
 
     def kicked(self, state: Vector, impulse: Vector, propellant: float = 0.0) -> Vector:
-        """The state after an ``impulse`` (3,) N m s in principal axes, which takes so many kg of ``propellant``."""
+        """State after an ``impulse`` (3,) N m s in principal axes, which uses ``propellant`` kg."""
         _, inverse = self._body(state[7:] + 0.5 * propellant)
         return np.concatenate([state[:3] + inverse @ (self.axes @ impulse), state[3:7], state[7:] + propellant])
 
     def _body(self, used: Vector) -> tuple[Vector, Vector]:
-        """The tensor and its inverse once so many kg are ``used``, (1,), or (0,) where they stay."""
+        """Tensor and its inverse once ``used`` kg, (1,), are gone; (0,) where they stay."""
         if self.shed is None:
             return self.tensor, self.inverse
         tensor: Vector = self.tensor - used[0] * self.shed
@@ -82,7 +79,7 @@ class Equations:
         burn: tuple[float, float] = (0.0, 0.0),
         dense: bool = False,
     ) -> Any:
-        """What solve_ivp gives from ``state`` at ``start`` to ``end`` s, with its interpolant where it is ``dense``.
+        """Result of solve_ivp from ``state`` at ``start`` to ``end`` s, with interpolant where ``dense``.
 
         ``burn``: flow of propellant at ``start``, kg/s, and its slope, kg/s². Raises Infeasible where all of them
         together take more than ``most``.
@@ -119,13 +116,13 @@ class Equations:
     def _disturbed(self, t: float) -> Vector:
         """Torque (3,) N m of the disturbances at ``t`` s, principal axes."""
         total = np.zeros(3)
-        for one in self.spacecraft.disturbances:
-            turned = one.transverse * complex(math.cos(one.rate * t), math.sin(one.rate * t))
-            total += (turned.real, turned.imag, one.axial)
+        for disturbance in self.spacecraft.disturbances:
+            turned = disturbance.transverse * complex(math.cos(disturbance.rate * t), math.sin(disturbance.rate * t))
+            total += (turned.real, turned.imag, disturbance.axial)
         return total
 
     def _sink(self, momentum: Vector) -> Vector:
-        """What energy dissipation adds to dH/dt in the body, (3,) N m in the axes of the file, from H there.
+        """Contribution of energy dissipation to dH/dt in the body, (3,) N m in the axes of the file.
 
         It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space.
         So in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to
@@ -140,11 +137,11 @@ class Equations:
 
 
 def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:
-    """The motion under a schedule: rates (n, 3) and quaternions (n, 4) in principal axes at ``times`` (n,) s ascending.
+    """Rates (n, 3) and quaternions (n, 4) under a schedule in principal axes at ``times`` (n,) s ascending.
 
     Raises Infeasible where that takes more than `EVALUATIONS`.
     """
-    equations = Equations(spacecraft)
+    equations = EulerEquations(spacecraft)
     state = equations.state(spacecraft.initial)
     edges = {0.0, float(times[-1]), *times.tolist()}
     edges |= {edge for pulse in schedule for edge in pulse.edges}
@@ -157,13 +154,13 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
         rows[now] = state
         if end > now:
             firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
-            burn = np.sum([_flow(*one) for one in firing], axis=0) if firing else (0.0, 0.0)
+            burn = np.sum([_flow(*flow) for flow in firing], axis=0) if firing else (0.0, 0.0)
             state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
     return equations.motion(np.array([rows[time] for time in times.tolist()]))
 
 
 def _flow(pulse: Pulse, push: Push) -> tuple[float, float]:
-    """Flow of propellant, kg/s, as a stretch of a pulse begins, and its slope, kg/s²: as the torque, over all of it."""
+    """Flow of propellant, kg/s, at the start of a stretch of a pulse, and its slope, kg/s²."""
     torque, slope = push
     along = (pulse.propellant or 0.0) * pulse.impulse / float(pulse.impulse @ pulse.impulse)
     return float(along @ torque), 0.0 if slope is None else float(along @ slope)
@@ -177,15 +174,15 @@ AGREE = 1e-9
 
 
 IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"
-"""The rows of the budget that every schedule has."""
+"""Rows of the budget of every schedule."""
 
 WITHOUT = "without "
-"""How the rows of the budget begin that leave out what plans include."""
+"""Prefix of the rows of the budget that omit an effect included in plans."""
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way to fly the schedule: its residual (rad), or why it could not be flown.
+    """Method of flying the schedule: its residual (rad), or the reason why it could not be flown.
 
     ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
     ``outside``: an integration that shares nothing with it, and so is to confirm it.
@@ -202,14 +199,14 @@ class Method:
 
     @property
     def short(self) -> str:
-        """The name without what it says of the model."""
+        """Name without the model."""
         return self.name.partition(",")[0]
 
     @property
     def difference(self) -> float:
-        """The largest of the three, NaN where one is not known."""
-        found = (self.axis, self.momentum, self.rate)
-        return float(np.max([math.nan if one is None else one for one in found]))
+        """Largest of the three, NaN where one is unknown."""
+        differences = (self.axis, self.momentum, self.rate)
+        return float(np.max([math.nan if difference is None else difference for difference in differences]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,7 +221,7 @@ class Imperfection:
 
 @dataclass(frozen=True, slots=True)
 class Conservation:
-    """The largest relative change of |H| or of the energy on a coast; ``changed``: what may change it there, if any."""
+    """Largest relative change of |H| or of the energy on a coast; ``changed``: legitimate cause, if any."""
 
     name: str
     drift: float
@@ -232,13 +229,13 @@ class Conservation:
 
     @property
     def kept(self) -> bool | None:
-        """Whether it keeps to `AGREE`; None where something may change it."""
+        """True if within `AGREE`; None where there is a legitimate cause."""
         return None if self.changed else self.drift <= AGREE
 
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """Methods side by side, what must be conserved, and the budget."""
+    """Methods side by side, conserved quantities, and the budget."""
 
     methods: tuple[Method, ...]
     momentum: Conservation
@@ -252,17 +249,17 @@ class Verification:
 
     @property
     def disagreeing(self) -> tuple[str, ...]:
-        """Names of those whose motion differs from the flown one by more than `AGREE`, or is not a number."""
+        """Names of methods whose motion differs from the flown one by more than `AGREE`, or is not a number."""
         return tuple(method.short for method in self._outside if not method.difference <= AGREE)
 
     @property
     def drifting(self) -> tuple[str, ...]:
-        """What changes on coasts although nothing may change it."""
-        return tuple(one.name for one in (self.momentum, self.energy) if one.kept is False)
+        """Quantities that change on coasts without a cause."""
+        return tuple(quantity.name for quantity in (self.momentum, self.energy) if quantity.kept is False)
 
     @property
     def agree(self) -> bool:
-        """Whether there are any, and all of them confirm the flown motion."""
+        """True if there are other methods and all of them confirm the flown motion."""
         return bool(self.checks) and not self.disagreeing
 
     @property
@@ -391,7 +388,7 @@ def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
 def _budget(
     spacecraft: Spacecraft, schedule: Schedule, unrounded: Schedule | None, *, expected: bool
 ) -> tuple[Imperfection, ...]:
-    """Residual of the ideal flight, with each imperfection alone, with all of them; and without what plans include.
+    """Residual of the ideal flight, with each imperfection alone, with all, and without the included ones.
 
     Plans include the moments of the body, with the axial parts of its torques, with dissipation and, ``expected``,
     with disturbances: these are part of the ideal flight, so that it leaves little.
@@ -427,7 +424,7 @@ def _budget(
 
 
 def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
-    """Every pulse as an ideal impulse at its centre, as strong as it acts on ω."""
+    """Every pulse as an ideal impulse at its centre, at its effective strength on ω."""
     effective = propagation.effective_impulses(spacecraft, schedule)
     return Schedule(
         tuple(
@@ -444,7 +441,7 @@ def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
 
 
 def _transverse(schedule: Schedule) -> Schedule:
-    """The schedule without the axial parts of its torques."""
+    """Schedule without the axial parts of its torques."""
     flat = np.array([1.0, 1.0, 0.0])
     return Schedule(
         tuple(

@@ -1,16 +1,8 @@
-"""The realised spacecraft and pulses of each case.
-
-The dispersed cases: what body flies, how it moves at t = 0, and which impulses it really gets.
+"""Dispersed cases: body, initial motion and impulses of each case.
 
 The schedule is fixed: which channel, commanded start, on-time. A case differs from the estimate in its moments, its
-rates, and in what each pulse does. Everything here is elementwise over cases (structure of arrays); a quantity that
-nothing disperses stays one number for all of them.
-
-Vectors and quotients elementwise over cases: one number for all cases, or an array.
-
-How strong pulses of cases are where cold nozzles and the tank are not as the file has them, and what they take.
-
-The directions that the spin axis keeps its distance from, as dispersed cases see them.
+rates, and in the response of each pulse, cold nozzles and tank included. Everything here is elementwise over cases
+(structure of arrays); a quantity that nothing disperses stays one number for all of them.
 """
 
 from __future__ import annotations
@@ -41,25 +33,25 @@ if TYPE_CHECKING:
 
 
 Cases = Any
-"""One number for all cases, or an array (n,): real, or complex where a derivative is taken by a complex step."""
+"""One number for all cases, or an array (n,): real, or complex for complex-step derivatives."""
 
 Triple = tuple[Cases, Cases, Cases]
 
 
 def plus(first: Cases, second: Cases) -> Cases:
-    """A sum that costs nothing where one side is exactly zero for all cases."""
+    """Sum that costs nothing where one side is exactly zero for all cases."""
     if nothing(first):
         return second
     return first if nothing(second) else first + second
 
 
 def times(first: Cases, second: Cases) -> Cases:
-    """A product that costs nothing where one side is exactly zero for all cases."""
+    """Product that costs nothing where one side is exactly zero for all cases."""
     return 0.0 if nothing(first) or nothing(second) else first * second
 
 
 def nothing(value: Cases) -> bool:
-    """Whether it is exactly zero for all cases."""
+    """True if exactly zero for all cases."""
     return isinstance(value, float) and value == 0.0
 
 
@@ -84,18 +76,18 @@ def scaled(vector: Sequence[Cases], factor: Cases) -> Triple:
 
 
 def triple(parts: Iterable[Cases]) -> Triple:
-    """Three components, one for all cases or an array each."""
+    """Three components, numbers for all cases or arrays."""
     x, y, z = parts
     return x, y, z
 
 
 def parts_of(vector: Vector) -> Triple:
-    """The components of one vector (3,)."""
+    """Components of one vector (3,)."""
     return triple(vector.tolist())
 
 
 def tilt_axes(force: Vector) -> tuple[Vector, Vector]:
-    """The two unit axes across a force about which it is tilted: ``a`` square to axis 3 (or 1) too, ``b`` to both."""
+    """Unit axes of tilt of a force: ``a`` perpendicular to it and to axis 3 (or 1), ``b`` to both."""
     along = force / np.linalg.norm(force)
     reference = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
     first = np.cross(along, reference)
@@ -134,7 +126,7 @@ def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
 
 
 def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
-    """The tank as it is in the cases."""
+    """Tank of the cases."""
     if body.tank is None:
         return None
     names = ("propellant", "pressure", "final_pressure", "exponent")
@@ -144,7 +136,7 @@ def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
 
 
 class Fed(NamedTuple):
-    """How strong each pulse is over what it is as planned, and its propellant, kg, None where that is not known.
+    """Dispersed feed: strength of each pulse over the planned one, and its propellant, kg, None where unknown.
 
     ``drained``: share of the propellant in the tank that all of them would take, 1 at most where it lasts; 0 without a
     tank, or where it is not known what they take.
@@ -156,7 +148,7 @@ class Fed(NamedTuple):
 
 
 def supplied(body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]) -> Fed:
-    """How strong the pulses are in cases: none once the tank is empty, nor those that do not fire as planned.
+    """Strength of the pulses of cases: zero once the tank is empty, and of those that do not fire as planned.
 
     ``flows``: what each takes of propellant over what it does as planned, at the same pressure and as warm.
     """
@@ -194,14 +186,14 @@ DISC = 1e-12
 """Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
 
 NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg")
-"""Tolerances of what is never below zero: draws that make it so are drawn again."""
+"""Tolerances of quantities that are never negative: draws that make them so are repeated."""
 
 ROUNDING = 1e-9
 """A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
 
 
 class Thrusting(NamedTuple):
-    """What one thruster gives through a valve that is not as the file has it: times from the start of the command."""
+    """Thrust of one thruster through a dispersed valve: times from the start of the command."""
 
     opened: Opened
     torque: Triple
@@ -232,12 +224,12 @@ class DispersedCases:
 
     @property
     def propellant(self) -> Cases | None:
-        """All of it, kg; None where it is not known."""
+        """Total propellant, kg; None where unknown."""
         return None if self.spent is None else sum(self.spent, 0.0)
 
     @property
     def sheds(self) -> list[tuple[Cases, Cases]] | None:
-        """What each pulse takes off A and C, kg m²; None where they stay."""
+        """Decrease of A and C by each pulse, kg m²; None where they stay."""
         if self.per_kg is None or self.spent is None:
             return None
         across, axial = 0.5 * (self.per_kg[0] + self.per_kg[1]), self.per_kg[2]
@@ -257,7 +249,7 @@ class DispersedCases:
 
 @dataclass(frozen=True, slots=True)
 class _Actuation:
-    """How one pulse follows from what fires: nominal ``impulse``, and the part of it no thruster accounts for."""
+    """Dependence of a pulse on its actuator: nominal ``impulse``, and the part of it of no thruster."""
 
     pulse: Pulse
     source: str | None
@@ -266,7 +258,7 @@ class _Actuation:
 
 
 class _Fired(NamedTuple):
-    """What one pulse gives in each case at the thrust of the file, and its ``flow``; see `DispersedCases`."""
+    """Response of each case to one pulse at the thrust of the file, and its ``flow``; see `DispersedCases`."""
 
     start: Cases
     width: Cases
@@ -277,8 +269,8 @@ class _Fired(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """A spacecraft and the schedule it flies, ready to be dispersed."""
+class DispersedModel:
+    """Spacecraft and schedule, ready to be dispersed."""
 
     spacecraft: Spacecraft
     schedule: Schedule
@@ -311,7 +303,7 @@ class Model:
 
     @property
     def target(self) -> Vector:
-        """Where H shall point, as a unit vector (3,) in the estimated body axes at t = 0.
+        """Target of H, as a unit vector (3,) in the estimated body axes at t = 0.
 
         The goal of the spacecraft where it has one (an inertial axis), else H at t = 0 as the estimate has it.
         """
@@ -324,7 +316,7 @@ class Model:
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """Which cases can be: moments of a rigid body, thrust that pushes."""
+        """True where a case is possible: moments of a rigid body, positive thrust."""
         moments = self._moments(draws)
         good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
@@ -340,31 +332,35 @@ class Model:
         return good  # type: ignore[no-any-return]
 
     def _per_kg(self, draws: Draws) -> Triple | None:
-        """What each kg of propellant takes off the moments, m²; None where they stay."""
+        """Decrease of the moments per kg of propellant, m²; None where they stay."""
         per_kg = shed(self.spacecraft)
         return None if per_kg is None else scaled(parts_of(per_kg), plus(1.0, draws.get("inertia_per_kg", 0.0)))
 
     def cases(self, draws: Draws) -> DispersedCases:
-        """The cases of the ``draws`` (deviations by input name)."""
+        """Cases of the ``draws`` (deviations by input name)."""
         turn = self.spacecraft.inertia.axes
         omega0 = parts_of(self.spacecraft.omega0)
         off = [draws.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)]
-        torques = {source: self._torque(source, draws) for source in {one.source for one in self._actuations}}
-        fired = [self._fired(n, one, torques[one.source], draws) for n, one in enumerate(self._actuations)]
-        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, [one.flow for one in fired])
+        torques = {
+            source: self._torque(source, draws) for source in {actuation.source for actuation in self._actuations}
+        }
+        fired = [
+            self._fired(n, actuation, torques[actuation.source], draws) for n, actuation in enumerate(self._actuations)
+        ]
+        levels, spent, drained = supplied(self.spacecraft, self.schedule, draws, [response.flow for response in fired])
         return DispersedCases(
             moments=self._moments(draws),
             omega0=added(omega0, turned(turn.T, off)),
-            starts=tuple(one.start for one in fired),
-            widths=tuple(one.width for one in fired),
-            leads=tuple(one.lead for one in fired),
+            starts=tuple(response.start for response in fired),
+            widths=tuple(response.width for response in fired),
+            leads=tuple(response.lead for response in fired),
             impulses=tuple(
-                one.impulse if isinstance(level, float) and level == 1.0 else scaled(one.impulse, level)
-                for one, level in zip(fired, levels, strict=True)
+                response.impulse if isinstance(level, float) and level == 1.0 else scaled(response.impulse, level)
+                for response, level in zip(fired, levels, strict=True)
             ),
             thrust=tuple(
-                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in one.thrust)
-                for one, level in zip(fired, levels, strict=True)
+                tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in response.thrust)
+                for response, level in zip(fired, levels, strict=True)
             ),
             tilt=(draws.get("attitude x", 0.0), draws.get("attitude y", 0.0)),
             spent=spent,
@@ -372,40 +368,40 @@ class Model:
             per_kg=self._per_kg(draws),
         )
 
-    def _fired(self, index: int, one: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
-        """What the pulse ``index`` gives; ``nominal`` is the `_torque` of what fires it."""
-        opened, width, number = self._opened(one, draws), self.on_times[index], index + 1
+    def _fired(self, index: int, actuation: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
+        """Response to the pulse ``index``; ``nominal`` is the `_torque` of its actuator."""
+        opened, width, number = self._opened(actuation, draws), self.on_times[index], index + 1
         late = plus(draws.get("timing offset", 0.0), draws.get(f"Sun pulse {number}", 0.0))
         shift = plus(late, draws.get(f"timing pulse {number}", 0.0))
-        start, lead = one.pulse.start, 0.0
-        if one.pulse.command is not None:
-            start = one.pulse.command.start
-            lead = one.pulse.t - 0.5 * width - start
+        start, lead = actuation.pulse.start, 0.0
+        if actuation.pulse.command is not None:
+            start = actuation.pulse.command.start
+            lead = actuation.pulse.t - 0.5 * width - start
         longer: dict[str, Cases] = {}
         if opened:
             parts = {name: each.acts for name, each in opened.items()}
-            longer = {name: acts / one.pulse.on_time for name, (acts, _, _) in parts.items()}
+            longer = {name: acts / actuation.pulse.on_time for name, (acts, _, _) in parts.items()}
             centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
-            fall = 0.0 if one.pulse.command is None else one.pulse.command.fall
+            fall = 0.0 if actuation.pulse.command is None else actuation.pulse.command.fall
             lead = centroid - fall * width / 12.0 - 0.5 * width
         factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
-        torque, mean, flow = nominal if not opened else self._torque(one.source, draws, longer)
-        if one.source == STEERABLE and not self._members[STEERABLE]:
-            impulse = self._steered(one.pulse.impulse, mean, draws)
+        torque, mean, flow = nominal if not opened else self._torque(actuation.source, draws, longer)
+        if actuation.source == STEERABLE and not self._members[STEERABLE]:
+            impulse = self._steered(actuation.pulse.impulse, mean, draws)
         else:
-            impulse = added(scaled(torque, one.duration), scaled(one.remainder, mean))
-        strength = factor * (one.duration / one.pulse.on_time) if opened else 0.0
+            impulse = added(scaled(torque, actuation.duration), scaled(actuation.remainder, mean))
+        strength = factor * (actuation.duration / actuation.pulse.on_time) if opened else 0.0
         return _Fired(
             start=plus(start if nothing(shift) else _not_before(start + shift), lead),
             width=width,
             lead=lead,
             impulse=impulse if isinstance(factor, float) and factor == 1.0 else scaled(impulse, factor),
-            thrust=tuple(self._thrusting(one, name, each, strength, draws) for name, each in opened.items()),
+            thrust=tuple(self._thrusting(actuation, name, each, strength, draws) for name, each in opened.items()),
             flow=flow * factor,
         )
 
     def _moments(self, draws: Draws) -> Triple:
-        """A scales both transverse moments, C is the axial one."""
+        """Moments: the draw of A scales both transverse moments, C is the axial one."""
         inertia = self.spacecraft.inertia
         first, second, third = inertia.moments
         transverse = plus(1.0, times(draws.get("A", 0.0), 1.0 / inertia.A))
@@ -427,27 +423,27 @@ class Model:
             remainder = np.zeros(3)
         return _Actuation(pulse, source, duration, parts_of(remainder))
 
-    def _opened(self, one: _Actuation, draws: Draws) -> dict[str, Opened]:
-        """What the valves of a pulse give, by thruster, where any of them is not as the file has it."""
-        if one.pulse.command is None or one.source is None or not one.pulse.command.ramps:
+    def _opened(self, actuation: _Actuation, draws: Draws) -> dict[str, Opened]:
+        """Response of the valves of a pulse, by thruster, where any of them is dispersed."""
+        if actuation.pulse.command is None or actuation.source is None or not actuation.pulse.command.ramps:
             return {}
         from nutdamp.physics.thruster import Measured, Trapezoid  # few spacecraft have any
 
-        members, on_time = self._members[one.source], one.pulse.command.on_time
+        members, on_time = self._members[actuation.source], actuation.pulse.command.on_time
         if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
             return {}
-        found = {}
+        openings = {}
         for thruster in members:
             off = [draws.get(f"{key} {thruster.name}", 0.0) for key in BY_VALVE]
             if isinstance(thruster.valve, Trapezoid):
-                found[thruster.name] = thruster.valve.opened(on_time, *off[:-1])
+                openings[thruster.name] = thruster.valve.opened(on_time, *off[:-1])
             elif isinstance(thruster.valve, Measured):
-                found[thruster.name] = thruster.valve.opened(on_time, plus(1.0, off[-1]))
-        return found
+                openings[thruster.name] = thruster.valve.opened(on_time, plus(1.0, off[-1]))
+        return openings
 
-    def _thrusting(self, one: _Actuation, name: str, opened: Opened, strength: Cases, draws: Draws) -> Thrusting:
-        """What a thruster gives whose torque is ``strength`` times that of the file."""
-        (thruster,) = (each for each in self._members[one.source or ""] if each.name == name)
+    def _thrusting(self, actuation: _Actuation, name: str, opened: Opened, strength: Cases, draws: Draws) -> Thrusting:
+        """Thrust of a thruster whose torque is ``strength`` times that of the file."""
+        (thruster,) = (each for each in self._members[actuation.source or ""] if each.name == name)
         strength = strength * plus(1.0, draws.get(f"thrust {name}", 0.0))
         return Thrusting(opened, scaled(self.thruster_torque(thruster, draws), strength))
 
@@ -462,7 +458,9 @@ class Model:
         torque: Triple = (0.0, 0.0, 0.0)
         factors = [plus(1.0, draws.get(f"thrust {thruster.name}", 0.0)) for thruster in thrusters]
         if longer is not None:
-            factors = [one * longer.get(thruster.name, 1.0) for one, thruster in zip(factors, thrusters, strict=True)]
+            factors = [
+                factor * longer.get(thruster.name, 1.0) for factor, thruster in zip(factors, thrusters, strict=True)
+            ]
         for thruster, factor in zip(thrusters, factors, strict=True):
             turned = self.thruster_torque(thruster, draws)
             torque = added(torque, turned if isinstance(factor, float) and factor == 1.0 else scaled(turned, factor))
@@ -504,7 +502,7 @@ class Model:
 
 
 def _possible(first: Cases, second: Cases, third: Cases) -> Any:
-    """Which moments a rigid body can have."""
+    """True where moments are those of a rigid body."""
     slack = 1.0 + DISC
     good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
     return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
@@ -519,7 +517,7 @@ def _width(pulse: Pulse) -> float:
 
 
 def _not_before(start: Cases) -> Cases:
-    """A pulse shifted before t = 0 fires at 0; there its derivative is the mean of both sides, one half."""
+    """Starts not before t = 0; at 0 the derivative is the mean of both sides, one half."""
     if not np.iscomplexobj(start):
         return np.maximum(start, 0.0)
     return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
@@ -528,14 +526,14 @@ def _not_before(start: Cases) -> Cases:
 Tilt = tuple[Any, Any]
 
 
-def watch_of(model: Model, cases: DispersedCases) -> AxisWatch:
-    """What sees the angles from the spin axis to the directions of the cones, in each of the ``cases``."""
+def watch_of(model: DispersedModel, cases: DispersedCases) -> AxisWatch:
+    """Observer of the angles from the spin axis to the directions of the cones, in each of the ``cases``."""
     return watch_over(model.spacecraft, cases.tilt, number_of(cases))
 
 
 def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
-    """The same in so many cases of a ``body`` that begin with their axes off by a ``tilt``, rad, about its 1 and 2."""
-    directions = np.array([in_body(body, tilt, count, one.direction) for one in body.keep])
+    """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and 2."""
+    directions = np.array([in_body(body, tilt, count, cone.direction) for cone in body.keep])
     return AxisWatch.of(directions.reshape(-1, 3, count), math.copysign(1.0, body.spin))
 
 
@@ -546,11 +544,13 @@ def in_body(body: Spacecraft, tilt: Tilt, count: int, direction: Vector) -> NDAr
 
 
 def cones_used(keep: Sequence[Keep], aspects: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By cone and case (m, n): what is used up of a cone, see `Keep.used`, by angles (m, 2, n) on the way."""
-    return np.array([one.used(*angles) for one, angles in zip(keep, aspects, strict=True)]).reshape(aspects[:, 0].shape)
+    """Used fraction of cones by cone and case (m, n), see `Keep.used`, from angles (m, 2, n) on the way."""
+    return np.array([cone.used(*angles) for cone, angles in zip(keep, aspects, strict=True)]).reshape(
+        aspects[:, 0].shape
+    )
 
 
 def number_of(cases: DispersedCases) -> int:
-    """How many cases there are."""
+    """Number of cases."""
     parts = (*cases.moments, *cases.omega0, *cases.starts, *cases.tilt, *(cases.spent or ()), *(cases.per_kg or ()))
     return max(np.size(part) for part in (*parts, *(part for pulse in cases.impulses for part in pulse)))

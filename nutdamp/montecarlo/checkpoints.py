@@ -1,4 +1,4 @@
-"""What dispersed cases show on the way: where most of them are after some of the pulses, for abort criteria."""
+"""Abort criteria: where most dispersed cases are after some of the pulses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Milestone:
-    """After so many ``pulses``: what a share of the cases does not leave.
+    """Milestone after so many ``pulses``: values that a share of the cases does not exceed.
 
     ``nutation`` rad is not exceeded; ``spin`` (rad/s) and ``sun_angle`` (rad, of H, None without a Sun) are between
     least and most, beyond which lies as much of the rest on either side.
@@ -35,7 +35,7 @@ class Milestone:
 
 
 def milestones(study: Study, after: Sequence[int], probability: float) -> Iterator[Milestone]:
-    """Where the share ``probability`` of the cases of a ``study`` is ``after`` so many pulses of its schedule."""
+    """Milestones that the share ``probability`` of the cases of a ``study`` keeps ``after`` pulses of its schedule."""
     body, schedule = study.model.spacecraft, study.model.schedule
     drawn, _ = study.source().block(0)
     draws = {name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()}
@@ -47,7 +47,7 @@ def milestones(study: Study, after: Sequence[int], probability: float) -> Iterat
         measure(part.model, ends, outcome)
         sun_angle = None
         if body.sun is not None:
-            momentum = np.array([np.broadcast_to(one, CASES) for one in ends.after])
+            momentum = np.array([np.broadcast_to(component, CASES) for component in ends.after])
             sun = sun_seen(part.model, cases, CASES)
             across = np.linalg.norm(np.cross(momentum, sun, axis=0), axis=0)
             sun_angle = _range(np.arctan2(across, np.sum(momentum * sun, axis=0)), tails)
@@ -61,7 +61,7 @@ def _range(values: NDArray[np.float64], tails: NDArray[np.float64]) -> Range:
 
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:
-    """The first ``count`` pulses of a schedule, and the blocks that fire no more than those."""
+    """First ``count`` pulses of a schedule, and the blocks cut to them."""
     blocks: list[Block] = []
     left = count
     for block in schedule.blocks:
@@ -72,5 +72,5 @@ def first_pulses(schedule: Schedule, count: int) -> Schedule:
 
 
 def even(count: int, most: int) -> list[int]:
-    """At most so many (two or more) of the numbers 1 … ``count``, evenly, the first and the last of them among them."""
+    """Up to ``most`` (two or more) of the numbers 1 … ``count``, evenly spaced, with the first and the last."""
     return sorted({round(number) for number in np.linspace(1, count, min(most, count)).tolist()})

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre
-from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, plus, rotated, times
+from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, plus, rotated, times
 from nutdamp.physics import attitude, energy_sink
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.energy_sink import TINY
@@ -29,12 +29,12 @@ FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
 
 MOST_NODES = 128
-"""Of that quadrature: enough for pulses of 20 nutation periods."""
+"""Largest number of nodes of that quadrature: enough for pulses of 20 nutation periods."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """How cases end.
+    """End states of cases.
 
     ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
     H at t = 0 and at the end in the true body axes of t = 0, which are fixed in space; ``pointed``: the end in the
@@ -63,15 +63,15 @@ class ClosedForm:
     Dissipation acts as the estimate has it, whatever the moments of a case are.
     """
 
-    model: Model
+    model: DispersedModel
 
     def __call__(self, cases: DispersedCases) -> Ends:
-        """How the ``cases`` end, whose pulses all come in the order of the first of them."""
+        """End states of the ``cases``, whose pulses all come in the order of the first of them."""
         return _fly(*_in_order(cases, self._nodes), self.model.spacecraft.growth)
 
     @cached_property
     def _nodes(self) -> tuple[int, ...]:
-        """Quadrature nodes that each pulse needs, from the largest phase it may span."""
+        """Quadrature nodes of each pulse, from the largest phase it may span."""
         body = self.model.spacecraft
         A, C, spin = body.inertia.A, body.inertia.C, abs(body.spin)
         off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
@@ -83,7 +83,7 @@ class ClosedForm:
 
 
 def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
-    """How cases end whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
+    """End states of cases whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
     # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
     A, C = cases.A, cases.C
     a, per_A = 1.0 - C / A, 1.0 / A
@@ -103,9 +103,9 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
         if growth == 0.0:
             phase = phase + a * spin * coast
         else:
-            found, turn = _slipped(turn, (x, y, z), growth, coast)
-            phase = phase + a * spin * found.turned
-            x, y, spin = x * found.transverse, y * found.transverse, spin * found.axial
+            effect, turn = _slipped(turn, (x, y, z), growth, coast)
+            phase = phase + a * spin * effect.turned
+            x, y, spin = x * effect.transverse, y * effect.transverse, spin * effect.axial
             z = C * spin
         if sheds is not None:  # half before the pulse and half after it, the rates as they are
             x, y, A, C = _lighter(x, y, A, C, sheds[number])
@@ -141,7 +141,7 @@ def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases])
 
 
 def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
-    """The quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by |H|·``time``."""
+    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by |H|·``time``."""
     x, y, z = momentum
     size = np.sqrt(x * x + y * y + z * z) + TINY
     half = np.tan(0.5 * size * time)
@@ -153,15 +153,15 @@ def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) ->
 
 def _slipped(
     turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
-) -> tuple[energy_sink.Course, tuple[Cases, ...]]:
-    """What dissipation does in ``time`` s, and ``turn`` with the slip against ``momentum``, of the course's start."""
+) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
+    """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
     x, y, z = momentum
     across = x * x + y * y
     size = np.sqrt(across + z * z) + TINY
-    found = energy_sink.courses(growth, z / size, across / (size * size), time)
-    w, i, j = found.cosine, found.sine * y / size, -found.sine * x / size
+    effect = energy_sink.courses(growth, z / size, across / (size * size), time)
+    w, i, j = effect.cosine, effect.sine * y / size, -effect.sine * x / size
     p, a, b, c = turn
-    return found, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
+    return effect, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
 
 
 def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
@@ -217,7 +217,7 @@ def _effective(
 
 
 def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
-    """The complex number ``along``, ``across`` times another, and ``axial``."""
+    """Complex number ``along``, ``across`` times another, and ``axial``."""
     return (
         plus(times(along, real), times(-1.0, times(across, imaginary))),
         plus(times(along, imaginary), times(across, real)),
@@ -245,14 +245,14 @@ def nodes_for(phase: float) -> int:
 
 @cache
 def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
-    """The nodes above zero of an even Gauss-Legendre rule, with weights for the mean of an even function."""
+    """Positive nodes of an even Gauss-Legendre rule, with weights for the mean of an even function."""
     places, weights = gauss_legendre(nodes)
     half = nodes // 2
     return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
 
 
 def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedCases, tuple[int, ...]]:
-    """The ``cases``, and the ``nodes``, with the pulses in the order of their centres in the first case."""
+    """Cases and ``nodes`` with the pulses in the order of their centres in the first case."""
     centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
     order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable").tolist()
     if order == sorted(order):

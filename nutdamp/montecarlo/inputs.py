@@ -1,21 +1,16 @@
-"""Dispersed inputs, random draws, correlation.
+"""Dispersed inputs of a study: selection, correlation, random draws.
 
-Which quantities a dispersion study draws: the tolerances of the file against the pulses of the schedule.
+The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `DispersedInput`;
+a tolerance without effect becomes an `Unused` with its reason.
 
-Every drawn quantity is one `Input` with a name of its own. A tolerance that cannot touch the outcome is not dropped
-in silence: it becomes an `Unused` with its reason.
+Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
+correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
+ones theirs is (6/π) asin(ρ/2).
 
-Inputs that vary together: a Gaussian copula over the draws of each.
-
-Each input of a group is a monotonic function of a standard normal number, and the correlation given is that of these
-numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform ones theirs is (6/π) asin(ρ/2).
-
-Draws: the same numbers for the same seed, whatever the number of threads or of cases.
-
-Cases come in fixed blocks of `BLOCK`. Every input has a stream of its own in every block: the counter-based Philox
-generator with the seed and the input's name in the key, the block in the counter. So case 1234 is the same in a study
-of any size, and a tolerance that is tightened or dropped leaves the draws of all others as they were. Inputs that are
-correlated are mixed of the streams of their group.
+Draws do not depend on the number of threads or cases. Cases come in fixed blocks of `BLOCK`. Every input has a stream
+of its own in every block: the counter-based Philox generator with the seed and the input's name in the key, the block
+in the counter. So case 1234 is the same in a study of any size, and a tolerance that is tightened or dropped leaves
+the draws of all others as they were. Correlated inputs mix the streams of their group.
 """
 
 from __future__ import annotations
@@ -47,8 +42,8 @@ KNOWN_BY_TORQUE = "the file gives only its torque: where and which way its force
 SCHEDULE_IDLE = "the schedule does not fire"
 
 
-class Input(NamedTuple):
-    """One drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
+class DispersedInput(NamedTuple):
+    """Drawn quantity: its value in a case = ``nominal`` + draw, in ``unit``.
 
     ``tolerance`` is the key of the file's ``dispersions`` it comes from; ``size`` is what its ``kind`` means in
     `nutdamp.spacecraft.tolerances.KINDS`, in ``unit`` (a bare number for factors).
@@ -75,15 +70,15 @@ class Unused(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What a study draws, in a fixed order, and what it leaves."""
+    """Inputs of a study in a fixed order, and unused tolerances."""
 
-    drawn: tuple[Input, ...]
+    drawn: tuple[DispersedInput, ...]
     unused: tuple[Unused, ...]
 
 
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
-    """The inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
-    drawn: list[Input] = []
+    """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
+    drawn: list[DispersedInput] = []
     unused: list[Unused] = []
     for entry in _entries(spacecraft, schedule):
         if isinstance(entry, Unused):
@@ -96,7 +91,7 @@ def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
 
 
 def reachable(spacecraft: Spacecraft) -> Inputs:
-    """What any schedule could draw: the inputs of one that fires each channel and the torquer once.
+    """Inputs of any schedule: those of one that fires each channel and the torquer once.
 
     What each pulse draws is there once.
     """
@@ -117,7 +112,7 @@ def reachable(spacecraft: Spacecraft) -> Inputs:
 
 
 def of_sensor(spacecraft: Spacecraft) -> Inputs:
-    """What a loop draws of its sensor: bias and scale of each gyro on its own; nothing for a spacecraft without one."""
+    """Inputs of the sensor of a loop: bias and scale of each gyro; none for a spacecraft without sensor."""
     requested, loop = spacecraft.dispersions, spacecraft.loop
     if requested is None or loop is None:
         return Inputs((), ())
@@ -143,13 +138,13 @@ def of_sensor(spacecraft: Spacecraft) -> Inputs:
     return Inputs(tuple(drawn), tuple(unused))
 
 
-def _no_size(entry: Input) -> str:
+def _no_size(entry: DispersedInput) -> str:
     if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
         return "given in % of a value that is zero"
     return "its size is zero"
 
 
-def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unused]:
+def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedInput | Unused]:
     requested = spacecraft.dispersions
     if requested is None:
         return
@@ -183,7 +178,7 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
         for number in pulses:
-            yield Input(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
+            yield DispersedInput(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
     if requested.attitude is not None:
         for axis in "xy":
             yield _input(f"attitude {axis}", "attitude", requested.attitude, 0.0, "rad")
@@ -192,14 +187,14 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[Input | Unu
             yield Unused(key.replace("_", " "), "a schedule is fired whatever a sensor shows: --loop flies the loop")
 
 
-def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> Input:
-    """Sizes of relative tolerances become absolute; a factor (nominal one) stays what it is."""
+def _input(name: str, key: str, tolerance: Tolerance, nominal: float, unit: str) -> DispersedInput:
+    """Input of a tolerance: relative sizes become absolute; a factor (nominal one) stays."""
     size = tolerance.size * (nominal if tolerance.relative else 1.0)
-    return Input(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
+    return DispersedInput(name, key, tolerance.kind, size if tolerance.kind == "bias" else abs(size), nominal, unit)
 
 
 def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | None]:
-    """The thrusters that the schedule fires, by name; the steerable torquer has None."""
+    """Thrusters fired by the schedule, by name; the steerable torquer has None."""
     channels = {channel.name: channel for channel in spacecraft.channels}
     members: dict[str, Thruster | None] = {}
     for pulse in schedule:
@@ -210,11 +205,11 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
     return members
 
 
-def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[Input | Unused]:
-    yield Input(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
+def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[DispersedInput | Unused]:
+    yield DispersedInput(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
 
 
-def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     if thruster is None:
         yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
     elif thruster.force is None or thruster.position is None:
@@ -224,7 +219,7 @@ def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> It
             yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
 
 
-def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     if thruster is None:
         yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
     elif thruster.force is None:
@@ -234,8 +229,8 @@ def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Ite
             yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
 
 
-def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[Input | Unused]:
-    """Tolerances of cold nozzles and of the tank; ``fires``: whether any thruster does."""
+def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[DispersedInput | Unused]:
+    """Tolerances of cold nozzles and of the tank; ``fires``: some thruster fires."""
     cold, tank = spacecraft.cold, spacecraft.tank
     first, count = (0.0, 0.0) if cold is None else (cold.first, cold.pulses)
     of_cold = {"cold": (first, ""), "cold_pulses": (count, "")}
@@ -256,12 +251,12 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterat
             yield _input(name, key, tolerance, nominal, unit)
 
 
-def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[Input | Unused]:
+def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
     """A tolerance of a valve, or of a table in its place."""
     called, valve = f"{key} {name}", None if thruster is None else thruster.valve
     delay = getattr(valve, key, None)
     if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
-        yield Input(called, key, tolerance.kind, tolerance.size, 1.0, "")
+        yield DispersedInput(called, key, tolerance.kind, tolerance.size, 1.0, "")
     elif key == "impulse_bit" or delay is None:
         yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
     else:
@@ -270,12 +265,12 @@ def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None)
 
 def _of_pulses(
     key: str, names: Iterable[str], tolerance: Tolerance, nominal: float, unit: str
-) -> Iterator[Input | Unused]:
+) -> Iterator[DispersedInput | Unused]:
     named = list(names)
     if not named:
         yield Unused(key.replace("_", " "), "the schedule has no pulses")
     for name in named:
-        yield Input(name, key, tolerance.kind, tolerance.size, nominal, unit)
+        yield DispersedInput(name, key, tolerance.kind, tolerance.size, nominal, unit)
 
 
 Array = NDArray[np.float64]
@@ -283,22 +278,22 @@ Pair = tuple[str, str, float]
 """Names of two inputs, and their correlation."""
 
 NODES = 96
-"""Of the quadrature by which the correlation of values that are not normal is worked out."""
+"""Nodes of the quadrature for the correlation of values that are not normal."""
 
 
 class Group(NamedTuple):
-    """Inputs that are correlated with one another, directly or through others: ``matrix`` (m, m) of their normals."""
+    """Group of directly or indirectly correlated inputs: ``matrix`` (m, m) of their normals."""
 
     names: tuple[str, ...]
     matrix: Array
 
     @property
     def factor(self) -> Array:
-        """L (m, m), lower: L times independent standard normals has this correlation. The first stays as it is."""
+        """Cholesky factor L (m, m), lower: L times independent standard normals has this correlation."""
         return np.asarray(np.linalg.cholesky(self.matrix))
 
     def among(self, names: Iterable[str]) -> Group:
-        """Those of them that are among ``names``."""
+        """Subgroup of the inputs among ``names``."""
         rows = [row for row, name in enumerate(self.names) if name in set(names)]
         return Group(tuple(self.names[row] for row in rows), self.matrix[np.ix_(rows, rows)])
 
@@ -311,7 +306,7 @@ class Group(NamedTuple):
 
 
 def positive_definite(group: Group) -> bool:
-    """Whether there are numbers with these correlations, none of which follows from the others."""
+    """True if numbers with these correlations exist, none of which follows from the others."""
     try:
         return bool(np.all(np.isfinite(group.factor)))
     except np.linalg.LinAlgError:
@@ -319,13 +314,13 @@ def positive_definite(group: Group) -> bool:
 
 
 def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
-    """The groups that ``pairs`` connect, names in the order of their first pair."""
+    """Groups connected by ``pairs``, names in the order of their first pair."""
     pairs = list(pairs)
     members: list[list[str]] = []
     for first, second, _ in pairs:
-        touched = [one for one in members if first in one or second in one]
-        members = [one for one in members if one not in touched]
-        members.append(list(dict.fromkeys([*(name for one in touched for name in one), first, second])))
+        touched = [member for member in members if first in member or second in member]
+        members = [member for member in members if member not in touched]
+        members.append(list(dict.fromkeys([*(name for member in touched for name in member), first, second])))
     groups = []
     for names in members:
         matrix = np.eye(len(names))
@@ -338,16 +333,16 @@ def grouped(pairs: Iterable[Pair]) -> tuple[Group, ...]:
 
 
 def groups_of(pairs: Iterable[Pair]) -> tuple[Group, ...]:
-    """The same; raises BadRequest where they are not positive definite."""
-    found = grouped(pairs)
-    for group in found:
+    """`grouped`; raises BadRequest for groups that are not positive definite."""
+    groups = grouped(pairs)
+    for group in groups:
         if not positive_definite(group):
             raise BadRequest(f"the correlation of {', '.join(group.names)} is not positive definite")
-    return found
+    return groups
 
 
-def value_of(entry: Input, normal: Array) -> Array:
-    """The deviation that belongs to a standard ``normal`` number, at the same level of its distribution."""
+def value_of(entry: DispersedInput, normal: Array) -> Array:
+    """Deviation of a standard ``normal`` number, at the same level of its distribution."""
     if entry.kind == "normal":
         return entry.size * normal
     from scipy.special import ndtr  # few files have correlated inputs that are not normal
@@ -357,8 +352,8 @@ def value_of(entry: Input, normal: Array) -> Array:
     return np.asarray(entry.size * np.sign(normal) * (1.0 - np.sqrt(2.0 * ndtr(-np.abs(normal)))))
 
 
-def normal_of(entry: Input, value: Array) -> Array:
-    """The inverse of `value_of`."""
+def normal_of(entry: DispersedInput, value: Array) -> Array:
+    """Inverse of `value_of`."""
     if entry.kind == "normal":
         return value / entry.size
     from scipy.special import ndtri  # as above
@@ -368,47 +363,51 @@ def normal_of(entry: Input, value: Array) -> Array:
     return np.asarray(-np.sign(share) * ndtri(np.maximum(below, np.finfo(float).tiny)))
 
 
-def mixing(inputs: Sequence[Input], groups: Iterable[Group]) -> Array:
+def mixing(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> Array:
     """M (d, d): M Mᵀ is the correlation of the values of ``inputs``; the unit matrix where none is correlated.
 
     In a group, column k is what input k adds to those before it.
     """
-    found, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
+    mixed, rows = np.eye(len(inputs)), {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
     for group in groups:
         present = group.among(rows)
         members = [inputs[rows[name]] for name in present.names]
         if len(members) < 2:
             continue
         matrix = [
-            [_of_values(one, other, rho) for other, rho in zip(members, line, strict=True)]
-            for one, line in zip(members, present.matrix.tolist(), strict=True)
+            [_of_values(member, other, rho) for other, rho in zip(members, line, strict=True)]
+            for member, line in zip(members, present.matrix.tolist(), strict=True)
         ]
         at = [rows[name] for name in present.names]
-        found[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
-    return found
+        mixed[np.ix_(at, at)] = np.linalg.cholesky(np.array(matrix))
+    return mixed
 
 
-def independent(draws: Mapping[str, Array], inputs: Iterable[Input], groups: Iterable[Group]) -> dict[str, Array]:
-    """The draws, where those of a group are the independent normals behind them: what each adds to those before it."""
-    named, found = {entry.name: entry for entry in inputs}, dict(draws)
+def independent(
+    draws: Mapping[str, Array], inputs: Iterable[DispersedInput], groups: Iterable[Group]
+) -> dict[str, Array]:
+    """Draws with those of a group replaced by the independent normals behind them."""
+    named, normals_of = {entry.name: entry for entry in inputs}, dict(draws)
     for group in groups:
         present = group.among(draws)
         if len(present.names) < 2:
             continue
         normals = np.array([normal_of(named[name], draws[name]) for name in present.names])
-        found.update(zip(present.names, np.linalg.solve(present.factor, normals), strict=True))
-    return found
+        normals_of.update(zip(present.names, np.linalg.solve(present.factor, normals), strict=True))
+    return normals_of
 
 
-def together(inputs: Sequence[Input], groups: Iterable[Group]) -> list[list[int]]:
+def together(inputs: Sequence[DispersedInput], groups: Iterable[Group]) -> list[list[int]]:
     """Rows of ``inputs``, those of a group in one list, in order."""
     rows = {entry.name: row for row, entry in enumerate(inputs) if entry.sigma > 0.0}
-    found = [[rows[name] for name in group.among(rows).names] for group in groups]
-    taken = {row for one in found for row in one}
-    return sorted([one for one in found if one] + [[row] for row in range(len(inputs)) if row not in taken], key=min)
+    rows_of = [[rows[name] for name in group.among(rows).names] for group in groups]
+    taken = {row for block in rows_of for row in block}
+    return sorted(
+        [block for block in rows_of if block] + [[row] for row in range(len(inputs)) if row not in taken], key=min
+    )
 
 
-def _of_values(first: Input, second: Input, rho: float) -> float:
+def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> float:
     """Correlation of the values of two inputs whose normals have ``rho``, by Gauss-Hermite quadrature."""
     if first.name == second.name:
         return 1.0
@@ -424,7 +423,7 @@ def _of_values(first: Input, second: Input, rho: float) -> float:
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    """Of the standard normal distribution."""
+    """Quadrature nodes of the standard normal distribution."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     return nodes, weights / math.sqrt(2.0 * math.pi)
 
@@ -436,10 +435,10 @@ BLOCK = 16_384
 """Cases that share a substream of each input."""
 
 MOST_ATTEMPTS = 1_000
-"""How often a case may be drawn again before the dispersions count as impossible."""
+"""Largest number of redraws of a case; beyond it the dispersions count as impossible."""
 
 
-class Source:
+class DrawSource:
     """Draws of the blocks of a study. Not to be shared by threads: each makes its own.
 
     ``physical`` tells which of the cases drawn can be (a mask (n,), or True for all); ``groups`` are the inputs that
@@ -448,7 +447,7 @@ class Source:
 
     def __init__(
         self,
-        inputs: Sequence[Input],
+        inputs: Sequence[DispersedInput],
         seed: int,
         physical: Callable[[Draws], NDArray[np.bool_] | bool],
         groups: Iterable[Group] = (),
@@ -469,7 +468,7 @@ class Source:
         self._physical = physical
 
     def block(self, number: int) -> tuple[dict[str, Array | float], NDArray[np.intp]]:
-        """Deviations of the cases of block ``number`` (from 0), and which rows were drawn again (as often as it was).
+        """Deviations of the cases of block ``number`` (from 0), and the rows drawn again (once per redraw).
 
         The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
         """
@@ -495,7 +494,7 @@ class Source:
         return {**self._fixed, **{entry.name: row for entry, row in rows}}
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
-        """Deviations of one block into ``table`` (inputs, cases); each ``attempt`` has a stream of its own."""
+        """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
         for entry in self._alone:
             row, generator = table[self._rows[entry.name]], self._stream(entry.name, block, attempt)
             if entry.kind == "normal":
@@ -518,7 +517,7 @@ class Source:
                     table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
 
     def _stream(self, name: str, block: int, attempt: int) -> np.random.Generator:
-        """The generator, at the begin of what one input draws."""
+        """Generator at the start of the draws of one input."""
         self._bits.state = {
             "bit_generator": "Philox",
             "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": self._keys[name]},

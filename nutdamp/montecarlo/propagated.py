@@ -1,8 +1,6 @@
-"""Cases by real pulse widths, and blocks fired by the Sun.
+"""Propagation of cases through real pulse widths, with the true tensor and the disturbances, many at once.
 
-Cases flown through real pulse widths, with the true tensor and the disturbances, many at once.
-
-Command blocks in dispersed cases: each case fires from the Sun pulses of its own nutating body, many at once.
+Command blocks fire in each case from the Sun pulses of its own nutating body.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from nutdamp.flight.propagation import Dynamics, make_dynamics
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,
-    Model,
+    DispersedModel,
     Thrusting,
     Triple,
     in_body,
@@ -33,8 +31,8 @@ from nutdamp.montecarlo.cases import (
 )
 from nutdamp.montecarlo.closed_form import Ends, carried
 from nutdamp.physics import batch, sky
-from nutdamp.physics.batch import Bodies, Stretch
-from nutdamp.physics.sky import AxisWatch, Push, SunClock
+from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.schemes.block_model import fire, pushes
@@ -42,8 +40,8 @@ from nutdamp.schemes.block_model import fire, pushes
 Array = NDArray[np.float64]
 
 
-class Fired(NamedTuple):
-    """How cases move as their last pulse ends, and what was fired.
+class FiredBlocks(NamedTuple):
+    """Motion of cases at the end of their last pulse, and the fired pulses.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n); ``starts`` (k, n) s of the pulses; ``seen`` (k, n): whether they
     fire, which needs the sensor to have seen the Sun up to then in the same turns as in the nominal flight: another
@@ -58,15 +56,15 @@ class Fired(NamedTuple):
 
 
 def fly(
-    model: Model,
+    model: DispersedModel,
     bodies: Bodies,
     rates: Array,
     quaternion: Array,
     cases: DispersedCases,
     nominal: Sequence[bool],
     watch: AxisWatch | None = None,
-) -> Fired:
-    """The pulses of the blocks of ``model``, fired in each case from its own Sun pulses; ``watch`` sees the motion.
+) -> FiredBlocks:
+    """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
     ``nominal``: `seen_nominally`. A pulse that is due while the one before is on begins as that ends.
     """
@@ -85,9 +83,9 @@ def fly(
         def part(value: object, rows: slice = rows) -> Array:
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
 
-        start = Stretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
+        start = MotionStretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
         sense = math.copysign(1.0, body.spin)
-        clock = SunClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
+        clock = SunPulseClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
         sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
@@ -95,28 +93,28 @@ def fly(
             passage = int(passages[number - 1]) if number <= len(passages) else before + 1
             for between in () if sees_all else range(before + 1, passage):
                 alike &= body.sun_sensor.sees(clock.angle(clock.sun_pulse(between))) == nominal[between - 1]
-            found, before = clock.sun_pulse(passage), passage
-            alike &= body.sun_sensor.sees(clock.angle(found)) & ~clock.lost
+            sun_pulse, before = clock.sun_pulse(passage), passage
+            alike &= body.sun_sensor.sees(clock.angle(sun_pulse)) & ~clock.lost
             seen[index, rows] = alike
-            impulse = np.where(seen[index, rows], np.array([part(one) for one in cases.impulses[index]]), 0.0)
+            impulse = np.where(seen[index, rows], np.array([part(impulse) for impulse in cases.impulses[index]]), 0.0)
             if cases.thrust[index]:
                 torques = _pushes(cases.thrust[index], seen[index, rows], part)
             else:
                 torques = pushes(pulses[index], impulse / (pulses[index].on_time or 1.0))
             sheds = None
             if cases.per_kg is not None and cases.spent is not None:
-                sheds = np.array([part(one * cases.spent[index]) * seen[index, rows] for one in cases.per_kg])
-            fired = clock.fire(found, block.delay + part(shifts[index]), block.width, torques, sheds)
+                sheds = np.array([part(per_kg * cases.spent[index]) * seen[index, rows] for per_kg in cases.per_kg])
+            fired = clock.fire(sun_pulse, block.delay + part(shifts[index]), block.width, torques, sheds)
             starts[index, rows] = fired + part(cases.leads[index])
             if watch is not None:
                 for here, end in clock.passed:
                     watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
-    return Fired(rates, quaternion, starts, seen, over)
+    return FiredBlocks(rates, quaternion, starts, seen, over)
 
 
-def seen_nominally(model: Model) -> list[bool]:
-    """Whether the sensor sees each passage of the Sun in the nominal flight; none, where that cannot be fired."""
+def seen_nominally(model: DispersedModel) -> list[bool]:
+    """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
     sensor, blocks = model.spacecraft.sun_sensor, model.schedule.blocks
     if sensor is not None and sensor.sees_all:
         return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
@@ -126,32 +124,32 @@ def seen_nominally(model: Model) -> list[bool]:
         return [False]
 
 
-def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[Push]:
-    """The torques of thrusters through valves of their own, together, from one corner of any of them to the next."""
-    torques = [np.array([part(one) for one in each.torque]) * seen for each in thrust]
+def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
+    """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
+    torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
     opened = [
         Opened(tuple(map(part, each.opened.corners)), part(each.opened.level))  # type: ignore[arg-type]  # four
         for each in thrust
     ]
     edges = np.sort(np.array([each.corners for each in opened]).reshape(-1, len(seen)), axis=0)
-    found = []
+    pushes = []
     for begin, end in pairwise(edges):
         middle, first, last = 0.5 * (begin + end), np.zeros_like(torques[0]), np.zeros_like(torques[0])
         for each, torque in zip(opened, torques, strict=True):
             first = first + torque * each.within(middle, begin)
             last = last + torque * each.within(middle, end)
-        found.append(Push(begin, end, first, last))
-    return found
+        pushes.append(TorqueRamp(begin, end, first, last))
+    return pushes
 
 
-def sun_seen(model: Model, cases: DispersedCases, count: int) -> Array:
-    """The direction to the Sun in the true body axes of t = 0, (3, n)."""
+def sun_seen(model: DispersedModel, cases: DispersedCases, count: int) -> Array:
+    """Direction to the Sun in the true body axes of t = 0, (3, n)."""
     assert model.spacecraft.sun is not None
     return in_body(model.spacecraft, cases.tilt, count, model.spacecraft.sun)
 
 
 CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
-"""Units of work: of a case and of each of its pulses, of a step of a coast that is no arc, of a look at its axis."""
+"""Units of work: of a case and of each of its pulses, of a step of a numerical coast, of an observation of its axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +159,7 @@ class RealWidths:
     Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
     """
 
-    model: Model
+    model: DispersedModel
 
     @cached_property
     def _dynamics(self) -> Dynamics:
@@ -182,7 +180,7 @@ class RealWidths:
         return CASE * (1.0 + len(self.model.schedule)) + stepping
 
     def __call__(self, cases: DispersedCases) -> Ends:
-        """How the ``cases`` end. Raises Infeasible for motions too long to be integrated."""
+        """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
         count = number_of(cases)
         watch = watch_of(self.model, cases) if self.model.spacecraft.keep else None
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
@@ -204,7 +202,7 @@ class RealWidths:
         shed = _sheds(cases, count)
         last = moments if shed is None else moments - shed.sum(axis=0)
         if watch is not None:
-            watch.turn(batch.Stretch(self._bodies(last), over, settled, turned))
+            watch.turn(batch.MotionStretch(self._bodies(last), over, settled, turned))
         momentum = triple(last * settled)
         after = carried(tuple(turned), momentum)
         sense = math.copysign(1.0, self.model.spacecraft.spin)
@@ -225,7 +223,7 @@ class RealWidths:
         return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
 
     def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> batch.Pulses:
-        """The pulses by the ramps of their thrust, each as one of its own; as in `batch.Pulses`."""
+        """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
         count, sheds = starts.shape[1], _sheds(cases, starts.shape[1])
         begins, lengths, parts, leans, falls = [], [], [], [], []
 
@@ -251,14 +249,16 @@ class RealWidths:
                 continue
             command = start - cases.leads[number]
             fall = 0.0 if pulse.command is None else pulse.command.fall  # of the nominal pulse, evenly
-            for one in thrust:
-                acts, passed = one.opened.acts[0], 0.0
-                for begin, length, level, lean in one.opened.pieces:
+            for thruster in thrust:
+                acts, passed = thruster.opened.acts[0], 0.0
+                for begin, length, level, lean in thruster.opened.pieces:
                     area = level * length
                     part = area / np.where(acts == 0.0, 1.0, acts)
                     area = area * (1.0 + fall * (0.5 - passed - 0.5 * part))
                     lean = lean - 0.5 * fall * part
-                    add(command + begin, length, _whole(one.torque, count) * area, lean, number, part / len(thrust))
+                    add(
+                        command + begin, length, _whole(thruster.torque, count) * area, lean, number, part / len(thrust)
+                    )
                     passed = passed + part
         return batch.Pulses(
             np.array(begins).reshape(-1, count),
@@ -270,7 +270,7 @@ class RealWidths:
 
 
 def _sheds(cases: DispersedCases, count: int) -> Array | None:
-    """What each pulse takes off the moments, (k, 3, n) kg m²; None where they stay."""
+    """Decrease of the moments by each pulse, (k, 3, n) kg m²; None where they stay."""
     if cases.per_kg is None or cases.spent is None:
         return None
     return np.array([_whole(cases.per_kg, count) * kg for kg in cases.spent]).reshape(-1, 3, count)

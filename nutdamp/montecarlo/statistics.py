@@ -1,20 +1,12 @@
-"""Percentiles, Clopper-Pearson, sensitivities.
+"""Statistics of a study: output vectors, percentiles, exact binomial intervals, sensitivities.
 
-Which tolerance matters: first-order sensitivities of the outcome, and the shares that the drawn cases show.
+First-order sensitivities are analytic: the closed form runs on numbers with an infinitesimal imaginary part
+(complex-step differentiation, Squire & Trapp 1998), which carries each input's derivative through every operation to
+rounding. The shares from the cases are first-order Sobol indices, from the means of the outcome over equally likely
+intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
 
-First order is analytic: the kernel itself runs on numbers with an infinitesimal imaginary part (complex-step
-differentiation, Squire & Trapp 1998), which carries each input's derivative through every operation to rounding,
-without differences of nearby numbers. The shares from the cases are first-order Sobol indices, from the means of the
-outcome over equally likely intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
-
-Distributions of an output over many cases: exact while they fit, in constant memory beyond.
-
-Everything here is the same in whatever order or portions the cases come: exact values have their places, and the
-sketch only counts.
-
-The exact interval for a probability of which so many of so many cases were seen; by the standard library alone.
-
-What a study reports of each case: five numbers, and the small vectors of which two are the lengths.
+Distributions are exact while they fit, in constant memory beyond. Results do not depend on the order or portions of
+the cases: exact values have their places, and the sketch only counts.
 """
 
 from __future__ import annotations
@@ -27,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import Cases, DispersedCases, Model, Triple, parts_of
+from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
 from nutdamp.montecarlo.closed_form import ClosedForm, Ends
-from nutdamp.montecarlo.inputs import Input, mixing
+from nutdamp.montecarlo.inputs import DispersedInput, mixing
 
 STEPS = 200
 """Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly."""
@@ -45,7 +37,7 @@ LARGE = 20.0
 
 
 def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """The exact interval for a probability of which ``successes`` of ``trials`` were seen, Clopper & Pearson 1934.
+    """Exact confidence interval of a probability from ``successes`` of ``trials``, Clopper & Pearson 1934.
 
     It holds the true probability at least as often as ``confidence`` says, whatever that probability is.
     """
@@ -62,7 +54,7 @@ def cases_to_show(probability: float, confidence: float = 0.95) -> int:
 
 
 def _quantile(a: float, b: float, tail: float, *, upper: bool) -> float:
-    """Where a beta distribution has ``tail`` below (``upper``: above): by Newton's steps, halving where they fail."""
+    """Quantile of a beta distribution with ``tail`` below (``upper``: above) by Newton's method and bisection."""
     low, high, x = 0.0, 1.0, a / (a + b)
     for _ in range(STEPS):
         below, above, density = _beta(a, b, x)
@@ -91,12 +83,12 @@ def _beta(a: float, b: float, x: float) -> tuple[float, float, float]:
 
 
 def _logarithm(more: float, ratio: float) -> float:
-    """The logarithm of a ``ratio`` that is 1 + ``more``, whichever of the two is the more exact."""
+    """Logarithm of a ``ratio`` that is 1 + ``more``, by the more exact of the two."""
     return math.log1p(more) if abs(more) < 0.5 else math.log(ratio)
 
 
 def _rest(z: float) -> float:
-    """What Stirling's formula lacks: ln Γ(z) - (z - 1/2) ln z + z - ln(2π)/2."""
+    """Remainder of Stirling's formula: ln Γ(z) - (z - 1/2) ln z + z - ln(2π)/2."""
     if z < LARGE:
         return math.lgamma(z) - (z - 0.5) * math.log(z) + z - 0.5 * math.log(2.0 * math.pi)
     square = 1.0 / (z * z)
@@ -104,7 +96,7 @@ def _rest(z: float) -> float:
 
 
 def _fraction(a: float, b: float, x: float) -> float:
-    """The continued fraction of the incomplete beta function, by Lentz's method; it takes some √(a + b) terms."""
+    """Continued fraction of the incomplete beta function, by Lentz's method, in some √(a + b) terms."""
     c, d = 1.0, 1.0 / _not_zero(1.0 - (a + b) * x / (a + 1.0))
     value = d
     for m in range(1, 100 + 20 * math.isqrt(int(a + b))):
@@ -136,14 +128,14 @@ VECTORS = {
     "spin_change": slice(8, 9),
     "propellant": slice(9, 10),
 }
-"""Which rows of `vectors` belong to each output."""
+"""Rows of `vectors` by output."""
 
 ROWS = 10
 """Rows of `vectors`."""
 
 
-def measure(model: Model, ends: Ends, out: Array) -> None:
-    """The `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where it is not known."""
+def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
+    """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
     x, y, z = ends.momentum
     sense = math.copysign(1.0, model.spacecraft.spin)
     out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
@@ -153,8 +145,8 @@ def measure(model: Model, ends: Ends, out: Array) -> None:
     out[4] = np.nan if ends.propellant is None else ends.propellant
 
 
-def vectors(model: Model, ends: Ends, out: NDArray[Any]) -> None:
-    """What varies linearly for small dispersions, into ``out`` (10, n); `VECTORS` names the rows.
+def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
+    """Write quantities that are linear for small dispersions into ``out`` (10, n); `VECTORS` names the rows.
 
     Nutation is the length of the transverse momentum over the axial one, the shift of H that of the change of its
     direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
@@ -185,13 +177,13 @@ def angle(first: Triple, second: Triple) -> Cases:
 
 
 EXACT_CASES = 10_000_000
-"""Up to so many cases every value is kept, and percentiles are exact."""
+"""Number of cases up to which every value is kept, and percentiles are exact."""
 
 SHARPNESS = 10
 """Leading bits of the mantissa that the sketch tells apart: bins 0.1 % wide, so their middles are 0.05 % off."""
 
 OCTAVES = 64
-"""The sketch tells sizes from 2^-64 to 2^64 apart; what is smaller counts as zero."""
+"""Octaves of the sketch: sizes from 2^-64 to 2^64; smaller ones count as zero."""
 
 PORTION = 16_384
 """Values that are counted at once, so that they stay in the cache."""
@@ -223,7 +215,7 @@ class Exact:
         Each divides what lies above the last one.
         """
         places = np.asarray(probabilities) * (len(self.values) - 1)
-        found = np.empty(len(places))
+        quantiles = np.empty(len(places))
         rest, first = self.values.copy(), 0  # what lies above the last quantile, and its rank
         for index in np.argsort(places).tolist():
             rank = int(places[index])
@@ -231,8 +223,8 @@ class Exact:
             rest, first = rest[rank - first :], rank
             share = places[index] - rank
             low, high = rest[0], rest[1:].min() if share else rest[0]
-            found[index] = low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)
-        return found
+            quantiles[index] = low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)
+        return quantiles
 
     def histogram(self, edges: Array) -> Array:
         """Cases between each two of ``edges``."""
@@ -261,8 +253,8 @@ class Sketch:
                 np.copyto(bins, -1 - bins, where=part < 0.0)
             bins += _SIZES
             lowest = int(bins.min())
-            found = np.bincount(bins - lowest)  # values lie close together: few bins to count
-            self.counts[lowest : lowest + len(found)] += found
+            counts = np.bincount(bins - lowest)  # values lie close together: few bins to count
+            self.counts[lowest : lowest + len(counts)] += counts
             self.minimum, self.maximum = min(self.minimum, least), max(self.maximum, most)
 
     def quantiles(self, probabilities: Array) -> Array:
@@ -283,7 +275,7 @@ Distribution = Exact | Sketch
 
 
 def _middles() -> Array:
-    """The value that represents each bin of a sketch."""
+    """Representative value of each bin of a sketch."""
     low = ((np.arange(_SIZES, dtype=np.int64) + _LOWEST) << _SHIFT).view(np.float64)
     sizes = low * (1.0 + 0.5 ** (SHARPNESS + 1))
     sizes[0] = 0.0
@@ -291,7 +283,7 @@ def _middles() -> Array:
 
 
 class Worst:
-    """The cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
+    """Cases of greatest severity, in a fixed order: the most severe first, then the lower number."""
 
     def __init__(self, keep: int) -> None:
         self.keep = keep
@@ -314,10 +306,10 @@ class Worst:
 
 
 STEP = 1e-30
-"""Imaginary step, as a share of an input's size: nothing is subtracted, so nothing is lost however small it is."""
+"""Imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost."""
 
 SHARE = 1e-3
-"""Of an input's size, by which it is changed to either side where differences are taken."""
+"""Step of central differences, as a share of an input's size."""
 
 CLASSES = 128
 """Intervals of an input over which the cases are averaged, at most."""
@@ -328,14 +320,14 @@ CLASS_SIZE = 32
 
 @dataclass(frozen=True, eq=False)
 class FirstOrder:
-    """The outcome to first order about nominal values (and biases).
+    """Outcome to first order about nominal values (and biases).
 
     ``jacobian`` (10, d): derivative of each row of `nutdamp.montecarlo.statistics.vectors` by each drawn input, in its
     unit; ``sigmas`` (d,) standard deviations of the inputs. ``mixing`` (d, d), times its transpose, is their
     correlation; None where they are independent.
     """
 
-    inputs: tuple[Input, ...]
+    inputs: tuple[DispersedInput, ...]
     jacobian: Array
     mixing: Array | None = None
 
@@ -350,7 +342,7 @@ class FirstOrder:
         return np.asarray(scaled @ scaled.T)
 
     def independent(self, output: str) -> Array:
-        """What one sigma of each input adds to that vector, (m, d); of correlated ones beyond those before it."""
+        """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those before it."""
         scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
         return scaled if self.mixing is None else np.asarray(scaled @ self.mixing)
 
@@ -359,7 +351,7 @@ class FirstOrder:
         return float(np.sqrt(np.trace(self.covariance(output))))
 
     def effects(self, output: str) -> Array:
-        """What each input alone does to ``output``, (d,): one sigma of it, or all of a bias."""
+        """Effect of each input alone on ``output``, (d,): one sigma of it, or all of a bias."""
         sizes = np.array([entry.sigma or abs(entry.size) for entry in self.inputs])
         return np.asarray(np.linalg.norm((self.jacobian * sizes)[VECTORS[output]], axis=0))
 
@@ -374,11 +366,11 @@ class FirstOrder:
 
 
 ALIKE = 0.01
-"""Share by which the derivatives of the closed form may differ from those of what is flown, and be used for them."""
+"""Relative difference up to which derivatives of the closed form may replace those of the flight."""
 
 
-def as_flown(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """The derivatives of what ``fly`` flies: those of the closed form where they agree, for they have no rounding.
+def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+    """Derivatives of the model that ``fly`` flies: those of the closed form, which have no rounding, where they agree.
 
     By output and input; else central differences.
     """
@@ -387,14 +379,14 @@ def as_flown(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
         return flown
     closed, jacobian = first_order(model).jacobian, flown.jacobian.copy()
     for rows in VECTORS.values():
-        apart, size = (np.linalg.norm(one[rows], axis=0) for one in (closed - jacobian, jacobian))
+        apart, size = (np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian))
         alike = apart <= ALIKE * size
         jacobian[rows, alike] = closed[rows, alike]
     return FirstOrder(flown.inputs, jacobian, flown.mixing)
 
 
-def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
-    """The same by central differences of what ``fly`` flies, which no closed form has: blocks fired by Sun pulses."""
+def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
+    """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun pulses."""
     inputs = model.inputs.drawn
     steps = np.array([SHARE * abs(entry.size) for entry in inputs])
     draws: dict[str, Array | float] = {}
@@ -408,7 +400,7 @@ def by_differences(model: Model, fly: Callable[[DispersedCases], Ends]) -> First
     return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
 
 
-def first_order(model: Model) -> FirstOrder:
+def first_order(model: DispersedModel) -> FirstOrder:
     """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
     inputs = model.inputs.drawn
     jacobian = np.zeros((ROWS, len(inputs)))
@@ -424,7 +416,7 @@ def first_order(model: Model) -> FirstOrder:
     return FirstOrder(inputs, jacobian, _mixing(model))
 
 
-def _mixing(model: Model) -> Array | None:
+def _mixing(model: DispersedModel) -> Array | None:
     return mixing(model.inputs.drawn, model.groups) if model.groups else None
 
 
@@ -437,7 +429,7 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
     count = outcome.shape[1]
     centred = outcome - outcome.mean(axis=1, keepdims=True)
     variances = {name: float((centred[rows] ** 2).sum()) for name, rows in VECTORS.items()}
-    found: dict[str, dict[str, float]] = {}
+    shares: dict[str, dict[str, float]] = {}
     classes = min(CLASSES, max(count // CLASS_SIZE, 1))
     ranks = np.linspace(0, count, classes + 1).astype(int)[1:-1]
     for name, draw in draws.items():
@@ -448,10 +440,10 @@ def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict
         sums = np.add.reduceat(centred.take(order, axis=1), starts, axis=1)
         between = (sums**2 / np.diff(starts, append=count)).sum(axis=1)
         chance = (len(starts) - 1) / count
-        found[name] = {
+        shares[name] = {
             output: max(0.0, (float(between[VECTORS[output]].sum()) / variances[output] - chance) / (1.0 - chance))
             if variances[output] > 0.0 and chance < 1.0
             else 0.0
             for output in OUTPUTS
         }
-    return found
+    return shares

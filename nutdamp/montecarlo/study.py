@@ -1,4 +1,4 @@
-"""A study and its threads.
+"""Dispersion studies: many dispersed cases fly one schedule, in rounds of blocks over threads.
 
 Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped.
 
@@ -24,9 +24,9 @@ from nutdamp.errors import BadRequest
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight, shed
-from nutdamp.montecarlo.cases import Model, cones_used
+from nutdamp.montecarlo.cases import DispersedModel, cones_used
 from nutdamp.montecarlo.closed_form import Ends
-from nutdamp.montecarlo.inputs import BLOCK, Draws, Source, independent
+from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import (
     EXACT_CASES,
@@ -52,7 +52,7 @@ from nutdamp.spacecraft.schedule import Schedule
 Array = NDArray[np.float64]
 
 STRIDE = batch.BLOCK
-"""Cases that are always flown together, as real widths need it."""
+"""Cases that are always flown together."""
 
 PORTION = 2 * STRIDE
 """Cases that a thread takes at once; blocks are multiples of it."""
@@ -78,7 +78,7 @@ class Round:
         self.lock = threading.Lock()
 
     def fly(self, threads: int, watch: Callable[[int], None], stopped: Callable[[], bool]) -> tuple[int, int]:
-        """How many cases were flown, always the first ones, and how many draws were made again."""
+        """Fly the round; returns the number of flown cases, always the first ones, and of redraws."""
         count = min(threads, len(self.portions))
         # Daemons: an interrupt need not wait for the portions that are in work, which nobody uses then.
         workers = [threading.Thread(target=self._work, args=(stopped,), daemon=True) for _ in range(count)]
@@ -99,7 +99,7 @@ class Round:
 
     @property
     def _flown(self) -> int:
-        """Where the cases end that are flown; below ``first`` where none is."""
+        """End states of the flown cases; below ``first`` where none is."""
         return min(self.last, (self.portions[0] + self.finished) * PORTION)
 
     def _work(self, stopped: Callable[[], bool]) -> None:
@@ -127,9 +127,7 @@ class Round:
                 self.taken = len(self.portions)
 
     def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
-        """Fly the cases from ``begin`` to ``end`` of the block that starts at ``start``; returns how often they were
-        drawn again.
-        """
+        """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number of redraws."""
         study, early = self.results.study, self.results.early
         draws, redrawn = drawn
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
@@ -156,13 +154,13 @@ ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
 
 EARLY = 2 * BLOCK
-"""The first cases, whose outcome is kept whole for `sampled_shares`."""
+"""Number of first cases whose outcome is kept whole for `sampled_shares`."""
 
 KEPT_WORST = 1_000
 """Worst cases that are kept."""
 
 CONFIDENCE = 0.95
-"""Of the interval about the fraction that meets it."""
+"""Confidence level of the interval about the fraction that complies."""
 
 WORTH_SAYING = math.radians(1e-4)
 """rad by which cases of falling moments must err for that to be said."""
@@ -178,27 +176,27 @@ def threads_here() -> int:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What is studied: cases of ``model`` drawn from ``seed``.
+    """Study: cases of ``model`` drawn from ``seed``.
 
     Cases count from 0 here; people see them count from 1.
     """
 
-    model: Model
+    model: DispersedModel
     seed: int = 1
 
     @cached_property
     def flies(self) -> RealWidths:
-        """What flies the cases."""
+        """Flight model of the cases."""
         return RealWidths(self.model)
 
     @cached_property
     def first_order(self) -> FirstOrder:
-        """Sensitivities of what is flown."""
+        """Sensitivities of the flight."""
         return as_flown(self.model, self.flies)
 
-    def source(self) -> Source:
+    def source(self) -> DrawSource:
         """Draws for one thread."""
-        return Source(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
 
     def draws_of(self, case: int) -> dict[str, float]:
         """Deviations of one case (from 0), by input."""
@@ -206,28 +204,28 @@ class Study:
         return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
 
     def ends_of(self, draws: Draws) -> Ends:
-        """How one case with these deviations ends; none: the estimate itself."""
+        """End state of one case with these deviations; none: of the estimate itself."""
         return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))
 
     def outputs_of(self, draws: Draws) -> Array:
-        """The outputs (5,) of one case with these deviations; none: of the estimate itself."""
+        """Outputs (5,) of one case with these deviations; none: of the estimate itself."""
         out = np.empty((len(OUTPUTS), 1))
         measure(self.model, self.ends_of(draws), out)
         return out[:, 0]
 
     @property
     def nominal(self) -> Flight:
-        """The estimate itself, flown alone as the cases are."""
+        """Estimate itself, flown alone as the cases are."""
         return propagation.flown(self.model.spacecraft, self.model.schedule)
 
     @property
     def nominal_aspects(self) -> Array:
         """Least and largest angle (m, 2) rad from the spin axis to the direction of each cone in that flight."""
         seen = aspects(self.nominal)[: len(self.model.spacecraft.keep)]
-        return np.array([(one.least, one.largest) for one in seen])
+        return np.array([(aspect.least, aspect.largest) for aspect in seen])
 
     def severity(self, values: Array, ends: Ends) -> Array:
-        """How bad cases are, (n,), by `compliance.severity`, of the outputs (5, n) and ``ends`` of cases.
+        """Severity of cases, (n,), by `requirements.severity`, of the outputs (5, n) and ``ends`` of cases.
 
         Where the axis breaks a cone on the way, or the tank runs empty, no better than the share of its bound, or of
         the propellant, that is used up.
@@ -238,12 +236,12 @@ class Study:
 
     def aspects_of(self, draws: Draws) -> Array | None:
         """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
-        found = self.ends_of(draws).aspects
-        return None if found is None else found[:, :, 0]
+        aspects = self.ends_of(draws).aspects
+        return None if aspects is None else aspects[:, :, 0]
 
     @property
     def lightening_error(self) -> str:
-        """By how much cases of falling moments err, as the nominal one shows; empty where that is nothing to speak of.
+        """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
 
         They fall half as each pulse begins and half as it ends, which errs in second order; `flight.flown` lets them
         fall as the thrust goes.
@@ -251,18 +249,20 @@ class Study:
         body = self.model.spacecraft
         if shed(body) is None:
             return ""
-        found, exact = self.outputs_of({}), self.nominal.residual
+        outputs, exact = self.outputs_of({}), self.nominal.residual
         part = requirements.aim(body)
         aim = exact.momentum_shift if part is Part.SHIFT else exact.axis_error
-        errors = {Part.NUTATION: found[0] - exact.nutation, part: found[OUTPUTS.index(part.value)] - aim}
+        errors = {Part.NUTATION: outputs[0] - exact.nutation, part: outputs[OUTPUTS.index(part.value)] - aim}
         if max(map(abs, errors.values())) < WORTH_SAYING:
             return ""
-        said = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {one.label}" for one, error in errors.items())
-        return f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {said}"
+        message = " and ".join(f"{math.degrees(abs(error)):.2g} deg of {part.label}" for part, error in errors.items())
+        return (
+            f"cases let the moments of inertia fall at the edges of pulses: in the nominal one that errs by {message}"
+        )
 
 
 class Counted:
-    """The ``done`` cases of a ``study``, of which ``met`` comply."""
+    """Number ``met`` of the ``done`` cases of a ``study`` that comply."""
 
     study: Any
     done: int
@@ -279,7 +279,7 @@ class Counted:
         return self.interval_about(self.met)
 
     def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
-        """Exact interval about the share of so many of the cases, or of so many ``of`` them."""
+        """Exact interval about the share of ``count`` of the cases, or of ``of`` of them."""
         return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
 
     @property
@@ -289,14 +289,14 @@ class Counted:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether as many cases comply as must; None where nothing is required."""
+        """True if enough cases comply; None where nothing is required."""
         fraction = self.met_fraction
         return None if fraction is None else fraction >= self.probability
 
 
 @dataclass(eq=False)
 class Results(Counted):
-    """What has been found of a study so far: the cases from 0 to ``done``.
+    """Results of a study so far: the cases from 0 to ``done``.
 
     ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
     are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
@@ -331,15 +331,15 @@ class Results(Counted):
 
     @property
     def exact(self) -> bool:
-        """Whether percentiles are exact."""
+        """True if percentiles are exact."""
         return self.sketches is None
 
     def distribution(self, output: str) -> Distribution | None:
-        """The distribution of an output; None where it is not known (propellant)."""
+        """Distribution of an output; None where it is unknown (propellant)."""
         row = OUTPUTS.index(output)
         if self.sketches is not None:
-            found = self.sketches[row]
-            return None if math.isinf(found.minimum) or math.isnan(found.minimum) else found
+            sketch = self.sketches[row]
+            return None if math.isinf(sketch.minimum) or math.isnan(sketch.minimum) else sketch
         assert self.values is not None
         values = self.values[row, : self.done]
         return None if not len(values) or math.isnan(values[0]) else Exact(values)
@@ -378,7 +378,7 @@ class Results(Counted):
         self.done = first + values.shape[1]
 
     def extended(self, requested: int) -> Results:
-        """The same, with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
+        """Copy with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
         done = self.done, self.redrawn, self.met, self.emptied, self.worst
         more = Results(self.study, requested, *done, self.early)
         more.broken, more.aspects = self.broken, self.aspects
@@ -425,11 +425,11 @@ SAMPLES = 20_000
 """Cases that are flown where nothing else is said."""
 
 SEED = 1
-"""Of their draws, likewise."""
+"""Default seed of the draws."""
 
 
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
-    """The study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
+    """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
     if spacecraft.dispersions is None:
         raise BadRequest("the spacecraft has no dispersions")
-    return Study(Model(spacecraft, schedule), seed)
+    return Study(DispersedModel(spacecraft, schedule), seed)

@@ -35,7 +35,7 @@ from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
 from nutdamp.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
-from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, said
+from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
 from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Gain, Standing
 from nutdamp.planning.tradeoff import Front
@@ -174,7 +174,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 
 def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
-    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*said(plan), *_broken(plan)))
+    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
     blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
     if remarks:

@@ -1,4 +1,4 @@
-"""Attitude: the one place that knows the quaternion convention.
+"""Attitude quaternions: convention, products, rotations, free arcs.
 
 A quaternion (w, x, y, z) is a unit quaternion, scalar first, that leads from body axes to the inertial frame:
 v_inertial = rotate(q, v_body). ``multiply(p, q)`` turns by q first, then by p. Arrays may carry leading axes.
@@ -27,7 +27,7 @@ def multiply(left: Array, right: Array) -> Array:
 
 
 def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, Any]:
-    """The same of quaternions by components, each a number or an array."""
+    """`multiply` by components, each a number or an array."""
     p, a, b, c = left
     w, x, y, z = right
     return (
@@ -39,7 +39,7 @@ def product(left: Iterable[Any], right: Iterable[Any]) -> tuple[Any, Any, Any, A
 
 
 def rotate(quaternion: Array, vector: Array) -> Array:
-    """Components in the inertial frame of a vector given in the body, (..., 4) and (..., 3) -> (..., 3)."""
+    """Inertial components of a body vector, (..., 4) and (..., 3) -> (..., 3)."""
     # Written out: np.cross takes several times as long for a few vectors.
     w, x, y, z = (quaternion[..., index] for index in range(4))
     v1, v2, v3 = (vector[..., index] for index in range(3))
@@ -50,7 +50,7 @@ def rotate(quaternion: Array, vector: Array) -> Array:
 
 
 def conjugate(quaternion: Array) -> Array:
-    """The rotation back, (…, 4)."""
+    """Inverse rotation, (..., 4)."""
     return np.asarray(quaternion * _BACK)
 
 
@@ -131,7 +131,7 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
 
 
 def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float) -> Array:
-    """`arc` at one moment ``time`` s after its start, (4,): in plain numbers a tenth of the work of arrays."""
+    """`arc` at one ``time`` in s after its start, (4,): plain numbers, a tenth of the cost of arrays."""
     h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
     size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
     half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * (A - C) / A * spin * time
@@ -143,13 +143,13 @@ def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, 
 
 
 def full_turn(angle: float) -> float:
-    """The same direction as an angle in [0, 2π)."""
+    """Angle reduced to [0, 2π)."""
     turned = angle % (2.0 * math.pi)
     return turned if turned < 2.0 * math.pi else 0.0  # of a tiny negative angle the remainder rounds up to 2π
 
 
 def sphere_angles(vector: Array) -> tuple[float | None, float]:
-    """Right ascension in [0, 2π) and declination of ``vector`` (3,), rad; at the poles there is no right ascension."""
+    """Right ascension in [0, 2π), None at the poles, and declination of ``vector`` (3,), rad."""
     x, y, z = numerics.cleaned(vector).tolist()
     across = math.hypot(x, y)
     declination = math.atan2(z, across)

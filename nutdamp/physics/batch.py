@@ -1,13 +1,9 @@
-"""Taylor integration of many bodies.
-
-Many bodies at once: Euler's equations and the attitude through pulses of real width, vectorised over cases.
+"""Vectorised flight of many bodies: Euler's equations and the attitude through pulses of real width.
 
 Arrays carry the case last (structure of arrays). Each case has its own moments, motion, torques and edges. A stretch
-between two edges is an arc in closed form where the body is symmetric and no torque from outside acts, with energy
-dissipation too; else a Taylor series, as in `rigid`, of an order and a number of steps common to a block of cases that
-stays in the cache.
-
-Taylor series of Euler's equations and the attitude for many bodies at once, as `batch` sums them.
+between two edges is an arc in closed form where the body is symmetric and no external torque acts, with energy
+dissipation too; else a Taylor series as in `taylor`, with an order and a number of steps common to a block of cases
+that stays in the cache.
 """
 
 from __future__ import annotations
@@ -26,7 +22,7 @@ from nutdamp.physics.taylor import AT_REST, LONGEST, NOTHING, Forcing
 Array = NDArray[np.float64]
 
 LARGEST_ORDER = 30
-"""Of the series; what has not converged by then is done again in shorter steps."""
+"""Largest order of a series; a step that has not converged by then is repeated in shorter steps."""
 
 REMAINDER = 1e-15
 """Size of the last terms kept, relative to the scale of rates and quaternion."""
@@ -35,8 +31,8 @@ REMAINDER = 1e-15
 class Series:
     """Taylor coefficients of rates and quaternion in x = (t - now)/step, for the cases of a block.
 
-    ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products that Euler's equations need are one product
-    of two slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `rigid`.
+    ``rates`` (order+1, 5, n) holds ω1, ω2, ω3, ω1, ω2, so that the products in Euler's equations are one product of two
+    slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `taylor`.
     """
 
     def __init__(
@@ -59,13 +55,15 @@ class Series:
         self.turns = np.empty((LARGEST_ORDER + 1, 4, count))
         self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
-        self.sink = None if forcing.growth == 0.0 else _Sink(moments, forcing.growth, acceleration, rates, step)
+        self.sink = (
+            None if forcing.growth == 0.0 else _DampingSeries(moments, forcing.growth, acceleration, rates, step)
+        )
         # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
         self.even_spin = not self.coupled and self.sink is None and jerk is None
         self.order = 0
 
     def converges(self) -> bool:
-        """Take in as many orders as it needs; whether that is no more than there may be."""
+        """Add orders until converged; False if `LARGEST_ORDER` is not enough."""
         scale = REMAINDER * max(1.0, float(np.max(np.abs(self.rates[0] * self.step))))
         small = 0
         while self.order < LARGEST_ORDER and small < 2:
@@ -85,7 +83,7 @@ class Series:
         return max(float(np.max(np.abs(turned))), float(np.max(np.abs(self.turns[order]))))
 
     def _next(self) -> None:
-        """The next order: products of series are sums over the orders so far."""
+        """Append the next order: products of series are sums over the orders so far."""
         k, rates, turns = self.order, self.rates, self.turns
         scale = self.step / (k + 1)
         following = rates[k + 1, :3]
@@ -122,8 +120,8 @@ class Series:
         self.order = k + 1
 
 
-class _Sink:
-    """Energy dissipation as series, see `rigid._Sink`: what it does to H, and how the body slips against it."""
+class _DampingSeries:
+    """Energy dissipation as series, see `taylor._Sink`: torque on H and slip of the body."""
 
     def __init__(self, moments: Array, growth: float, acceleration: Array, rates: Array, step: Array) -> None:
         self.moments, self.growth = moments, growth
@@ -136,7 +134,7 @@ class _Sink:
         self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
 
     def acceleration(self, rates: Array, k: int) -> Array:
-        """Coefficient k of H × s, (3, n) N m; makes that of ``slip`` s on the way. ``rates`` (3, n): coefficient k."""
+        """Coefficient k of H × s, (3, n) N m; stores that of ``slip`` s. ``rates`` (3, n): coefficient k."""
         momentum, slip = self.momentum, self.slip
         momentum[k] = rates * self.moments
         self.squares[k] = np.einsum("kcn,kcn->n", momentum[: k + 1], momentum[k::-1])
@@ -151,20 +149,20 @@ class _Sink:
 
 
 BLOCK = 2048
-"""Cases that are flown together: many enough to hide the calls, few enough that their series stay in the cache."""
+"""Cases flown together: enough to hide the cost of calls, few enough that their series stay in the cache."""
 
 STRIDE = 2.5
-"""Radians of one step, at most; there the work per radian is least."""
+"""Largest step, rad; the work per radian is least there."""
 
 FEW = 256
-"""Cases up to which many steps of symmetric bodies are summed at once: the calls then cost more than the sums."""
+"""Cases up to which many steps of symmetric bodies are summed at once: beyond, the sums cost more than the calls."""
 
 TOO_FAST = "the motion of a dispersed case changes too fast to be integrated"
 
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """What flies: principal ``moments`` (3, n) kg m²; ``constant`` torque (3,) N m and ``forcing`` act on all."""
+    """Bodies with principal ``moments`` (3, n) kg m²; ``constant`` torque (3,) N m and ``forcing`` act on all."""
 
     moments: Array
     constant: Array
@@ -172,16 +170,16 @@ class Bodies:
 
     @property
     def free(self) -> bool:
-        """Whether a coast is an arc of a symmetric body without torque from outside for every case."""
+        """True if every coast is an arc of a symmetric body without external torque."""
         alone = not self.constant.any() and not self.forcing.turning
         return alone and bool(np.array_equal(self.moments[0], self.moments[1]))
 
     def some(self, cases: Any) -> Bodies:
-        """Those of ``cases`` (an index of arrays)."""
+        """Subset of ``cases`` (an index of arrays)."""
         return Bodies(self.moments[:, cases], self.constant, self.forcing)
 
     def lighter(self, by: Array | None) -> Bodies:
-        """The same with moments smaller ``by`` (3, n) kg m²; None: as they are."""
+        """Copy with moments smaller ``by`` (3, n) kg m²; None: unchanged."""
         return self if by is None else Bodies(self.moments - by, self.constant, self.forcing)
 
 
@@ -201,7 +199,7 @@ class Pulses:
     sheds: Array | None = None
 
     def some(self, cases: Any) -> Pulses:
-        """Those of ``cases`` (an index of arrays)."""
+        """Subset of ``cases`` (an index of arrays)."""
         on_times = self.on_times if self.on_times.ndim == 1 else self.on_times[:, cases]
         leans = self.leans if self.leans is None or self.leans.ndim == 1 else self.leans[:, cases]
         sheds = None if self.sheds is None else self.sheds[:, :, cases]
@@ -209,7 +207,7 @@ class Pulses:
 
     @property
     def slopes(self) -> Array | None:
-        """Slope of each torque, (k, 3, n) N m/s; None where all keep even."""
+        """Slope of each torque, (k, 3, n) N m/s; None where all are constant."""
         if self.leans is None or not self.leans.any():
             return None
         lasts = np.where(self.on_times == 0.0, 1.0, self.on_times)
@@ -223,7 +221,7 @@ class Pulses:
 
     @property
     def jumps(self) -> tuple[Array, Array]:
-        """What changes at each of the edges, (2k, 3, n) each: the torque in N m, and the momentum in N m s."""
+        """Jump at each edge, (2k, 3, n) each: of the torque in N m, and of the momentum in N m s."""
         ideal = _of_each(self.on_times == 0.0)
         torque = np.where(ideal, 0.0, self.impulses / _of_each(np.where(self.on_times == 0.0, 1.0, self.on_times)))
         kick = np.where(ideal, self.impulses, 0.0)
@@ -234,19 +232,19 @@ class Pulses:
 
 
 def _of_each(values: Any) -> Any:
-    """What pulses have, (k,) or (k, n), beside vectors (k, 3, n)."""
+    """Values by pulse, (k,) or (k, n), broadcast against vectors (k, 3, n)."""
     return values[:, None, None] if values.ndim == 1 else values[:, None, :]
 
 
 def _edgewise(begins: Array, ends: Array) -> Array:
-    """What is at begins and at ends (k, 3, n) in turn, (2k, 3, n)."""
+    """Values at starts and ends (k, 3, n) interleaved, (2k, 3, n)."""
     return np.stack([begins, ends], axis=1).reshape(-1, *begins.shape[1:])
 
 
-class Stretch(NamedTuple):
+class MotionStretch(NamedTuple):
     """Motion of ``bodies`` under one ``torque`` (3, n) N m, None for a coast, from ``since`` (n,) s on.
 
-    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) then; the torque changes by ``slope`` (3, n) N m/s, None for none.
+    ``rates`` (3, n) rad/s and ``quaternion`` (4, n) at ``since``; the torque changes by ``slope`` (3, n) N m/s or None.
     """
 
     bodies: Bodies
@@ -256,14 +254,14 @@ class Stretch(NamedTuple):
     torque: Array | None = None
     slope: Array | None = None
 
-    def some(self, cases: Any) -> Stretch:
-        """That of some of the cases (an index of arrays)."""
-        torque, slope = (None if one is None else one[:, cases] for one in self[4:])
+    def some(self, cases: Any) -> MotionStretch:
+        """Subset of ``cases`` (an index of arrays)."""
+        torque, slope = (None if vector is None else vector[:, cases] for vector in self[4:])
         motion = self.since[cases], self.rates[:, cases], self.quaternion[:, cases]
-        return Stretch(self.bodies.some(cases), *motion, torque, slope)
+        return MotionStretch(self.bodies.some(cases), *motion, torque, slope)
 
-    def moved(self, times: Array) -> Stretch:
-        """The same from ``times`` (n,) s on; this one stays as it is."""
+    def moved(self, times: Array) -> MotionStretch:
+        """Copy propagated to ``times`` (n,) s."""
         gone, torque = times - self.since, self.torque
         if torque is not None and self.slope is not None:
             torque = torque + self.slope * gone
@@ -272,24 +270,24 @@ class Stretch(NamedTuple):
         return later._replace(since=times, torque=torque)
 
 
-class Watch(Protocol):
-    """Sees the motion of cases on the way; see `sky`."""
+class Observer(Protocol):
+    """Observer of the motion of cases; see `sky`."""
 
-    def some(self, cases: Any) -> Watch:
-        """That of some of the cases (an index of arrays)."""
+    def some(self, cases: Any) -> Observer:
+        """Observer of a subset of ``cases`` (an index of arrays)."""
 
-    def motion(self, here: Stretch, duration: Array) -> None:
-        """The motion that `advance` is about to make with the same arguments."""
+    def motion(self, here: MotionStretch, duration: Array) -> None:
+        """Receive the motion that `advance` is about to make with the same arguments."""
 
 
 def fly(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None = None
+    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None = None
 ) -> tuple[Array, Array]:
     """Rates (3, n) rad/s and unit quaternions (4, n), body -> inertial, as the last pulse of each case ends.
 
     ``rates`` (3, n) and ``quaternion`` (4, n) at t = 0; ``watch`` sees the motion until then. Exact to some 1e-13 rad
     for each hundred radians flown. Pulses may overlap and come in any order, in each case its own. Raises Infeasible
-    for motions over more than `rigid.LONGEST` rad.
+    for motions over more than `taylor.LONGEST` rad.
     """
     rates, quaternion = np.array(rates, dtype=float), np.array(quaternion, dtype=float)
     for begin in range(0, rates.shape[1], BLOCK):
@@ -299,7 +297,7 @@ def fly(
     return rates, quaternion
 
 
-def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
+def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None) -> None:
     """Fly one block, in place."""
     edges = pulses.edges
     if not len(edges):
@@ -321,9 +319,14 @@ def _fly_block(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, 
 
 
 def _fly_alike(
-    bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None, order: NDArray[np.intp]
+    bodies: Bodies,
+    rates: Array,
+    quaternion: Array,
+    pulses: Pulses,
+    watch: Observer | None,
+    order: NDArray[np.intp],
 ) -> None:
-    """Fly cases whose edges come in the same ``order``, in place: between pulses all of them coast."""
+    """Fly cases whose edges have the same ``order``, in place: between pulses all of them coast."""
     edges, (turns, kicks), slopes = pulses.edges, pulses.jumps, pulses.slopes
     half = None if pulses.sheds is None else 0.5 * pulses.sheds
     now = np.zeros(rates.shape[1])
@@ -335,7 +338,7 @@ def _fly_alike(
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
             torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
-        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
+        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
@@ -347,8 +350,8 @@ def _fly_alike(
             on.add(edge)
 
 
-def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Watch | None) -> None:
-    """Fly cases whose edges come in orders of their own, in place."""
+def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, watch: Observer | None) -> None:
+    """Fly cases with different orders of edges, in place."""
     edges = pulses.edges
     order = np.argsort(edges, axis=0, kind="stable")
     edges = np.take_along_axis(edges, order, axis=0)
@@ -363,7 +366,7 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
-        _pass(Stretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
+        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
         if bends is not None:
@@ -372,15 +375,15 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
         rates += kick / bodies.moments
 
 
-def _pass(here: Stretch, duration: Array, watch: Watch | None) -> None:
-    """`advance`, seen by a ``watch``."""
+def _pass(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
+    """`advance`, with a call of ``watch`` before it."""
     if watch is not None:
         watch.motion(here, duration)
     advance(here, duration)
 
 
-def advance(here: Stretch, duration: Array) -> None:
-    """Move rates and quaternion on by ``duration`` (n,) s, in place."""
+def advance(here: MotionStretch, duration: Array) -> None:
+    """Propagate rates and quaternion by ``duration`` (n,) s, in place."""
     bodies, torque, slope = here.bodies, here.torque, here.slope
     if not duration.any():
         return
@@ -395,7 +398,7 @@ def advance(here: Stretch, duration: Array) -> None:
 def cos_sin(angle: Any) -> tuple[Any, Any]:
     """Cosine and sine (of real or complex arrays or numbers) by the tangent of the half-angle.
 
-    As exact as numpy's, and several times as fast.
+    As exact as numpy's and several times as fast.
     """
     half = np.tan(0.5 * angle)
     scale = 1.0 / (1.0 + half * half)
@@ -403,7 +406,7 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
 
 
 def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duration: Array) -> None:
-    """The exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` where ``growth`` is not 0.
+    """Exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` where ``growth`` is not 0.
 
     R(t) = R(0) Rot(H(0)/A t) Rot3(aω3 t), with H in body axes: the body turns about H at |H|/A and about its own axis
     at aω3.
@@ -431,22 +434,22 @@ def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duratio
 def _slip(
     growth: float, rate: Array, size: Array, axial: Array, rates: Array, quaternion: Array, duration: Array
 ) -> None:
-    """What dissipation does to the ends of free arcs, in place; ``rate`` is aω3, ``size`` |H|/A, ``axial`` H3/A."""
+    """Apply dissipation to the ends of free arcs, in place; ``rate`` is aω3, ``size`` |H|/A, ``axial`` H3/A."""
     moving = np.where(size > 0.0, size, 1.0)
     cosine = np.where(size > 0.0, axial / moving, 1.0)
     h1, h2 = rates[0] / moving, rates[1] / moving
-    found = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
-    behind = rate * (found.turned - duration)
-    quaternion[:] = attitude.product(quaternion, energy_sink.slip(found, h1, h2, behind, cos_sin))
+    effect = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
+    behind = rate * (effect.turned - duration)
+    quaternion[:] = attitude.product(quaternion, energy_sink.slip(effect, h1, h2, behind, cos_sin))
     cosine, sine = cos_sin(behind)
-    x, y = rates[0] * found.transverse, rates[1] * found.transverse
-    rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * found.axial
+    x, y = rates[0] * effect.transverse, rates[1] * effect.transverse
+    rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * effect.axial
 
 
-def _integrate(here: Stretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
+def _integrate(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
     """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
 
-    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the begin.
+    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start.
     """
     forcing, moments = here.bodies.forcing, here.bodies.moments
     if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
@@ -476,8 +479,8 @@ def _expect_short(span: float) -> None:
         )
 
 
-def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) -> None:
-    """`_integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Array) -> None:
+    """`_integrate` for I1 = I2 without dissipation: many steps at once, see `taylor.steps`."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
     drive = taylor.Drive(
@@ -497,8 +500,8 @@ def _integrate_symmetric(here: Stretch, duration: Array, acceleration: Array) ->
     quaternion[:] = first.real, second.real, second.imag, first.imag
 
 
-def _step(here: Stretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
-    """One step of ``step`` (n,) s, in place; two of half the length where the series does not converge."""
+def _step(here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
+    """One step of ``step`` (n,) s, in place; halved where the series does not converge."""
     bodies, now, rates, quaternion = here[:4]
     series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
     if series.converges():

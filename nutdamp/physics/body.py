@@ -1,18 +1,10 @@
-"""Moments, stability, cone angles, nutation periods, half pulses.
+"""Moments of inertia, spin stability, nutation angle and periods, half pulses of rigid bodies.
 
-Nutation angle, body cone, space cone, and the periods of the nutation.
-
-``omega`` is the transverse rate |ω| = |ω1 + iω2| >= 0 in rad/s, ``spin`` for ω3 in rad/s, signed. The
-sources print (12), (18)-(20), (22) for positive signs; here |ω3| and |a| make them hold for both spin directions.
-Angles come from components by arctan2: arccos loses everything below 1e-8 rad.
-
-Stability of spin about a principal axis, and the nutation seen in three frames.
+``omega`` is the transverse rate |ω| = |ω1 + iω2| >= 0 and ``spin`` is ω3, signed, both in rad/s. The sources print
+(12), (18)-(20), (22) for positive signs; here |ω3| and |a| make them hold for both spin directions. Angles come from
+components by arctan2: arccos loses everything below 1e-8 rad.
 
 "Kreisel-Bewegungen" is cited as K(n): its J_xy is A, its J_z is C, its L is H.
-
-Moments of inertia: the ratio a, shapes, principal axes.
-
-Closed forms of nutation damping: what to fire, when, and the least that any schedule needs.
 """
 
 from __future__ import annotations
@@ -28,8 +20,8 @@ Array = NDArray[np.float64]
 Rate = TypeVar("Rate", float, Array)
 
 
-class Cones(NamedTuple):
-    """The cone angles of one instant, rad: ``nutation`` θ and ``body`` cone μ."""
+class ConeAngles(NamedTuple):
+    """Cone angles at one instant, rad: ``nutation`` θ and ``body`` cone μ."""
 
     nutation: float
     body: float
@@ -40,15 +32,15 @@ class Cones(NamedTuple):
         return self.nutation - self.body
 
 
-def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> Cones:
-    """The cones of any body now: angles of H and of ω from the spin axis ``sense``·e3, up to π.
+def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> ConeAngles:
+    """Instantaneous cones of any body: angles of H and of ω from the spin axis ``sense``·e3, up to π.
 
     ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
     """
     w = np.asarray(rates, dtype=float)
     first, second, third = (np.asarray(moments, dtype=float) * w).tolist()
     across, along = math.hypot(w[0], w[1]), sense * float(w[2])
-    return Cones(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
+    return ConeAngles(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
 
 
 def nutation_angle(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
@@ -56,31 +48,31 @@ def nutation_angle(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
 
     tan θ = A|ω| / (C|ω3|), from 0 (pure spin) to π/2 (no spin).
     """
-    found: Rate = np.arctan2(A * omega, C * np.abs(spin))
-    return found
+    angle: Rate = np.arctan2(A * omega, C * np.abs(spin))
+    return angle
 
 
 def body_cone(omega: Rate, spin: Rate) -> Rate:
     """Half-angle μ of the body cone ("Polkegel") in rad, Magnus 1970 (18): tan μ = |ω| / |ω3|.
 
-    The form of (18), for symmetric bodies; flights take their cones from `momentary`.
+    For symmetric bodies; flights take their cones from `momentary`.
     """
-    found: Rate = np.arctan2(omega, np.abs(spin))
-    return found
+    angle: Rate = np.arctan2(omega, np.abs(spin))
+    return angle
 
 
 def space_cone(A: float, C: float, omega: Rate, spin: Rate) -> Rate:
-    """Half-angle λ of the space cone ("Spurkegel") in rad, signed: negative for oblate bodies; the form of (20).
+    """Half-angle λ of the space cone ("Spurkegel") in rad, signed: negative for oblate bodies.
 
     Magnus 1970 (20), whose print has a minus in the denominator and ω1² for |ω|²: with tan(λ + μ) = A|ω|/(C|ω3|) and
     tan μ = |ω|/|ω3| the difference of angles gives tan λ = (A - C)|ω||ω3| / (C ω3² + A|ω|²).
     """
-    found: Rate = np.arctan2((A - C) * omega * np.abs(spin), C * np.square(spin) + A * np.square(omega))
-    return found
+    angle: Rate = np.arctan2((A - C) * omega * np.abs(spin), C * np.square(spin) + A * np.square(omega))
+    return angle
 
 
 def transverse_rate(A: float, C: float, nutation: float, spin: float) -> float:
-    """|ω| in rad/s that belongs to a nutation angle in [0, π/2); the inverse of `nutation_angle`."""
+    """Transverse rate |ω| in rad/s of a nutation angle in [0, π/2); inverse of `nutation_angle`."""
     return C * abs(spin) * math.tan(nutation) / A
 
 
@@ -129,7 +121,7 @@ def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
 
 
 def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> HalfPulses:
-    """The two equal halves of Magnus 1970 (21), (22), with Δt from the motion before the first pulse.
+    """Two equal halves of Magnus 1970 (21), (22), with Δt from the motion before the first pulse.
 
     A small-angle scheme: it leaves H displaced by 0.0016° at θ = 2°, 0.19° at 10°, 5.1° at 30°, whatever A/C.
     """
@@ -152,9 +144,9 @@ def mounting_angle(A: float, C: float, omega: float, spin: float) -> float:
 
 
 def phase_to_oppose(omega: complex, torque: complex) -> float:
-    """Angle in rad, (-π, π], by which ω has still to turn back, at a ω3 > 0, to point against ``torque``.
+    """Remaining turn of ω, rad in (-π, π], at a ω3 > 0, until it points against ``torque``.
 
-    The best moment for a body-fixed torque direction d is arg ω = arg d + π. For ±1, ±2 this is the table of
+    The best time for a body-fixed torque direction d is arg ω = arg d + π. For ±1, ±2 this is the table of
     Magnus 1970 before fig. 5 when a ω3 > 0, and its mirror image when a ω3 < 0, where the printed table would
     pump the nutation up.
     """
@@ -162,7 +154,7 @@ def phase_to_oppose(omega: complex, torque: complex) -> float:
 
 
 DEGENERATE = 1e-9
-"""Principal moments that differ by no more, relative to the largest, are equal: a sphere, or a plane of free axes."""
+"""Relative difference up to which principal moments count as equal: a sphere, or a plane of free axes."""
 
 Moments = tuple[float, float, float]
 
@@ -170,8 +162,8 @@ Moments = tuple[float, float, float]
 def settled(moments: ArrayLike) -> Moments:
     """Principal moments (I1, I2, I3), those within `DEGENERATE` of each other made exactly equal.
 
-    I1 and I2 become their mean; of a sphere all are I3. So whatever is decided by comparing moments, a sphere, symmetry
-    or the class of an axis, is decided alike everywhere, and nothing divides by a difference that is rounding.
+    I1 and I2 become their mean; of a sphere all are I3. Comparisons of moments (sphere, symmetry, class of an axis)
+    thus agree everywhere, and nothing divides by a difference that is rounding.
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
     rounding = DEGENERATE * max(first, second, third)
@@ -240,7 +232,7 @@ AxisClass = Literal["minimum", "maximum", "intermediate", "degenerate", "sphere"
 
 
 class Stability(NamedTuple):
-    """Spin about axis 3: p² in 1/s², whether a small nutation stays small, and the growth time 1/p in s."""
+    """Spin about axis 3: p² in 1/s², boundedness of a small nutation, and the growth time 1/p in s."""
 
     squared_exponent: float
     stable: bool
@@ -258,7 +250,7 @@ class NutationRates(NamedTuple):
 def axis_class(moments: ArrayLike) -> AxisClass:
     """Kind of axis 3 among the principal moments (I1, I2, I3).
 
-    Equal moments are those of `inertia.settled`. I1 = I2 leaves axis 3 the minimum or the maximum;
+    Equal moments are those of `settled`. I1 = I2 leaves axis 3 the minimum or the maximum;
     ``degenerate`` means I3 equal to one of the others alone, so that any axis of their plane would do.
     """
     first, second, third = settled(moments)
@@ -272,7 +264,7 @@ def axis_class(moments: ArrayLike) -> AxisClass:
 
 
 def growth(moments: ArrayLike, spin: float) -> Stability:
-    """What becomes of a small nutation about axis 3 of a rigid body: e^{pt}, p² = -(I3 - I1)(I3 - I2)ω3²/(I1 I2).
+    """Growth of a small nutation about axis 3 of a rigid body: e^{pt}, p² = -(I3 - I1)(I3 - I2)ω3²/(I1 I2).
 
     "Kreiseltheorie" 24.4, which prints p² <= 0 for bounded. With p = 0 about an axis of two equal moments ω grows
     linearly (I2 = I3: ω1 stays, dω2/dt = (I3 - I1)/I2 ω3 ω1), with no time of growth of its own: unstable. On a
@@ -292,14 +284,14 @@ def growth(moments: ArrayLike, spin: float) -> Stability:
 def principal_tilt(axes: ArrayLike) -> float:
     """Angle in rad, 0 to π/2, between principal axis 3 and the third axis of the file: the wobble of a pure spin.
 
-    ``axes`` (3, 3) has the principal axes as columns, as `inertia.principal_axes` returns them.
+    ``axes`` (3, 3) has the principal axes as columns, as `principal_axes` returns them.
     """
     x, y, z = (float(component) for component in np.asarray(axes, dtype=float)[:, 2])
     return math.atan2(math.hypot(x, y), abs(z))
 
 
 def nutation_rates(A: float, C: float, omega: float, spin: float) -> NutationRates:
-    """The nutation of a symmetric body seen in the body, in the despun frame and inertially.
+    """Rates of the nutation of a symmetric body in the body, in the despun frame and inertially.
 
     ω turns at K(7), (J_z - J_xy)/J_xy ω_z = -aω3, in the body and at K(10), Cω3/A, in the frame that follows the
     body's transverse motion without spinning: body = despun - ω3. Inertially the axis goes round H at K(13), |H|/A,

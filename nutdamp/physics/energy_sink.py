@@ -1,23 +1,23 @@
-"""Energy dissipation inside the body: the energy sink, in closed form for coasting symmetric bodies.
+"""Energy sink: dissipation inside the body, in closed form for coasting symmetric bodies.
 
 Flexible parts and liquids drain energy while H stays as it is in space. For the angle θ of axis 3 from H the sink is
 
     dθ/dt = κ sin θ cos θ,   that is   tan θ = tan θ0 e^{κt},   κ = +1/τ prolate, -1/τ oblate,
 
-a linear damper, of which e^{κt} is what small angles show. As a torque in body axes, beside the free motion, with
+a linear damper, of which e^{κt} is the small-angle form. As a torque in body axes, beside the free motion, with
 h = H/|H| (exact for any moments; then κ is a given rate, and the energy falls as long as axis 3 is that of least
 moment for κ > 0 or of largest for κ < 0; a sphere has no energy to give, and κ = 0):
 
     dH1/dt = κ H1 cos²θ,   dH2/dt = κ H2 cos²θ,   dH3/dt = -κ H3 sin²θ,
 
 which is H × s with s = κ h3 (h × e3) = κ h3 (h2, -h1, 0): the body slips against H at s, beside ω = H/I.
-The slip is square to both H and axis 3, so it changes θ alone. The Euler angles φ about H and ψ about axis 3 of a
-symmetric body go on by themselves: dφ/dt = |H|/A and dψ/dt = |H|(1/C - 1/A) cos θ. With s = sin θ0, c = cos θ0, E =
+The slip is perpendicular to both H and axis 3, so it changes θ alone. The Euler angles φ about H and ψ about axis 3 of
+a symmetric body are unaffected: dφ/dt = |H|/A and dψ/dt = |H|(1/C - 1/A) cos θ. With s = sin θ0, c = cos θ0, E =
 e^{κt} and N = sqrt(c² + s²E²): sin θ = sE/N, cos θ = c/N, and
 
-    ∫ cos θ dt = asinh(2c sinh(κt)/(1 + N))/κ
+    ∫ cos θ dt = asinh(2c sinh(κt)/(1 + N))/κ,
 
-is PHYSICS' -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0 for κ -> 0, t
+which is -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0 for κ -> 0, t
 for θ0 -> 0, and zero for θ0 = 90°. Either sense of spin: θ runs from 0 to 180°, and h3 carries the sign.
 """
 
@@ -37,22 +37,22 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 FOR_EVER = 300.0
-"""Time constants after which the sink has done all it can: θ is then 0 or 90° to far beyond rounding."""
+"""Time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding."""
 
 TINY = 1e-200
-"""Keeps quotients like asinh x / x defined at zero, and changes nothing elsewhere."""
+"""Offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere."""
 
 
 SMALLEST = 1e-150
-"""Least cosine of a nutation angle that is distinguished from zero: its square is a number still."""
+"""Least cosine of a nutation angle that is distinguished from zero: its square is still a number."""
 
 
-class Course(NamedTuple):
-    """What the sink does to an arc, by numbers that multiply or add to the free arc of the same body.
+class SinkEffect(NamedTuple):
+    """Effect of the sink on an arc: factors and terms on the free arc of the same body.
 
-    ``transverse`` and ``axial``: factors on |ω| and on ω3. ``turned``: s, the time that the spin at the start takes to
-    turn the body as far as it turns by now, ∫ω3 dt / ω3(0). ``cosine`` of half the angle by which θ has grown, and
-    ``sine`` of it as a multiple of sin θ0.
+    ``transverse`` and ``axial``: factors on |ω| and on ω3. ``turned``: s, the time in which the spin at the start turns
+    the body as far as it has turned, ∫ω3 dt / ω3(0). ``cosine`` of half the angle by which θ has grown, and ``sine`` of
+    it as a multiple of sin θ0.
     """
 
     transverse: Any
@@ -74,27 +74,27 @@ _OF_NUMBERS = _Functions(math.exp, math.expm1, math.sinh, math.asinh, math.sqrt)
 _OF_ARRAYS = _Functions(np.exp, np.expm1, np.sinh, np.arcsinh, np.sqrt)
 
 
-def course(growth: float, cosine: float, sine_squared: float, time: float) -> Course:
-    """The sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
+def course(growth: float, cosine: float, sine_squared: float, time: float) -> SinkEffect:
+    """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
     exponent = growth * time
     return _course(_OF_NUMBERS, cosine, sine_squared, time, exponent, max(-FOR_EVER, min(exponent, FOR_EVER)))
 
 
-def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> Course:
-    """`course` for arrays that go together, real or complex (a complex step gives derivatives)."""
+def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> SinkEffect:
+    """`course` for arrays that broadcast, real or complex (a complex step gives derivatives)."""
     exponent = growth * np.asarray(times)
     return _course(_OF_ARRAYS, cosine, sine_squared, times, exponent, np.clip(exponent, -FOR_EVER, FOR_EVER))
 
 
-def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> Course:
-    """``x`` is the ``exponent`` κt within ±`FOR_EVER`; from there on θ is constant."""
+def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> SinkEffect:
+    """`course` by elementary functions ``of`` a kind of number; ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`."""
     growing, squared = of.exp(x), cosine * cosine
     size = of.sqrt(squared + sine_squared * growing * growing)
     grown = of.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
     moving = time * ((x + TINY) / (exponent + TINY))
     stretched = moving * (of.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)  # asinh(c κ stretched)/(c κ)
     swing = cosine * 2.0 * of.sinh(x) / (1.0 + size) + TINY
-    return Course(
+    return SinkEffect(
         transverse=growing / size,
         axial=1.0 / size,
         turned=stretched * of.asinh(swing) / swing + (time - moving) / size,
@@ -104,10 +104,10 @@ def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent:
 
 
 def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: float) -> float:
-    """Time in s after which `Course.turned` is ``turned`` s: its inverse; infinite where it never comes to be.
+    """Time in s after which `SinkEffect.turned` is ``turned`` s: its inverse; infinite where it is never reached.
 
-    With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))): of flat spin no
-    turn is left to come.
+    With z = κ c ``turned`` and c = |cos θ0| > 0 it is κt = z - ln(1 - (e^{2z} - 1) sin²θ0/(2c(1 + c))); flat spin turns
+    no further.
     """
     c = max(abs(cosine), SMALLEST)
     z = growth * c * turned
@@ -117,21 +117,21 @@ def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: floa
     return (z - math.log1p(-slowed)) / growth if growth != 0.0 else turned
 
 
-def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> Course:
+def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> SinkEffect:
     """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start, rad/s."""
     first, second, third = _direction(A, C, omega, spin)
     return course(growth, third, first * first + second * second, time)
 
 
-def slip(found: Course, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
-    """Quaternion (w, x, y, z) by which the body has slipped from its free arc, to multiply that from the right.
+def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
+    """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
 
-    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aω3(turned - t)
-    rad, by how much more the body has turned about axis 3; ``cos_sin`` of an angle, of numbers or arrays.
+    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aω3(turned - t) rad,
+    the excess turn about axis 3; ``cos_sin`` gives cosine and sine of an angle, of numbers or arrays.
     """
-    x, y = found.sine * second, -found.sine * first
+    x, y = effect.sine * second, -effect.sine * first
     cosine, sine = cos_sin(0.5 * behind)
-    return found.cosine * cosine, x * cosine + y * sine, y * cosine - x * sine, found.cosine * sine
+    return effect.cosine * cosine, x * cosine + y * sine, y * cosine - x * sine, effect.cosine * sine
 
 
 def arc(
@@ -143,39 +143,39 @@ def arc(
     """
     times = np.asarray(times, dtype=float)
     first, second, third = _direction(A, C, omega, spin)
-    found = courses(growth, third, first * first + second * second, times)
+    effect = courses(growth, third, first * first + second * second, times)
     rate = (A - C) / A * spin
-    free, behind = np.exp(-1j * rate * times), rate * (found.turned - times)
+    free, behind = np.exp(-1j * rate * times), rate * (effect.turned - times)
     there = complex(first, second) * free
-    slipped = slip(found, there.real, there.imag, behind, lambda angle: (np.cos(angle), np.sin(angle)))
+    slipped = slip(effect, there.real, there.imag, behind, lambda angle: (np.cos(angle), np.sin(angle)))
     turned = attitude.multiply(attitude.arc(A, C, quaternion, omega, spin, times), np.stack(slipped, axis=-1))
-    return omega * free * found.transverse * np.exp(-1j * behind), spin * found.axial, turned
+    return omega * free * effect.transverse * np.exp(-1j * behind), spin * effect.axial, turned
 
 
 def rates_on_arc(A: Any, C: Any, growth: float, omega: Any, spin: Any, times: Array) -> tuple[ComplexArray, Array]:
     """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
 
-    The rates at the starts, rad/s, and moments, kg m², are those of the cases; ``growth`` may be zero.
+    ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
     """
     rate = (A - C) / A * spin
     if growth == 0.0:
         return np.asarray(omega * np.exp(-1j * (rate * times))), np.broadcast_to(spin, times.shape)
     across, along = A * A * (omega.real**2 + omega.imag**2), C * spin
     size = np.sqrt(across + along * along) + TINY
-    found = courses(growth, along / size, across / (size * size), times)
-    return np.asarray(omega * np.exp(-1j * (rate * found.turned)) * found.transverse), spin * found.axial
+    effect = courses(growth, along / size, across / (size * size), times)
+    return np.asarray(omega * np.exp(-1j * (rate * effect.turned)) * effect.transverse), spin * effect.axial
 
 
 def arc_end(
     A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, time: float
 ) -> tuple[complex, float, Array]:
-    """`arc` at one moment ``time`` s after its start: in plain numbers a tenth of the work of arrays."""
+    """`arc` at one ``time`` in s after its start: plain numbers, a tenth of the cost of arrays."""
     first, second, third = _direction(A, C, omega, spin)
-    found = course(growth, third, first * first + second * second, time)
+    effect = course(growth, third, first * first + second * second, time)
     rate = (A - C) / A * spin
-    free, behind = cmath.exp(-1j * rate * time), rate * (found.turned - time)
+    free, behind = cmath.exp(-1j * rate * time), rate * (effect.turned - time)
     there = complex(first, second) * free
-    p, a, b, c = slip(found, there.real, there.imag, behind, lambda angle: (math.cos(angle), math.sin(angle)))
+    p, a, b, c = slip(effect, there.real, there.imag, behind, lambda angle: (math.cos(angle), math.sin(angle)))
     w, x, y, z = attitude.arc_end(A, C, quaternion, omega, spin, time).tolist()
     turned = np.array(
         [
@@ -185,11 +185,11 @@ def arc_end(
             w * c + x * b - y * a + z * p,
         ]
     )
-    return omega * free * found.transverse * cmath.exp(-1j * behind), spin * found.axial, turned
+    return omega * free * effect.transverse * cmath.exp(-1j * behind), spin * effect.axial, turned
 
 
 def _direction(A: float, C: float, omega: complex, spin: float) -> tuple[float, float, float]:
-    """Unit vector h of H in body axes; of a body at rest, to which nothing happens, axis 3."""
+    """Unit vector h of H in body axes; axis 3 for a body at rest."""
     h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
     size = math.hypot(h1, h2, h3)
     return (h1 / size, h2 / size, h3 / size) if size > 0.0 else (0.0, 0.0, 1.0)

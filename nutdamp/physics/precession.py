@@ -1,14 +1,11 @@
-"""Turning the angular momentum: impulses, half cones, rhumb lines.
+"""Precession of H and the spin axis to a target axis: impulses, half cones, rhumb lines.
 
-Turning the angular momentum H and the spin axis S of a symmetric body to a target axis by transverse impulses.
+A transverse impulse is perpendicular to the spin axis S of a symmetric body, so that H·S = C|ω3| = h never changes;
+between impulses S goes round H at |H|/A. Two jumps and half cones follow exactly at any angle, for both spin
+directions. Trains of pulses triggered by the Sun pulse fire at one phase of the spin against the Sun, so that H keeps
+its heading to the direction of the Sun: a rhumb line on the sphere about the Sun.
 
-Such an impulse is square to S, so that H·S = C|ω3| = h never changes; between impulses S goes round H at |H|/A. All
-that follows from these two sentences is exact at any angle, and the same for both spin directions.
-
-Trains of pulses that the Sun pulse triggers, in closed form: where H goes, and what nutation they leave.
-
-All fire at one phase of the spin against the Sun, so that H keeps its heading to the direction of the Sun: a rhumb line
-on the sphere about the Sun. Angles are in rad, impulses in N m s; arrays of any shape broadcast.
+Angles are in rad, impulses in N m s; arrays of any shape broadcast.
 """
 
 from __future__ import annotations
@@ -24,10 +21,10 @@ from nutdamp.physics import attitude
 
 
 class RhumbEnd(NamedTuple):
-    """Where a rhumb line ends: angle from the Sun, growth of the longitude about it, and ``turn``.
+    """End of a rhumb line: angle from the Sun, growth of the longitude about it, and ``turn``.
 
-    ``turn`` is by how much the meridian of the Sun has turned about the axis against a direction that is carried
-    along without turning: ∫ cos γ dλ.
+    ``turn`` is the angle by which the meridian of the Sun has turned about the axis against a parallel-transported
+    direction: ∫ cos γ dλ.
     """
 
     sun_angle: Any
@@ -36,7 +33,7 @@ class RhumbEnd(NamedTuple):
 
 
 def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> RhumbEnd:
-    """A rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the Sun, right-handed about H.
+    """Rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the Sun, right-handed about H.
 
     γ2 = γ + s cos χ, Δλ = tan χ ln[tan(γ2/2)/tan(γ/2)] and ∫ cos γ dλ = tan χ ln[sin γ2 / sin γ], written without
     the division by cos χ. Not a number where it passes the Sun or the point opposite to it.
@@ -57,7 +54,8 @@ def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> RhumbEnd:
 
 
 def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]:
-    """The rhumb line to ``goal_angle`` from the Sun, ``ahead`` in longitude: heading χ as in `rhumb_end`, and length.
+    """Heading χ (as in `rhumb_end`) and length of the rhumb line to ``goal_angle``, ``ahead`` in longitude.
+    longitude.
 
     tan χ = Δλ/Δψ with ψ = ln tan(γ/2); the length is Δγ/cos χ, and sin γ |Δλ| along a parallel.
     """
@@ -69,8 +67,8 @@ def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]
 
 
 def turned_by(momentum: Any, torque: float, width: Any, spin: Any, spread: Any = None) -> Any:
-    """By how much a pulse of a ``torque`` (N m) fixed in the body turns H of size ``momentum``, rad: its mean over the
-    ``width`` s, in which the body turns at ``spin`` rad/s; ``spread`` s: over that time, where it is another.
+    """Mean turn of H of size ``momentum``, rad, by a pulse of a ``torque`` (N m) fixed in the body that lasts ``width``
+    s, in which the body turns at ``spin`` rad/s; ``spread`` s replaces the width in the mean over the turn.
     """
     return torque * width * np.sinc(0.5 * spin * (width if spread is None else spread) / np.pi) / momentum
 
@@ -90,7 +88,7 @@ Array = NDArray[np.float64]
 
 
 class TwoJumps(NamedTuple):
-    """Two jumps of H that leave it and the spin axis on the target, one row for each start: n rows.
+    """Two jumps of H that bring it and the spin axis to the target, one row per start: n rows.
 
     ``middle`` (n, 3) is H between them, N m s; ``first`` and ``second`` (n,) their sizes, N m s; ``wait`` (n,) s from
     one to the other, or ``turn`` (n,) s more for each further turn of the spin axis.
@@ -117,13 +115,13 @@ def two_jumps(
     aside: Array | float = 0.0,
     straight: bool = False,
 ) -> TwoJumps:
-    """The two jumps from H = ``momentum`` (3,), spin axes ``axes`` (n, 3), to the unit vector ``target`` (3,).
+    """Two jumps from H = ``momentum`` (3,), spin axes ``axes`` (n, 3), to the unit vector ``target`` (3,).
 
-    Between the jumps H must have the same component h along S, which it keeps, and along the target, onto which it is
-    to jump: it lies on the line where the planes H·S = h and H·T = h meet. The sum of both jumps is least
-    where the straight way from one end to the other crosses that line when both planes are laid flat. ``aside``
-    (n,) moves H along the line from there, N m s; ``straight`` takes the foot of the line instead, on the great circle
-    from S to T. With T along H this is Magnus 1970 (22) without drift.
+    Between the jumps H must have the same component h along S and along the target: it lies on the line where the
+    planes H·S = h and H·T = h meet. The sum of both jumps is least where the straight way from one end to the other
+    crosses that line when both planes are laid flat. ``aside`` (n,) moves H along the line from there, N m s;
+    ``straight`` takes the foot of the line instead, on the great circle from S to T. With T along H this is Magnus 1970
+    (22) without drift.
     """
     along = np.cross(axes, target)
     size = np.linalg.norm(along, axis=-1, keepdims=True)
@@ -145,7 +143,7 @@ def two_jumps(
 
 
 def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array, Array]:
-    """Time in s until the spin axes ``axes`` (n, 3) come past ``target`` (3,) about ``momentum`` (n, 3); and one turn.
+    """Time in s until the spin axes ``axes`` (n, 3) pass ``target`` (3,) about ``momentum`` (n, 3); and one period.
 
     Both must lie on the same cone about H.
     """
@@ -158,10 +156,11 @@ def coast(A: float, momentum: Array, axes: Array, target: Array) -> tuple[Array,
 
 
 def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, Array]:
-    """H (n, 3) for the first of ``cones`` half cones from spin axes ``axes`` (n, 3) to ``target`` (3,), and the rest.
+    """H (n, 3) in the first of ``cones`` half cones from spin axes ``axes`` (n, 3) to ``target`` (3,), and further
+    cost.
 
-    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T. The rest (n,) N m s is what the
-    jumps after the first cost: (2n - 1) h tan δ.
+    Half cones of half-angle δ = β/2n lie in a row on the great circle from S to T. The further cost (n,) N m s is that
+    of the jumps after the first: (2n - 1) h tan δ.
     """
     angle = np.arctan2(np.linalg.norm(np.cross(axes, target), axis=-1), axes @ target)
     half = angle / (2 * cones)
@@ -173,9 +172,9 @@ def half_cone(h: float, axes: Array, target: Array, cones: int) -> tuple[Array, 
 
 
 def half_cones_impulse(h: float, angle: float, cones: int) -> float:
-    """What ``cones`` half cones cost from a pure spin, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ.
+    """Cost of ``cones`` half cones, N m s: 2n h tan(β/2n), with β = ``angle`` in rad below nπ.
 
-    Three times the angle of one cone costs less in three: as n grows it comes down to the floor hβ.
+    As n grows it falls to the lower bound hβ.
     """
     return 2 * cones * h * math.tan(angle / (2 * cones))
 
@@ -187,7 +186,7 @@ def arc_efficiency(spin: float, on_time: float) -> float:
 
 
 def reach(torque: float, spin: float, longest: float) -> float:
-    """Most by which one pulse of up to ``longest`` s turns H, N m s: 2M/|ω3| in half a spin turn."""
+    """Largest turn of H by one pulse of up to ``longest`` s, N m s: 2M/|ω3| in half a spin turn."""
     half = 0.5 * abs(spin)
     return torque / half * math.sin(min(half * longest, 0.5 * math.pi))
 
@@ -195,7 +194,7 @@ def reach(torque: float, spin: float, longest: float) -> float:
 def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
     """On-times (n,) s of pulses that turn H like ``impulses`` (n,) N m s: (2/ω3) asin(ω3J/2M).
 
-    Not a number beyond 2M/ω3, the most that a torque fixed in the body can turn H at a time.
+    Not a number beyond 2M/ω3, the largest turn of H by a torque fixed in the body.
     """
     rate = 0.5 * abs(spin)
     with np.errstate(invalid="ignore"):
@@ -203,17 +202,17 @@ def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
 
 
 def square_to(vector: Array) -> Array:
-    """Some unit vector square to ``vector`` (3,)."""
+    """Some unit vector perpendicular to ``vector`` (3,)."""
     other = np.eye(3)[int(np.argmin(np.abs(vector)))]
     square = np.cross(vector, other)
     return np.asarray(square / np.linalg.norm(square))
 
 
 def course(momentum: Array, target: Array, sun: Array | None) -> tuple[Array, float]:
-    """Unit vector (3,) square to H = ``momentum`` (3,) in which H is to go to ``target`` (3,), and the way, rad.
+    """Unit vector (3,) perpendicular to H = ``momentum`` (3,) towards ``target`` (3,), and the length of the way, rad.
 
-    Without ``sun`` (3,) along the great circle. With it along the rhumb line, which keeps its angle to the direction
-    of the Sun (`precession.rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
+    Without ``sun`` (3,) along the great circle, with it along the rhumb line, which keeps its angle to the direction
+    of the Sun (`rhumb_course`). Raises Infeasible where an axis points to the Sun or away from it.
     """
     here = momentum / float(np.linalg.norm(momentum))
     if sun is None:

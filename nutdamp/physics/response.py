@@ -1,14 +1,9 @@
-"""Effect of pulses and of lasting torques on the body rates.
+"""Body rates under pulses and lasting torques, in closed form: Magnus 1970 (8)-(17), (23)-(27).
 
-Body rates under torques that last: the general solution Magnus 1970 (8)-(10) and its special cases.
-
-Everything in time, ω̇ = -i a ω3(t) ω + M(t)/A and ω̇3 = M3/C, so that nothing is divided by ω3 (Magnus' m = M/(Aω3)
-breaks where the spin passes zero) or by a (a sphere is no exception). M = M1 + iM2 in N m, body-fixed unless said.
-
-Body rates under pulses, in closed form: ω = ω1 + iω2 turns in the body at -a ω3, and torques add to it.
-
-Equation of motion in time, Magnus 1970 (1) and (4)-(6) without the division by ω3:
+Equation of motion in time, Magnus 1970 (1) and (4)-(6) without the division by ω3, ω = ω1 + iω2:
 dω/dt = -i a ω3(t) ω + M(t)/A,  dω3/dt = M3/C.
+Nothing is divided by ω3 (Magnus' m = M/(Aω3) breaks where the spin passes zero) or by a (a sphere is no exception).
+M = M1 + iM2 in N m, body-fixed unless stated.
 """
 
 from __future__ import annotations
@@ -37,10 +32,10 @@ SERIES_ORDERS = 60
 """Orders of that power series: it has converged long before."""
 
 OUTWARDS = 2000
-"""Steps of a tenth outwards, at most, in which an on-time is sought: over more decades than there are in a number."""
+"""Largest number of steps outwards by a tenth in the search for an on-time: more decades than numbers have."""
 
 MOST_PANELS = 20_000
-"""A pulse over more phase than these span keeps less than 1e-4 of its impulse; it counts as keeping none."""
+"""Panels beyond which a pulse keeps less than 1e-4 of its impulse; it counts as keeping none."""
 
 
 def impulse_sum(
@@ -76,7 +71,7 @@ def impulse_sum(
 def width_factor(
     a: float, spin: float, spin_rate: float, on_time: float, growth: float = 0.0, drift: float = 0.0
 ) -> complex:
-    """What a rectangular pulse loses on ω by its width, as a factor on its impulse at the centre.
+    """Factor on the impulse of a rectangular pulse at its centre, for its effect on ω.
 
     For a constant body torque with axial part, ω3 = spin + spin_rate·(time since start) with spin_rate = M3/C, the
     pulse acts on ω exactly as an impulse M τ F at its centre, when ω3 jumps there by spin_rate·τ:
@@ -110,7 +105,7 @@ def width_factor(
 
 
 def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
-    """Mean of exp(i(slope s + bend s²)) over |s| <= half, for one ``slope`` or many, by its power series."""
+    """Mean of exp(i(slope s + bend s²)) over |s| <= half, by its power series; ``slope`` is a number or an array."""
     before, term = 0.0 * slope, 1.0 + 0.0 * slope  # terms c_k half^k of the series of the integrand
     total = term
     for order in range(SERIES_ORDERS):
@@ -157,7 +152,7 @@ def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate:
 
 
 def _crossing(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Where ``excess`` rises through zero between ``low`` and ``high``: false position that halves a stale end."""
+    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale end."""
     below, above = excess(low), excess(high)
     for _ in range(100):
         if above == 0.0 or high - low <= 2e-16 * high:
@@ -174,7 +169,7 @@ def _crossing(excess: Callable[[float], float], low: float, high: float) -> floa
 
 
 PANEL = 2.0
-"""Phase in rad that one Gauss-Legendre panel spans; ten nodes then err by less than a rounding."""
+"""Phase in rad of one Gauss-Legendre panel; ten nodes then err by less than a rounding."""
 
 
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:
@@ -202,7 +197,7 @@ def stepwise_torque(
 ) -> tuple[ComplexArray, Array]:
     """General solution, Magnus 1970 (8)-(10), for a torque that is constant between edges; exact at any angle.
 
-    The form of these equations; schedules fly their pulses by `rates` and `rigid`. ``times`` (n,) s in [edges[0],
+    The form of these equations; schedules fly their pulses by `rates` and `taylor`. ``times`` (n,) s in [edges[0],
     edges[-1]]; ``edges`` (k+1,) s ascending, the motion (``omega0``, ``spin0`` in rad/s) begins at edges[0];
     ``torques`` (k, 3) N m. Returns ω (n,) and ω3 (n,) in rad/s.
     """
@@ -230,7 +225,7 @@ def stepwise_torque(
 def rotating_torques(
     times: Array, omega0: complex, spin: float, A: float, C: float, torques: ComplexArray, rates: Array
 ) -> ComplexArray:
-    """ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
+    """Transverse rate ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
 
     Magnus 1970 (23), (24) with r_p = b_p ω3, where ω0 of the print is an integration constant: with ω(0) given it is
     ω(0) + i Σ m_p/(a + b_p). Both are one here, without cancellation near resonance r_p = -aω3, which is (25):
@@ -294,7 +289,8 @@ def beat(A: float, C: float, spin: float, torque: complex, rate: float) -> tuple
 
 
 def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: complex, nutation: float) -> float:
-    """When a resonant torque (r = -aω3) has driven the nutation angle to ``nutation`` rad, s; Magnus 1970 (25).
+    """Time in s for a resonant torque (r = -aω3) to drive the nutation angle to ``nutation`` rad; Magnus 1970 (25).
+    (25).
 
     |ω0 + M t/A| = C|ω3| tan θ/A: the later root, since the pole curve may first run inwards; 0 if it is there already.
     """

@@ -1,18 +1,11 @@
-"""Sun direction, Sun pulses, extreme angles of the spin axis from directions.
-
-How near the spin axis comes to directions in space, and how far from them, in many cases at once.
+"""Direction of the Sun, Sun pulses of nutating bodies, extreme angles of the spin axis from directions.
 
 On a free arc of a symmetric body the axis goes round H on a cone: with H at the angle β from the direction and the
 axis at θ from H it comes as near as |β - θ| and as far as β + θ, if it goes so far round. Where dissipation changes θ
-those turns that count are followed in steps, and any other motion all the way. Arrays carry the case last, as in
-`batch`.
+only the turns that count are followed in steps; any other motion all the way.
 
-Sun pulses of nutating bodies and what fires from them, many at once: each pulse moves the Sun pulses after it.
-
-A Sun pulse comes when the Sun passes the azimuth of the sensor in the body: as the body moves, not as it would without
-nutation. Arrays carry the case last, as in `batch`, by which everything moves.
-
-Where the Sun is seen, to 0.01 deg between 1972 and 2100: enough for the phase of a Sun pulse and for cones.
+A Sun pulse comes when the Sun passes the azimuth of the sensor in the nutating body, so each thruster pulse moves the
+Sun pulses after it. Arrays carry the case last, as in `batch`, which propagates everything.
 """
 
 from __future__ import annotations
@@ -25,23 +18,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.batch import Stretch
+from nutdamp.physics.batch import MotionStretch
 
 OBLIQUITY = math.radians(23.43928)
-"""Of the ecliptic at J2000.0."""
+"""Obliquity of the ecliptic at J2000.0."""
 
 ABERRATION = 20.4898 / 3600.0
-"""deg by which the Sun is seen behind where it is, at its mean distance (Meeus, 25.10)."""
+"""Mean aberration of the Sun, deg (Meeus, 25.10)."""
 
 TILTING, NODE = math.radians(0.013056), math.radians(174.876)
-"""How far the ecliptic tilts in a century, and the longitude about which it does."""
+"""Tilt of the ecliptic per century, and the longitude of its axis."""
 
 
 def direction(days: float) -> NDArray[np.float64]:
     """Geocentric unit vector (3,) to the apparent Sun in the mean equator and equinox of J2000.0.
 
-    ``days`` since J2000.0 (2000-01-01T12:00 TT). Longitude by J. Meeus, Astronomical Algorithms, 2nd ed., chapter 25,
-    "low accuracy", with aberration, taken from ecliptic and equinox of date to those of J2000.0 (chapter 21).
+    ``days`` since J2000.0 (2000-01-01T12:00 TT). To 0.01 deg from 1972 to 2100. Longitude by J. Meeus, Astronomical
+    Algorithms, 2nd ed., chapter 25, "low accuracy", with aberration, taken from ecliptic and equinox of date to J2000.0
+    (21).
     """
     centuries = days / 36525.0
     mean_longitude = 280.46646 + centuries * (36000.76983 + centuries * 0.0003032)
@@ -63,20 +57,20 @@ def direction(days: float) -> NDArray[np.float64]:
 Array = NDArray[np.float64]
 
 ROWS = 24
-"""Steps in each turn of the axis, where it is followed in steps."""
+"""Steps per turn of the axis, where it is followed in steps."""
 
 SECANTS = 2
-"""Steps of the secant method to the moment between two steps at which the axis is nearest or farthest."""
+"""Steps of the secant method to the extreme of the angle between two steps."""
 
 CIRCLE = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisWatch:
-    """The ``least`` and the ``largest`` angles (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
+    """Extreme angles ``least`` and ``largest`` (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
 
-    The directions are inertial unit vectors. ``sense`` is the sign of the spin; ``rows``: which of the n cases those
-    are that are given to it.
+    The directions are inertial unit vectors. ``sense`` is the sign of the spin; ``rows``: indices of the observed cases
+    among the n.
     """
 
     directions: Array
@@ -87,7 +81,7 @@ class AxisWatch:
 
     @classmethod
     def of(cls, directions: Array, sense: float) -> AxisWatch:
-        """One that has seen nothing yet."""
+        """Observer without observations."""
         shape = len(directions), directions.shape[2]
         return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense)
 
@@ -97,12 +91,12 @@ class AxisWatch:
         return np.stack([self.least, self.largest], axis=1)
 
     def some(self, cases: Any) -> AxisWatch:
-        """That of some of the cases (an index of arrays), to which it adds what it sees of them."""
+        """Observer of a subset of ``cases`` (an index of arrays), which adds to this one."""
         rows = np.arange(self.least.shape[1])[self.rows][cases]
         return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
 
-    def motion(self, here: Stretch, duration: Array) -> None:
-        """Take the motion that `batch.advance` makes with these arguments, which stay as they are."""
+    def motion(self, here: MotionStretch, duration: Array) -> None:
+        """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
         bodies = here.bodies
         if here.torque is not None or not bodies.free:
             self._steps(here, duration)
@@ -111,8 +105,8 @@ class AxisWatch:
         else:
             self._slow(here, duration)
 
-    def turn(self, here: Stretch) -> None:
-        """Take one turn of the axis about H in a motion free of pulses."""
+    def turn(self, here: MotionStretch) -> None:
+        """Record one turn of the axis about H in a motion free of pulses."""
         first, second, _ = here.bodies.moments
         self.motion(here, CIRCLE * 0.5 * (first + second) / _momentum(here))
 
@@ -122,7 +116,7 @@ class AxisWatch:
         self.largest[number, rows] = np.maximum(self.largest[number, rows], largest)
 
     def _arc(self, moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
-        """Begin and inner extremes of arcs; their ends are where others begin."""
+        """Record start and inner extremes of arcs; their ends are starts of others."""
         momentum, axis = _rotated(quaternion, moments * rates), self._axis(quaternion)
         size = np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum, way = momentum / size, size / moments[0] * duration
@@ -136,25 +130,25 @@ class AxisWatch:
             least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
             self._take(number, np.where(way >= nearest, least, begins), np.where(way >= farthest, largest, begins))
 
-    def _slow(self, here: Stretch, duration: Array) -> None:
-        """Arcs with dissipation, of which the first turn and the last are followed in steps.
+    def _slow(self, here: MotionStretch, duration: Array) -> None:
+        """Record arcs with dissipation, of which the first turn and the last are followed in steps.
 
-        H stays and θ grows, or falls, all the way: between those turns so do |β - θ| and β + θ, unless θ passes β or
-        π - β, where all turns are followed.
+        H stays and θ changes monotonically: between those turns so do |β - θ| and β + θ, unless θ passes β or π - β,
+        where all turns are followed.
         """
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.moments * here.rates)
-        before, after = (_angles(momentum, self._axis(one.quaternion)) for one in (here, last))
-        betas = np.array([_angles(momentum, one) for one in self.directions[:, :, self.rows]])
-        passed = [(before - one) * (after - one) <= 0.0 for one in (*betas, *(math.pi - betas))]
+        before, after = (_angles(momentum, self._axis(stretch.quaternion)) for stretch in (here, last))
+        betas = np.array([_angles(momentum, direction) for direction in self.directions[:, :, self.rows]])
+        passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
         for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
             if cases.any():
                 self.some(cases)._steps(begins.some(cases), lasts[cases])
 
-    def _steps(self, here: Stretch, duration: Array) -> None:
-        """Begin and end of each step, and extremes between them."""
+    def _steps(self, here: MotionStretch, duration: Array) -> None:
+        """Record start and end of each step, and extremes between them."""
         first, second, _ = here.bodies.moments
         pace = _momentum(here) / np.minimum(first, second)
         if not np.array_equal(first, second):
@@ -169,8 +163,8 @@ class AxisWatch:
                 if len(cases):
                     self._between(then.some(cases), step[cases], (rise[cases], fall[cases]), number, cases)
 
-    def _between(self, then: Stretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
-        """Extremes between the ends of a step, by `SECANTS` from the rates (nearer, farther) there of one direction."""
+    def _between(self, then: MotionStretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
+        """Record extremes within a step, by `SECANTS` from the ``rates`` (nearer, farther) at its ends."""
         begin, end, (rise, fall) = np.zeros_like(step), step, rates
         for _ in range(SECANTS):
             way = begin + (end - begin) * rise / (rise - fall)
@@ -179,8 +173,8 @@ class AxisWatch:
             begin, rise = np.where(before, way, begin), np.where(before, here, rise)
             end, fall = np.where(before, end, way), np.where(before, fall, here)
 
-    def _look(self, here: Stretch, cases: Any) -> list[Array]:
-        """Take the angles of one moment; returns at what rate the axis comes nearer, in cosines by s."""
+    def _look(self, here: MotionStretch, cases: Any) -> list[Array]:
+        """Record the angles at one instant; returns the rate at which the axis comes nearer, in cosines per s."""
         bodies, quaternion = here.bodies, here.quaternion
         axis, (first, second, _) = self._axis(quaternion), here.rates
         moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
@@ -202,13 +196,13 @@ class AxisWatch:
         return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
-def _momentum(here: Stretch) -> Array:
+def _momentum(here: MotionStretch) -> Array:
     """Size (n,) of H, N m s."""
     return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
 
 
 def _rotated(quaternion: Array, vector: Array) -> Array:
-    """Vectors (3, n) turned by unit quaternions (4, n)."""
+    """Vectors (3, n) rotated by unit quaternions (4, n)."""
     w, axis = quaternion[0], quaternion[1:]
     once = np.cross(axis, vector, axis=0)
     return np.asarray(vector + 2.0 * (w * once + np.cross(axis, once, axis=0)))
@@ -221,17 +215,17 @@ def _angles(first: Array, second: Array) -> Array:
 
 
 ITERATIONS = 40
-"""Newton steps by which a Sun pulse is found, at most; three or four are usual."""
+"""Largest number of Newton steps to a Sun pulse; three or four are usual."""
 
 EXACT = 1e-13
-"""Share of a spin turn to which it is found."""
+"""Tolerance of the time of a Sun pulse, in spin turns."""
 
 AHEAD = 8
-"""Sun pulses after which the next one is looked for, at most: from there on it is foreseen by the mean rate."""
+"""Largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next."""
 
 
-class Push(NamedTuple):
-    """Torque that runs evenly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
+class TorqueRamp(NamedTuple):
+    """Torque that runs linearly from ``first`` (3, n) N m at ``begin`` s to ``last`` at ``end``; times (n,) or one."""
 
     begin: Any
     end: Any
@@ -239,16 +233,16 @@ class Push(NamedTuple):
     last: Array
 
 
-class SunClock:
-    """Bodies on their way from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
+class SunPulseClock:
+    """Motion of bodies from Sun pulse to Sun pulse, which count from 1, the first after t = 0.
 
     ``sun`` (3, n) are inertial unit vectors, ``azimuth`` rad is that of the sensor about axis 3 from axis 1, ``sense``
-    the sign of the spin. ``time`` (n,) s is that of the last Sun pulse looked for, ``lost`` (n,) where there was none:
-    the Sun is too near to the axis to go round in the body. ``over`` (n,) s: when the last pulse, command and
-    thrust, is over.
+    the sign of the spin. ``time`` (n,) s is that of the last computed Sun pulse, ``lost`` (n,) True where there was
+    none: the Sun is too near to the axis to go round in the body. ``over`` (n,) s: end of the last pulse, command and
+    thrust.
     """
 
-    def __init__(self, start: Stretch, sun: Array, sense: float, azimuth: float) -> None:
+    def __init__(self, start: MotionStretch, sun: Array, sense: float, azimuth: float) -> None:
         self.sun, self.sense, self.azimuth = sun, sense, azimuth
         self._stretches, self.over = [start], start.since
         ahead, _ = self._ahead(start, sun)
@@ -256,33 +250,38 @@ class SunClock:
         self.lost = np.zeros(len(start.since), dtype=bool)
 
     @property
-    def here(self) -> Stretch:
-        """The motion since the last pulse was over."""
+    def here(self) -> MotionStretch:
+        """Motion since the end of the last pulse."""
         return self._stretches[-1]
 
     @property
-    def passed(self) -> Iterator[tuple[Stretch, Array]]:
-        """The motion from the end of the last pulse but one to that of the last, each stretch with its end."""
-        return zip(self._stretches, (one.since for one in self._stretches[1:]), strict=False)
+    def passed(self) -> Iterator[tuple[MotionStretch, Array]]:
+        """Stretches from the end of the last pulse but one to that of the last, each with its end."""
+        return zip(self._stretches, (stretch.since for stretch in self._stretches[1:]), strict=False)
 
     def fire(
-        self, found: Stretch, delay: Array, width: float, pushes: Sequence[Push], sheds: Array | None = None
+        self,
+        sun_pulse: MotionStretch,
+        delay: Array,
+        width: float,
+        pushes: Sequence[TorqueRamp],
+        sheds: Array | None = None,
     ) -> Array:
-        """Fire a command of ``width`` s, the ``delay`` (n,) s after the Sun pulse ``found``, the last one.
+        """Fire a command of ``width`` s, ``delay`` (n,) s after the last Sun pulse, ``sun_pulse``.
 
-        ``pushes`` are the torques that follow it, s after its start; the moments fall by ``sheds`` (3, n) kg m², half
-        as the first begins. Returns the starts (n,) s of the commands: not before the pulse before is over.
+        ``pushes`` are its torques, s after its start; the moments fall by ``sheds`` (3, n) kg m², half as the first
+        begins. Returns the starts (n,) s of the commands: not before the end of the previous pulse.
         """
         before, half = self.here, None if sheds is None else 0.5 * sheds
-        starts = np.maximum(found.since + delay, self.over)
+        starts = np.maximum(sun_pulse.since + delay, self.over)
         lasts: Any = width
         for push in pushes:
             lasts = np.maximum(lasts, push.end)
         self.over = starts + lasts
         if not pushes:
             return starts
-        begun = found.moved(starts + pushes[0].begin)
-        late = np.flatnonzero(found.since < before.since)  # it came while the pulse before was on
+        begun = sun_pulse.moved(starts + pushes[0].begin)
+        late = np.flatnonzero(sun_pulse.since < before.since)  # it came while the pulse before was on
         if len(late):
             again = before.some(late).moved(begun.since[late])
             begun.rates[:, late], begun.quaternion[:, late] = again.rates, again.quaternion
@@ -297,24 +296,24 @@ class SunClock:
         self._stretches.append(begun._replace(bodies=begun.bodies.lighter(half)))
         return starts
 
-    def sun_pulse(self, number: int) -> Stretch:
-        """The motion as the Sun pulse of this ``number`` comes, if nothing is fired before; none goes back."""
-        found = self.here
+    def sun_pulse(self, number: int) -> MotionStretch:
+        """Motion at the Sun pulse of this ``number``, if nothing is fired before; numbers must not decrease."""
+        stretch = self.here
         while self._number < number:
             step = min(number - self._number, AHEAD)
             pace, (ahead, _) = self._pace, self._ahead(self.here, self.sun)
             passed = np.rint((pace * (self.here.since - self.time) + ahead) / CIRCLE)
             expected = self.here.since + (ahead + CIRCLE * (step - passed)) / pace
-            found = self._root(self.here.moved(expected), pace, self.sun)
-            self._look_back(found, expected, pace)
-            off, rate = self._off(found, self.sun)
-            astray = np.abs(found.since - expected) * pace > math.pi
+            stretch = self._root(self.here.moved(expected), pace, self.sun)
+            self._look_back(stretch, expected, pace)
+            off, rate = self._off(stretch, self.sun)
+            astray = np.abs(stretch.since - expected) * pace > math.pi
             self.lost |= astray | (rate <= 0.0) | ~(np.abs(off) < 1e-6)
-            self._number, self.time = self._number + step, found.since
-        return found
+            self._number, self.time = self._number + step, stretch.since
+        return stretch
 
-    def angle(self, here: Stretch) -> Array:
-        """Between spin axis and Sun, (n,) rad."""
+    def angle(self, here: MotionStretch) -> Array:
+        """Angle between spin axis and Sun, (n,) rad."""
         w, x, y, z = here.quaternion
         axis = self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
         across = np.linalg.norm(np.cross(axis, self.sun, axis=0), axis=0)
@@ -331,19 +330,19 @@ class SunClock:
         size = np.sqrt(np.sum((self.here.bodies.moments * self.here.rates) ** 2, axis=0))
         return np.asarray(np.abs(self.sense * size / A + (1.0 - C / A) * spin))
 
-    def _look_back(self, found: Stretch, expected: Array, pace: Array) -> None:
-        """Where a Sun pulse came before the last pulse was over, look again in the motion then, in place."""
+    def _look_back(self, sun_pulse: MotionStretch, expected: Array, pace: Array) -> None:
+        """Recompute in place the Sun pulses that came before the end of the last pulse."""
         for stretch, over in zip(self._stretches[-2::-1], self._stretches[:0:-1], strict=True):
-            cases = np.flatnonzero(found.since < over.since)
+            cases = np.flatnonzero(sun_pulse.since < over.since)
             if not len(cases):
                 return
             start = stretch.some(cases).moved(np.minimum(expected, over.since)[cases])
             again = self._root(start, pace[cases], self.sun[:, cases])
-            for whole, part in zip(found[1:4], again[1:4], strict=True):
+            for whole, part in zip(sun_pulse[1:4], again[1:4], strict=True):
                 whole[..., cases] = part
 
-    def _root(self, start: Stretch, pace: Array, sun: Array) -> Stretch:
-        """The motion as the Sun passes the sensor, at the moment next to that of ``start``: by Newton's method."""
+    def _root(self, start: MotionStretch, pace: Array, sun: Array) -> MotionStretch:
+        """Motion as the Sun passes the sensor, at the time nearest to that of ``start``: by Newton's method."""
         here = start
         for _ in range(ITERATIONS):
             off, rate = self._off(here, sun)
@@ -353,21 +352,21 @@ class SunClock:
                 break
         return here
 
-    def _off(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
-        """By what angle (n,) in [-π, π) the body has to turn until the Sun passes the sensor, and at what rate."""
+    def _off(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
+        """Angle (n,) in [-π, π) by which the body has to turn until the Sun passes the sensor, and its rate."""
         ahead, rate = self._ahead(here, sun)
         return (ahead + math.pi) % CIRCLE - math.pi, rate
 
-    def _ahead(self, here: Stretch, sun: Array) -> tuple[Array, Array]:
-        """The same in [0, 2π)."""
+    def _ahead(self, here: MotionStretch, sun: Array) -> tuple[Array, Array]:
+        """`_off` in [0, 2π)."""
         return ahead(here.rates, here.quaternion, sun, self.azimuth, self.sense)
 
 
 def ahead(rates: Array, quaternion: Array, sun: Array, azimuth: float, sense: float) -> tuple[Array, Array]:
-    """By what angle (n,) in [0, 2π) bodies have to turn until the Sun passes the sensor, and at what rate, rad/s.
+    """Angle (n,) in [0, 2π) by which bodies have to turn until the Sun passes the sensor, and its rate, rad/s.
 
     ``rates`` (3, n) rad/s, ``quaternion`` (4, n) body -> inertial, ``sun`` (3, n) inertial unit vectors; ``azimuth``
-    rad and ``sense`` are those of a `SunClock`.
+    rad and ``sense`` are those of a `SunPulseClock`.
     """
     w, x, y, z = quaternion
     s1, s2, s3 = sun

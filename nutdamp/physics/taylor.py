@@ -1,20 +1,15 @@
-"""Taylor integration of one body.
-
-Euler's equations and the attitude, integrated by Taylor series for piecewise constant body torques.
+"""Taylor integration of Euler's equations and the attitude of one body under piecewise constant torques.
 
 The equations are polynomials in rates and quaternion, so the Taylor coefficients of a solution follow from one
 another by products of series. One step spans about two radians at rounding accuracy, for any principal moments, and
 the series is its own dense output; closed forms and plans are checked against it.
 
-Symmetric bodies under torque: the Taylor series of many steps at once.
-
-Without dissipation the rates of a symmetric body do not depend on its attitude and are linear in what drives them:
-ω' = -iaω3 ω + M/A with ω3 even in time, Magnus 1970 (1). So the rates at the ends of all steps follow from sums, and
-with them the steps of the attitude are independent of each other: arrays carry the steps and the cases, and the
-turns of the steps are multiplied at the end.
-
-A quaternion (w, x, y, z) is a pair of complex numbers here, p = w + iz and r = x + iy: dq/dt = q (0, ω)/2 becomes
-p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is (p p* - r r̄*, p r* + r p̄*).
+Without dissipation the rates of a symmetric body do not depend on its attitude and are linear in their drive:
+ω' = -iaω3 ω + M/A with ω3 linear in time, Magnus 1970 (1). The rates at the ends of all steps follow from sums, and
+the steps of the attitude are independent of each other: arrays carry the steps and the cases, and the turns of the
+steps are multiplied at the end. A quaternion (w, x, y, z) is a pair of complex numbers there, p = w + iz and
+r = x + iy: dq/dt = q (0, ω)/2 becomes p' = (iω3 p - ω̄ r)/2 and r' = (ω p - iω3 r)/2, and the product of two is
+(p p* - r r̄*, p r* + r p̄*).
 """
 
 from __future__ import annotations
@@ -35,19 +30,19 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 DRIVEN_ORDER = 22
-"""Of the series, at most; a step that needs more is halved."""
+"""Largest order of the series of symmetric bodies; a step that needs more is halved."""
 
 STRIDE = 1.7
-"""Radians of one step, at most, of all that turns: 1.7^22/22! is rounding."""
+"""Largest step, rad of the fastest rotation: 1.7^22/22! is rounding."""
 
 REMAINDER = 2.0**-53
 """Size of the last two terms kept, relative to the scale of rates and quaternion."""
 
 TOGETHER = 1024
-"""Steps times cases that are summed together: few enough that their series stay in the cache."""
+"""Steps times cases summed together: few enough that their series stay in the cache."""
 
 HALVINGS = 12
-"""Times that the steps are halved, at most, where the series does not converge."""
+"""Largest number of halvings of the steps where the series does not converge."""
 
 
 class NotConverged(ArithmeticError):
@@ -56,7 +51,7 @@ class NotConverged(ArithmeticError):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What acts on n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
+    """Drive of n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
 
     ``turning``: (M/A, r) of torques M e^{irt} about axis 3, with M/A (n,) at t = 0 and r in rad/s.
     """
@@ -67,7 +62,7 @@ class Drive:
     turning: tuple[tuple[ComplexArray, float], ...] = ()
 
     def pace(self, omega: ComplexArray, spin: Array, duration: Array) -> Array:
-        """Rate in rad/s (n,) that bounds all that turns during the ``duration`` (n,) s."""
+        """Upper bound (n,) in rad/s on all rates during the ``duration`` (n,) s."""
         fastest = np.maximum(np.abs(spin), np.abs(spin + self.axial * duration))
         strength = np.hypot(np.abs(self.transverse), self.axial)
         strength = strength + sum(np.abs(size) for size, _ in self.turning)
@@ -92,7 +87,7 @@ class Steps(NamedTuple):
 
 
 def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration: Array, count: int) -> Iterator[Steps]:
-    """The motion over ``duration`` (n,) s from ``start`` (n,) s in ``count`` even steps or a multiple, some at a time.
+    """Motion over ``duration`` (n,) s from ``start`` (n,) s in ``count`` equal steps or a multiple, in groups.
 
     ``omega`` and ``spin`` (n,) rad/s at the start. Raises NotConverged.
     """
@@ -101,15 +96,15 @@ def steps(drive: Drive, omega: ComplexArray, spin: Array, start: Array, duration
     halvings = 0
     while done < count:
         some = min(together, count - done)
-        found = _driven_series(drive, omega, spin, start + done * step, step, some)
-        if found is None:
+        series = _driven_series(drive, omega, spin, start + done * step, step, some)
+        if series is None:
             if halvings == HALVINGS:
                 raise NotConverged
             halvings, step, done, count = halvings + 1, 0.5 * step, 2 * done, 2 * count
             continue
-        yield found
+        yield series
         done += some
-        omega, spin = found.omega[:, -1].sum(axis=0), found.spin[:, -1].sum(axis=0)
+        omega, spin = series.omega[:, -1].sum(axis=0), series.spin[:, -1].sum(axis=0)
 
 
 def end(
@@ -119,19 +114,19 @@ def end(
 
     Raises NotConverged.
     """
-    for found in steps(drive, omega, spin, start, duration, count_for(drive, omega, spin, duration)):
-        turned = product(turned, whole(found.turn.sum(axis=0)))
-        omega, spin = found.omega[:, -1].sum(axis=0), found.spin[:, -1].sum(axis=0)
+    for series in steps(drive, omega, spin, start, duration, count_for(drive, omega, spin, duration)):
+        turned = product(turned, whole(series.turn.sum(axis=0)))
+        omega, spin = series.omega[:, -1].sum(axis=0), series.spin[:, -1].sum(axis=0)
     return omega, spin, turned / np.sqrt(np.sum(turned.real**2 + turned.imag**2, axis=0))
 
 
 def count_for(drive: Drive, omega: ComplexArray, spin: Array, duration: Array) -> int:
-    """Steps that the slowest of the bodies takes, if the series converges as its pace promises."""
+    """Steps of the slowest of the bodies, if the series converges as its pace promises."""
     return max(1, math.ceil(float(np.max(drive.pace(omega, spin, duration) * duration)) / STRIDE))
 
 
 def _driven_series(drive: Drive, omega: ComplexArray, spin: Array, now: Array, step: Array, count: int) -> Steps | None:
-    """The next ``count`` steps of ``step`` (n,) s from ``now`` (n,) s; None where `ORDER` terms are too few."""
+    """Next ``count`` steps of ``step`` (n,) s from ``now`` (n,) s; None where `DRIVEN_ORDER` terms are too few."""
     number = np.arange(count)[:, None]
     starts = now + number * step
     gained = drive.axial * step
@@ -172,7 +167,7 @@ def _order(pace: float) -> int:
 
 
 def _powers(constant: ComplexArray, turning: list[tuple[Any, Any]]) -> list[Any]:
-    """Terms of what drives ω in a step, times the step: the ``constant`` in the first only."""
+    """Terms of the drive of ω in a step, times the step: the ``constant`` in the first only."""
     if not turning:
         return [constant]
     terms: list[Any] = []
@@ -221,12 +216,12 @@ def _turns(rates: ComplexArray, spins: Array, step: Array, order: int) -> Comple
 def product(left: ComplexArray, right: ComplexArray) -> ComplexArray:
     """Product of turns, (2, ...) each: the turn ``right``, then the turn ``left``."""
     p, r = left
-    one, two = right
-    return np.stack([p * one - r * two.conj(), p * two + r * one.conj()])
+    v, w = right
+    return np.stack([p * v - r * w.conj(), p * w + r * v.conj()])
 
 
 def in_turn(turns: ComplexArray) -> ComplexArray:
-    """The turns (2, s, n) from the start to the end of each step, (2, s, n), from those of the steps alone."""
+    """Turns (2, s, n) from the start to the end of each step, (2, s, n), from those of the steps alone."""
     done, reach = turns, 1
     while reach < done.shape[1]:
         done = np.concatenate([done[:, :reach], product(done[:, :-reach], done[:, reach:])], axis=1)
@@ -235,7 +230,7 @@ def in_turn(turns: ComplexArray) -> ComplexArray:
 
 
 def whole(turns: ComplexArray) -> ComplexArray:
-    """The turn (2, n) of all steps (2, s, n), one after the other."""
+    """Product (2, n) of the turns of all steps (2, s, n), one after the other."""
     while turns.shape[1] > 1:
         even = turns.shape[1] // 2 * 2
         pairs = product(turns[:, 0:even:2], turns[:, 1:even:2])
@@ -250,33 +245,33 @@ AT_REST = 1e-9
 """Share of the largest |H| of a motion below which H counts as at rest for energy dissipation."""
 
 LONGEST = 3e5
-"""Radians that one integration may run over: some two hundred thousand steps."""
+"""Largest angle of one integration, rad: some two hundred thousand steps."""
 
 SHORT = 8.0
-"""Radians up to which one step after the other is quicker than all at once."""
+"""Angle up to which sequential steps are quicker than all at once, rad."""
 
 MOST_STEPS = 400_000
-"""Steps of one integration, at most: enough for `LONGEST`, whatever becomes of the rates on the way."""
+"""Largest number of steps of one integration: enough for `LONGEST` whatever the rates on the way."""
 
 
 class Falling(NamedTuple):
-    """Principal moments that change: ``rate`` (3,) kg m²/s as an integration starts, and its own, (3,) kg m²/s².
+    """Changing principal moments: ``rate`` (3,) kg m²/s at the start of an integration, ``growth`` (3,) kg m²/s² of it.
 
-    What leaves the body takes along the angular momentum that it has there: I dω/dt = M - ω × (I ω), I as it falls.
+    Expelled mass takes along the angular momentum that it has there: I dω/dt = M - ω × (I ω), I as it falls.
     """
 
     rate: Array
     growth: Array
 
     def after(self, moments: Array, gone: float) -> tuple[tuple[float, float, float], Array, Falling]:
-        """``moments`` (3,) after ``gone`` s of it, the old ones over these, and how they fall from then on."""
+        """Moments (3,) after ``gone`` s, the ratio of ``moments`` (3,) to them, and their further fall."""
         light = moments + gone * (self.rate + 0.5 * gone * self.growth)
         further = Falling(self.rate + gone * self.growth, self.growth)
         return (light[0], light[1], light[2]), moments / light, further
 
 
 class Forcing(NamedTuple):
-    """What acts on a body besides a constant torque.
+    """Forcing of a body besides a constant torque.
 
     ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
     ``growth``: rate κ in 1/s at which energy dissipation lets a small nutation grow (negative: decay), `energy_sink`.
@@ -290,7 +285,7 @@ NOTHING = Forcing()
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class TaylorPiece:
     """Solution from ``start`` over ``duration`` s as polynomials in x = (t - start)/duration.
 
     ``rates`` (orders, 3) in rad/s, ``attitude`` (orders, 4).
@@ -325,15 +320,15 @@ def integrate(
     most: int = MOST_STEPS,
     slope: Array | None = None,
     falling: Falling | None = None,
-) -> list[Piece]:
+) -> list[TaylorPiece]:
     """Motion of a rigid body under a constant body torque and ``forcing``, from ``start`` to ``end`` s (> start).
 
     ``moments`` (I1, I2, I3) kg m², ``torque`` (3,) N m, ``rates`` (3,) rad/s, ``quaternion`` (4,) body -> inertial.
-    With a ``slope`` (3,) N m/s the torque is that at ``start`` and runs evenly from there; moments that are ``falling``
-    are those at ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
+    With a ``slope`` (3,) N m/s the torque is that at ``start`` and changes linearly; ``falling`` moments are those at
+    ``start``. Raises Infeasible for motions over more than `LONGEST` rad or ``most`` steps.
     """
     # In one piece: a part of the loop would take torque, slope, moments and forcing, each as it is at a step.
-    pieces: list[Piece] = []
+    pieces: list[TaylorPiece] = []
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     jerk = None if slope is None else slope / inertia
@@ -366,7 +361,7 @@ def integrate(
         if left - step < 1e-3 * step:  # no sliver of a step at the end
             step = left
         scaled = series * ((step / unit) ** np.arange(ORDER + 1))[:, None]
-        piece = Piece(now, step, scaled[:, :3], scaled[:, 3:])
+        piece = TaylorPiece(now, step, scaled[:, :3], scaled[:, 3:])
         pieces.append(piece)
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
@@ -374,7 +369,7 @@ def integrate(
 
 
 def _strength(acceleration: Array, jerk: Array | None, forcing: Forcing, least: float, duration: float) -> float:
-    """rad/s²: the most that all torques accelerate in ``duration`` s; ``least`` is the smallest principal moment."""
+    """Largest acceleration by all torques in ``duration`` s, rad/s²; ``least`` is the smallest principal moment."""
     strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / least
     return strength if jerk is None else max(strength, float(np.linalg.norm(acceleration + jerk * duration)))
 
@@ -403,8 +398,8 @@ def _symmetric(
     end: float,
     forcing: Forcing,
     most: int,
-) -> list[Piece]:
-    """`integrate` for I1 = I2 without dissipation: many steps at once, see `driven`."""
+) -> list[TaylorPiece]:
+    """`integrate` for I1 = I2 without dissipation: many steps at once, see `steps`."""
     A, _, C = moments
     drive = Drive(
         np.array([(A - C) / A]),
@@ -423,10 +418,10 @@ def _symmetric(
     if not angle <= LONGEST:
         raise _too_long(start, end, angle)
     count = count_for(drive, omega, spin, duration)
-    pieces: list[Piece] = []
+    pieces: list[TaylorPiece] = []
     try:
-        for found in steps(drive, omega, spin, np.array([start]), duration, count):
-            pieces += _pieces(found, quaternion)
+        for series in steps(drive, omega, spin, np.array([start]), duration, count):
+            pieces += _pieces(series, quaternion)
             quaternion = pieces[-1].final[1]
             if len(pieces) > most:
                 raise _too_many(start, end)
@@ -436,20 +431,20 @@ def _symmetric(
     return pieces
 
 
-def _pieces(found: Steps, quaternion: Array) -> list[Piece]:
-    """The steps of one body as pieces, from its ``quaternion`` (4,) at their beginning."""
-    terms, count = len(found.omega), len(found.starts)
+def _pieces(series: Steps, quaternion: Array) -> list[TaylorPiece]:
+    """Steps of one body as pieces, from its ``quaternion`` (4,) at their start."""
+    terms, count = len(series.omega), len(series.starts)
     rates = np.zeros((count, terms, 3))
-    rates[..., 0], rates[..., 1] = found.omega[..., 0].real.T, found.omega[..., 0].imag.T
-    rates[:, :2, 2] = found.spin[..., 0].T
-    turn = found.turn[..., 0]
+    rates[..., 0], rates[..., 1] = series.omega[..., 0].real.T, series.omega[..., 0].imag.T
+    rates[:, :2, 2] = series.spin[..., 0].T
+    turn = series.turn[..., 0]
     if count > 1:
         before = in_turn(turn.sum(axis=0)[:, :-1, None])[..., 0]
         turn[:, :, 1:] = np.moveaxis(product(before[:, None], np.moveaxis(turn, 1, 0)[:, :, 1:]), 0, 1)
     parts = np.stack([turn[:, 0].real, turn[:, 1].real, turn[:, 1].imag, turn[:, 0].imag], axis=-1)
     quaternions = attitude.multiply(quaternion, np.swapaxes(parts, 0, 1))
-    starts, duration = found.starts[:, 0].tolist(), float(found.duration[0])
-    return [Piece(*one) for one in zip(starts, [duration] * count, rates, quaternions, strict=True)]
+    starts, duration = series.starts[:, 0].tolist(), float(series.duration[0])
+    return [TaylorPiece(*parts) for parts in zip(starts, [duration] * count, rates, quaternions, strict=True)]
 
 
 def _series(
@@ -505,14 +500,14 @@ def _series(
 
 
 class _Light:
-    """Moments that fall as series: I(x) = I0 + I1 x + I2 x², x the time in the ``unit`` of the series."""
+    """Falling moments as series: I(x) = I0 + I1 x + I2 x², x the time in the ``unit`` of the series."""
 
     def __init__(self, moments: Array, falling: Falling, unit: float) -> None:
         self.parts = moments, unit * falling.rate, 0.5 * unit**2 * falling.growth
         self.unit, self.products = unit, list[Array]()
 
     def change(self, series: Array, product: Array, k: int) -> Array:
-        """What I1 and I2 add to coefficient k + 1 of ω, (3,); ``product``: coefficient k of (ω2 ω3, ω3 ω1, ω1 ω2).
+        """Terms of I1 and I2 in coefficient k + 1 of ω, (3,); ``product``: coefficient k of (ω2 ω3, ω3 ω1, ω1 ω2).
 
         By (k + 1) I0 ω_(k+1) + k I1 ω_k + (k - 1) I2 ω_(k-1) = unit Σ (ΔI_j) (ω ω)_(k-j), ΔI = (I2 - I3, …) of each.
         """
@@ -525,16 +520,16 @@ class _Light:
         return np.asarray(total / ((k + 1) * self.parts[0]))
 
     def momentum(self, series: Array, k: int) -> Array:
-        """What I1 and I2 add to coefficient k of H, (3,)."""
+        """Terms of I1 and I2 in coefficient k of H, (3,)."""
         orders = range(1, min(k, 2) + 1)
         return np.asarray(sum((self.parts[order] * series[k - order, :3] for order in orders), np.zeros(3)))
 
 
 class _Sink:
-    """`energy_sink` as series: what dissipation does to H in body axes, and how the body slips under it.
+    """`energy_sink` as series: torque of dissipation on H in body axes, and slip of the body.
 
     With q = H3/|H|² the slip is s = κq (H2, -H1, 0), and H × s is added to dH/dt in the body: products of series but
-    for q. ``floor`` keeps q regular where torques from outside bring H to rest: there is nothing to dissipate there.
+    for q. ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate there.
     """
 
     def __init__(self, moments: Array, growth: float, floor: float) -> None:
@@ -545,7 +540,7 @@ class _Sink:
         self.slip = np.zeros((ORDER, 3))  # s
 
     def acceleration(self, rates: Array, k: int, more: Array | None = None) -> Array:
-        """Coefficient k of (H × s)/I, (3,); makes that of ``slip`` on the way. ``rates`` (3,): coefficient k of ω.
+        """Coefficient k of (H × s)/I, (3,); stores that of ``slip``. ``rates`` (3,): coefficient k of ω.
 
         ``more`` (3,) is added to that of H, I ω with the moments of the beginning.
         """
@@ -566,7 +561,7 @@ class _Sink:
 
 
 def _reach(series: Array, unit: float) -> float:
-    """How far the series holds to `REMAINDER`, in its unit of time, from its last two orders."""
+    """Reach of the series at accuracy `REMAINDER`, in its unit of time, from its last two orders."""
     size = np.max(np.abs(series[-2:]) * np.array([unit] * 3 + [1.0] * 4), axis=1)
     reaches = [
         (REMAINDER / float(last)) ** (1.0 / order)

@@ -1,12 +1,8 @@
-"""Valve, impulse bit, cold nozzle, blowdown tank.
-
-What a valve makes of a command: the thrust that a nozzle gives, its impulse and its centroid, and back.
+"""Thruster: valve response (thrust, impulse, centroid), nozzle temperature, tank in blowdown.
 
 Times are in s after the start of the command; thrust is counted in full thrust, so that an impulse is a time, the
 *effective on-time*: impulse over full thrust. A rectangular pulse of that length about the centroid has the same
 impulse and the same first moment.
-
-What thrust depends on besides commands: how cold the nozzle is, and the pressure in the tank.
 """
 
 from __future__ import annotations
@@ -23,18 +19,19 @@ from numpy.typing import NDArray
 from nutdamp.common.numerics import gauss_legendre
 
 SMALL = 1e-9
-"""Share of a pressure by which the slope of a table is taken."""
+"""Relative pressure step for the slope of a table."""
 
 
 def possible(tank: Tank) -> Any:
-    """Whether there is such a tank: one number, or of arrays each."""
+    """True if the tank is possible: one value, or by case."""
     falls = (tank.final_pressure > 0.0) & (tank.final_pressure <= tank.pressure)
     return falls & (tank.propellant > 0.0) & (tank.exponent >= 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Cold:
-    """The first pulse of each channel has ``first`` times the thrust; over ``pulses`` of them this decays to one.
+    """Cold nozzle: the first pulse of each channel has ``first`` times the thrust; it decays to 1 over ``pulses``.
+    to 1.
 
     ``fired``: pulses by channel before t = 0. The first two may be arrays, of cases.
     """
@@ -44,20 +41,20 @@ class Cold:
     fired: Mapping[str, int] = field(default_factory=dict)
 
     def factor(self, before: int) -> Any:
-        """Of the pulse that comes after so many ``before`` it: 1 - (1 - first) exp(-k/pulses)."""
+        """Thrust factor of the pulse after ``before`` others: 1 - (1 - first) exp(-k/pulses)."""
         return 1.0 - (1.0 - self.first) * self.decay(before)
 
     def decay(self, before: int) -> Any:
-        """What is left of the difference to a warm nozzle then, over that of the first pulse."""
+        """Remaining difference to a warm nozzle, over that of the first pulse."""
         return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
 
 
 PIECES = 16
-"""Parts of a pulse in which the specific impulse is that of their middle."""
+"""Parts of a pulse, each with the specific impulse of its middle."""
 
 
 def expanded(rise: Any, power: Any) -> Any:
-    """((1 + rise)^(1/power) - 1) power/rise, 1 at 0: numbers or arrays, complex ones too."""
+    """((1 + rise)^(1/power) - 1) power/rise, 1 at 0: numbers or arrays, complex too."""
     still = rise == 0.0
     safe = np.where(still, 1.0, rise)
     return np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
@@ -65,12 +62,12 @@ def expanded(rise: Any, power: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Tank:
-    """A tank in blowdown: ``propellant`` kg, ``pressure`` when full and ``final_pressure`` Pa with nothing left.
+    """Tank in blowdown: ``propellant`` kg, ``pressure`` when full and ``final_pressure`` Pa with nothing left.
 
     Thrust goes with the pressure to the power ``exponent``. ``isp`` are rows of pressure, Pa, rising, and specific
-    impulse, s, between which it runs evenly; None leaves it to the thrusters. ``used`` kg were used before t = 0. The
+    impulse, s, interpolated linearly; None leaves it to the thrusters. ``used`` kg were used before t = 0. The
     principal moments (I1, I2, I3) of the spacecraft fall by ``inertia_per_kg`` kg m² for each kg that is used; None:
-    they stay. The first four may be arrays, of cases.
+    constant. The first four may be arrays, of cases.
     """
 
     propellant: Any
@@ -83,12 +80,12 @@ class Tank:
 
     @property
     def doubled(self) -> Tank:
-        """One with twice the propellant, in which the pressure falls as in this one, and on."""
+        """Tank with twice the propellant and the same fall of pressure, continued."""
         low = self.pressure / (2.0 * self.pressure / self.final_pressure - 1.0)
         return replace(self, propellant=2.0 * self.propellant, final_pressure=low)
 
     def pressure_after(self, used: Any) -> Any:
-        """Pressure (Pa) of the gas once so many kg are ``used``, at most all of it: one number or an array.
+        """Gas pressure (Pa) after ``used`` kg, at most all of it: one number or an array.
 
         At constant temperature it expands from V0 to V0 + used/density, and final/initial pressure is
         V0/(V0 + propellant/density): p = p0/(1 + (p0/p1 - 1) used/propellant).
@@ -104,9 +101,9 @@ class Tank:
     def burn(self, used: Any, flow: Any, time: Any) -> tuple[Any, Any]:
         """Propellant (kg) of ``time`` s of full thrust after ``used`` kg, and its mean thrust over that of a full tank.
 
-        ``flow`` is that of a full tank, kg/s; where the tank has the specific impulse, this times it. The pressure
-        falls as the gas expands, p = p0/(1 + κu/U) with κ = p0/p1 - 1, and the thrust with its power x, so that
-        (1 + κu/U)^(x+1) grows evenly in time. Past the last of the propellant it goes on falling.
+        ``flow`` is that of a full tank, kg/s, times the specific impulse where the tank has it. The pressure falls as
+        the gas expands, p = p0/(1 + κu/U) with κ = p0/p1 - 1, and the thrust with its power x, so that (1 + κu/U)^(x+1)
+        grows linearly in time. Past the last of the propellant it goes on falling.
         """
         if self.isp is None:
             return self._burn(used, flow, time)
@@ -127,7 +124,7 @@ class Tank:
         return flow * level * time * share, level * share
 
     def share(self, used: Any, more: Any) -> Any:
-        """Share of a pulse that is fired which takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
+        """Fraction fired of a pulse that takes ``more`` kg after ``used``: 1, or as far as the propellant lasts.
 
         A pulse during which the tank runs empty is as long as commanded, and that much weaker.
         """
@@ -143,23 +140,23 @@ class Tank:
             return None
         pressures, values = zip(*self.isp, strict=True)
         pressure = self.pressure_after(used)
-        found = np.interp(np.real(pressure), pressures, values)
+        isp = np.interp(np.real(pressure), pressures, values)
         if not np.iscomplexobj(pressure):
-            return found
-        rising = np.interp(np.real(pressure) * (1.0 + SMALL), pressures, values) - found
-        return found + 1j * np.imag(pressure) * rising / (SMALL * np.real(pressure))
+            return isp
+        rising = np.interp(np.real(pressure) * (1.0 + SMALL), pressures, values) - isp
+        return isp + 1j * np.imag(pressure) * rising / (SMALL * np.real(pressure))
 
 
 Array = NDArray[np.float64]
 
 NODES = 16
-"""Of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding."""
+"""Nodes of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding."""
 
 REACH = 2.0
 
 
 class Ramp(NamedTuple):
-    """Thrust that runs evenly from the level ``first`` at ``begin`` s to ``last`` at ``end`` s; 1 is full thrust."""
+    """Thrust that runs linearly from level ``first`` at ``begin`` s to ``last`` at ``end`` s; 1 is full thrust."""
 
     begin: float
     end: float
@@ -168,12 +165,12 @@ class Ramp(NamedTuple):
 
     @property
     def impulse(self) -> float:
-        """Of full thrust, s."""
+        """Impulse over full thrust, s."""
         return 0.5 * (self.first + self.last) * (self.end - self.begin)
 
 
 class Thrust(NamedTuple):
-    """What a command gives: the effective ``on_time`` s about the ``centroid`` s, by the ``ramps`` of the thrust."""
+    """Response to a command: the effective ``on_time`` s about the ``centroid`` s, by the ``ramps`` of the thrust."""
 
     on_time: float
     centroid: float
@@ -191,7 +188,7 @@ class Opened(NamedTuple):
 
     @property
     def pieces(self) -> tuple[tuple[Any, Any, Any, Any], ...]:
-        """Of rise, full thrust and fall the begin and the length, s, the mean level, and its lean to either side."""
+        """Start, length (s), mean level and lean to either side of rise, full thrust and fall."""
         first, second, third, last = self.corners
         half = 0.5 * self.level
         return (
@@ -226,7 +223,7 @@ class Opened(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Trapezoid:
-    """A valve that opens and closes with delays, s; the thrust then rises and falls evenly.
+    """Valve with delays of opening and closing, s, and linear rise and fall of the thrust.
 
     A command from 0 to τ lets the thrust rise from ``open_delay`` on, to full thrust within ``rise_time``, and fall
     from τ + ``close_delay`` on, as fast as from full thrust to nothing within ``fall_time``. A valve that closes before
@@ -242,11 +239,11 @@ class Trapezoid:
 
     @property
     def known(self) -> tuple[float, float]:
-        """Shortest and longest on-time (s) of which it is known what they give: any."""
+        """Shortest and longest on-time (s) with known response: any."""
         return 0.0, math.inf
 
     def thrust(self, on_time: float) -> Thrust:
-        """What a command of ``on_time`` s gives, from the areas and first moments of its pieces."""
+        """Response to a command of ``on_time`` s, from the areas and first moments of its pieces."""
         command = self._command(on_time) if self.effective else on_time
         opened = command + self.close_delay - self.open_delay  # from the first thrust to the beginning of its fall
         if opened <= 0.0 or on_time <= 0.0:
@@ -272,7 +269,7 @@ class Trapezoid:
         return Thrust(total, self.open_delay + moment / total, tuple(ramps))
 
     def opened(self, on_time: float, open_delay: Any, close_delay: Any, rise_time: Any, fall_time: Any) -> Opened:
-        """What a command gives where the four times are longer by so much, s, elementwise."""
+        """Response to a command with the four times longer by so much, s, elementwise."""
         command = self._command(on_time) if self.effective else on_time
         opens, rise, fall = self.open_delay + open_delay, self.rise_time + rise_time, self.fall_time + fall_time
         held = command + self.close_delay + close_delay - opens
@@ -320,19 +317,19 @@ class Trapezoid:
                 leads.append(self.open_delay + (0.5 * rise if place else 0.0))
                 lags.append(0.5 * fall if place else 0.0)
                 continue
-            found = self.thrust(self.on_time_for(place))
-            if found.ramps:
-                leads.append(found.centroid - 0.5 * found.on_time)
-                lags.append(found.ramps[-1].end - found.centroid - 0.5 * found.on_time)
+            thrust = self.thrust(self.on_time_for(place))
+            if thrust.ramps:
+                leads.append(thrust.centroid - 0.5 * thrust.on_time)
+                lags.append(thrust.ramps[-1].end - thrust.centroid - 0.5 * thrust.on_time)
         return max(leads, default=0.0), max(lags, default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Thrust by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each rising.
+    """Valve by a table of tests: ``rows`` of on-time, effective on-time and centroid, s, each rising.
 
-    Between the rows all run evenly; outside nothing is known. The thrust is taken as full from half the effective
-    on-time before the centroid to half of it after.
+    Linear between the rows, unknown outside. The thrust is taken as full from half the effective on-time before the
+    centroid to half of it after.
     """
 
     rows: tuple[tuple[float, float, float], ...]
@@ -343,17 +340,17 @@ class Measured:
         return self.rows[0][0], self.rows[-1][0]
 
     def thrust(self, on_time: float) -> Thrust:
-        """What a command of ``on_time`` s gives; outside the table, what its end gives."""
+        """Response to a command of ``on_time`` s; outside the table, that at its end."""
         effective, centroid = (self._between(0, on_time, column) for column in (1, 2))
         begin = centroid - 0.5 * effective
         return Thrust(effective, centroid, (Ramp(begin, begin + effective, 1.0, 1.0),))
 
     def on_time_for(self, effective: float) -> float:
-        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest there is."""
+        """On-time (s) of the command that acts like full thrust for ``effective`` s; the nearest in the table."""
         return self._between(1, effective, 0)
 
     def opened(self, on_time: float, factor: Any) -> Opened:
-        """What a command gives where all impulses of the table are ``factor`` times as large, elementwise.
+        """Response to a command with all impulses of the table ``factor`` times as large, elementwise.
 
         It does not begin before the command does.
         """
@@ -364,7 +361,7 @@ class Measured:
         return Opened((begin, begin, end, end), 1.0)
 
     def _between(self, known: int, value: float, sought: int) -> float:
-        """The value of the column ``sought`` where the column ``known`` has ``value``."""
+        """Interpolated column ``sought`` where the column ``known`` has ``value``."""
         places = [row[known] for row in self.rows]
         value = min(max(value, places[0]), places[-1])
         row = min(max(bisect_right(places, value) - 1, 0), len(places) - 2)
@@ -373,19 +370,19 @@ class Measured:
         return low + share * (high - low) if share < 1.0 else high
 
     def reaches(self, shortest: float, longest: float) -> tuple[float, float]:
-        """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both run evenly between the rows."""
+        """Bounds (s) of lead and lag, see `Trapezoid.reaches`: both linear between the rows."""
         places = [shortest, longest, *(row[1] for row in self.rows if shortest < row[1] < longest)]
         leads, lags = [], []
         for place in places:
             on_time = self.on_time_for(place)
-            found = self.thrust(on_time)
-            leads.append(found.ramps[0].begin)
-            lags.append(max(on_time - found.ramps[0].end, 0.0))
+            thrust = self.thrust(on_time)
+            leads.append(thrust.ramps[0].begin)
+            lags.append(max(on_time - thrust.ramps[0].end, 0.0))
         return max(leads), max(lags)
 
 
 Valve = Trapezoid | Measured
-"""What leads from commands to thrust. Times of commands are on-times as they are loaded."""
+"""Map from commands to thrust. Times of commands are on-times as they are loaded."""
 
 
 def shape_factor(
@@ -397,10 +394,10 @@ def shape_factor(
     growth: float = 0.0,
     drift: float = 0.0,
 ) -> complex:
-    """What a pulse loses on ω by its shape, as a factor on its impulse at the ``centroid``: `rates.width_factor`.
+    """Factor on the impulse at the ``centroid`` for the effect of a shaped pulse on ω: see `response.width_factor`.
 
     F = (1/E) ∫ f(t) exp(i a (ω3 (t - t_c) + drift (t² - t_c²)/2 + spin_rate ∫∫ f) - κ (t - t_c)) dt with the thrust f
-    of the ``ramps``, their impulse E, and times from the beginning of the first: with the whole spin change at the
+    of the ``ramps``, their impulse E, and times from the start of the first: with the whole spin change at the
     centroid ω3 turns the body by the end as far as it does. ``spin`` is ω3 as the first begins, rad/s.
     """
     nodes, weights = gauss_legendre(NODES)

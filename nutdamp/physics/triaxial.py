@@ -1,6 +1,4 @@
-"""Torque-free motion with three moments.
-
-Torque-free motion of a body with three different principal moments, in closed form.
+"""Torque-free motion of a body with three different principal moments, in closed form, and its cone angles.
 
 Euler's equations I1 dω1/dt = (I2 - I3) ω2 ω3 and round ("Kreiseltheorie" 24.2) are solved by Jacobi's functions. Here
 c is the axis, of largest or least moment, that the motion goes about; b that of the middle moment, a the other
@@ -13,9 +11,7 @@ extreme: ω_a ~ cn, ω_b ~ sn, ω_c ~ dn of p t + const. With d_xy = |I_x - I_y|
     1 - m = Q/(I_c d_cb D²)                      complementary parameter
 
 The addition theorems give the motion from the rates at t = 0 by sn, cn, dn of p t alone, so that neither the phase at
-the start nor the amplitudes of ω_a and ω_b are needed, and no limit divides by what vanishes in it.
-
-The cone angles by which a torque-free arc is judged, for bodies with two equal moments and with three.
+the start nor the amplitudes of ω_a and ω_b are needed, and no limit divides by a vanishing quantity.
 """
 
 from __future__ import annotations
@@ -29,26 +25,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import Cones, momentary
+from nutdamp.physics.body import ConeAngles, momentary
 
 Array = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-140
-"""A rate below this part of the largest counts as zero, as does a sine: its square would leave the range of numbers."""
+"""Fraction of the largest rate below which a rate counts as zero, as does a sine: its square would underflow."""
 
 MEANS = 40
-"""Steps to an arithmetic-geometric mean, at most; from the smallest number there is it takes twelve."""
+"""Largest number of steps to an arithmetic-geometric mean; from the smallest number it takes twelve."""
 
 MODES_REACH = 40.0
-"""Fourier coefficients are kept down to exp(-40): less than a rounding."""
+"""Exponent to which Fourier coefficients are kept: exp(-40) is less than a rounding."""
 
 
 def free_rates(moments: ArrayLike, rates0: ArrayLike, times: ArrayLike) -> Array:
     """Body rates (n, 3) in rad/s at ``times`` (n,) s from ``rates0`` (3,) at t = 0, exact for any motion.
 
     ``moments`` (I1, I2, I3) in kg m², in any order, equal ones included. Errors stay below 1e-12 of |ω| over 100
-    periods. Given numbers are taken as exact, and then this holds up to the separatrix and on it; what is uncertain in
-    them moves the phase by about 1/(1 - m) times as much each period, as it does for the spacecraft itself.
+    periods, up to the separatrix and on it, with the given numbers taken as exact; their uncertainty moves the phase by
+    about 1/(1 - m) times as much each period, as it does for the spacecraft itself.
     """
     polhode = _polhode(moments, rates0)
     return polhode.rate_unit * _rates(polhode, polhode.rate_unit * np.asarray(times, dtype=float))
@@ -109,8 +105,8 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
 
 
-def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
-    """The cone angles at the instant of the motion through ``rates0`` at which the nutation angle is largest.
+def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> ConeAngles:
+    """Cone angles at the instant of largest nutation angle of the motion through ``rates0``.
 
     The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed.
     """
@@ -120,8 +116,8 @@ def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> Cones:
     return _of_other_end(least) if reversed_ else largest
 
 
-def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]:
-    """The cones at the least and at the largest nutation angle."""
+def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[ConeAngles, ConeAngles]:
+    """Cone angles at the least and at the largest nutation angle."""
     polhode = _polhode(moments, rates0)
     inertia, (a, b, c) = polhode.moments, polhode.axes
     if polhode.pace == 0.0:
@@ -140,13 +136,13 @@ def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[Cones, Cones]
     return least, _of_other_end(least)
 
 
-def _of_other_end(found: Cones) -> Cones:
-    """The same instant seen from the other end of axis 3."""
-    return Cones(math.pi - found.nutation, math.pi - found.body)
+def _of_other_end(cones: ConeAngles) -> ConeAngles:
+    """Cone angles of the same instant seen from the other end of axis 3."""
+    return ConeAngles(math.pi - cones.nutation, math.pi - cones.body)
 
 
-class _Polhode(NamedTuple):
-    """Path of ω in the body; moments and rates divided by powers of two, so that nothing leaves the range."""
+class _ScaledPolhode(NamedTuple):
+    """Path of ω in the body; moments and rates scaled by powers of two against under- and overflow."""
 
     axes: tuple[int, int, int]  # a, b, c
     moments: Array
@@ -159,7 +155,7 @@ class _Polhode(NamedTuple):
     balance: float  # Q
 
 
-def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _Polhode:
+def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
     inertia, rates = np.array(moments, dtype=float), np.array(rates0, dtype=float)
     inertia /= _unit(inertia)
     rate_unit = _unit(rates)
@@ -176,7 +172,7 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _Polhode:
         largest = math.sqrt(rates[c] ** 2 + inertia[b] * d_ba / (inertia[c] * d_ca) * rates[b] ** 2)
         pace = largest * math.sqrt(d_ca / inertia[a] * (d_cb / inertia[b]))
         complement = min(abs(balance) / (inertia[c] * d_cb * largest**2), 1.0)
-    return _Polhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
+    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
 
 
 def _unit(values: Array) -> float:
@@ -188,14 +184,14 @@ def _unit(values: Array) -> float:
 def _balance(inertia: Array, rates: Array, least: int, middle: int, most: int) -> float:
     """H² - 2T I_b, positive for motion about the axis of the largest moment.
 
-    A difference that vanishes on the separatrix; in rational numbers it keeps all its digits.
+    It vanishes on the separatrix; rational numbers keep all its digits.
     """
     i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, middle, most))
     w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
     return float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
 
 
-def _rates(polhode: _Polhode, times: Array) -> Array:
+def _rates(polhode: _ScaledPolhode, times: Array) -> Array:
     """Scaled rates at scaled times: addition theorems, with the amplitudes written as dω/dt at t = 0.
 
     ω_a(t) = (ω_a cn + ω_a' sn dn/p)/N, ω_b(t) = (ω_b cn dn + ω_b' sn/p)/N, ω_c(t) = (ω_c dn + ω_c' sn cn/p)/N with
@@ -215,7 +211,7 @@ def _rates(polhode: _Polhode, times: Array) -> Array:
     return result
 
 
-def _swing(polhode: _Polhode, size: float, times: Array) -> Array:
+def _swing(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     """∫ |ω_c|/(|H| + I_c |ω_c|) dt from 0 to scaled ``times``."""
     if polhode.complement == 0.0:
         return _swing_on_separatrix(polhode, size, times)
@@ -234,7 +230,7 @@ def _swing(polhode: _Polhode, size: float, times: Array) -> Array:
     return np.asarray(total)
 
 
-def _swing_on_separatrix(polhode: _Polhode, size: float, times: Array) -> Array:
+def _swing_on_separatrix(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     """`_swing` without a period: ω_c = D sech u, so that the integrand is D/(|H|(cosh u + ε)), ε = I_c D/|H|.
 
     sqrt(1 - ε²) is I_a |ω_a|/|H| at ω_b = 0, free of cancellation.
@@ -270,7 +266,7 @@ def _turn(rates: Array, times: Array) -> Array:
 
 
 def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
-    """Arithmetic and geometric means that begin with 1 and sqrt(1 - m), and what they tend to."""
+    """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit."""
     arithmetic, geometric = 1.0, math.sqrt(complement)
     pairs = [(arithmetic, geometric)]
     for _ in range(MEANS):
@@ -314,11 +310,10 @@ def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
     )
 
 
-def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> Cones:
-    """The cones at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
+def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> ConeAngles:
+    """Cone angles at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
 
-    With I1 = I2 they stay what they are; else θ swings between two values while H is fixed in space. The spin
-    axis is ``sense``·e3.
+    Constant with I1 = I2; else θ swings between two values while H is fixed in space. The spin axis is ``sense``·e3.
     """
     if moments[0] == moments[1]:
         return momentary(moments, rates, sense)

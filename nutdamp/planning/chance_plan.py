@@ -20,18 +20,18 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.montecarlo.cases import Model
-from nutdamp.montecarlo.inputs import Input, mixing
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.statistics import cases_to_show
 from nutdamp.montecarlo.study import CONFIDENCE, SAMPLES, SEED, Results, Study, run, study_of, threads_here
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.catalogue import OptimalOptions, Options
-from nutdamp.schemes.optimal.chance import ChanceProgram, Limit, Sure, Uncertain
+from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
 from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
-from nutdamp.schemes.optimal.refinement import Equations, refine, small_angles
+from nutdamp.schemes.optimal.refinement import EndEquations, refine, small_angles
 from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -70,7 +70,7 @@ class Tightening:
 
     tolerances: tuple[str, ...]
     factor: float
-    inputs: tuple[tuple[Input, bool], ...]
+    inputs: tuple[tuple[DispersedInput, bool], ...]
     cases: int
     seed: int
     complied: float
@@ -78,7 +78,7 @@ class Tightening:
 
 
 def tightening(plan: Plan, probability: float) -> Tightening | None:
-    """The fewest of the tolerances that count most, and how far they shrink, so that cases comply in that share.
+    """Fewest dominant tolerances, and their reduction, for the required share of complying cases.
 
     None where enough do, or do not with the `MOST` of them exactly known.
     """
@@ -106,41 +106,41 @@ def tightening(plan: Plan, probability: float) -> Tightening | None:
             low, high = (middle, high) if complying(names, middle) else (low, middle)
         # The tries all had the same draws, and the largest size that passes passes by luck too.
         for seed in range(FRESH, FRESH + CHECKS):
-            found = tried(names, low, fresh, seed)
-            if found.interval[0] >= probability:
-                share = found.met_fraction or 0.0
-                return Tightening(names, low, _stated(study, given, names), fresh, seed, share, found.interval[0])
+            trial = tried(names, low, fresh, seed)
+            if trial.interval[0] >= probability:
+                share = trial.met_fraction or 0.0
+                return Tightening(names, low, _stated(study, given, names), fresh, seed, share, trial.interval[0])
             low *= SMALLER
     return None
 
 
 def _ranked(study: Study, given: Dispersions) -> list[str]:
-    """The tolerances by their share of what is required, the largest first."""
+    """Tolerances by their share of the required bound, the largest first."""
     shares: dict[str, float] = {}
     required = requirements.required(study.model.spacecraft)
     parts = [bound.part.value for bound in required if bound.part is not Part.SPIN]
     for output in parts or ["spin_change"]:
         for entry, share in zip(study.first_order.inputs, study.first_order.shares(output).tolist(), strict=True):
             shares[entry.tolerance] = max(shares.get(entry.tolerance, 0.0), share)
-    return [name for name in sorted(shares, key=lambda one: -shares[one]) if hasattr(given, name)]
+    return [name for name in sorted(shares, key=lambda name: -shares[name]) if hasattr(given, name)]
 
 
-def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[Input, bool], ...]:
-    """An input of each size of the tolerances of some names, and whether that is relative."""
-    found: dict[tuple[str, str, float], tuple[Input, bool]] = {}
+def _stated(study: Study, given: Dispersions, names: Iterable[str]) -> tuple[tuple[DispersedInput, bool], ...]:
+    """Input of each size of the named tolerances, with a flag for relative sizes."""
+    sizes: dict[tuple[str, str, float], tuple[DispersedInput, bool]] = {}
     for name in names:
-        for one in study.model.inputs.drawn:
-            if one.tolerance == name and one.kind != "bias":
-                found.setdefault((name, one.kind, one.size), (one, _relative(getattr(given, name), one)))
-    return tuple(found.values())
+        for entry in study.model.inputs.drawn:
+            if entry.tolerance == name and entry.kind != "bias":
+                sizes.setdefault((name, entry.kind, entry.size), (entry, _relative(getattr(given, name), entry)))
+    return tuple(sizes.values())
 
 
-def _relative(value: Any, entry: Input) -> bool:
-    """Whether the size of an input is given as a share of its nominal value."""
+def _relative(value: Any, entry: DispersedInput) -> bool:
+    """True if the size of an input is given as a share of its nominal value."""
     if isinstance(value, Tolerance):
         return value.relative
     if isinstance(value, Mapping):
-        return any(one.relative for name, one in value.items() if name in entry.name.split())
+        return any(size.relative for name, size in value.items() if name in entry.name.split())
     tolerance = value[int(entry.name.rpartition("_")[2]) - 1]
     return tolerance is not None and tolerance.relative
 
@@ -154,8 +154,8 @@ def _scaled(value: Any, factor: float) -> Any:
     if isinstance(value, Tolerance):
         return value if value.kind == "bias" else replace(value, size=factor * value.size)
     if isinstance(value, Mapping):
-        return {name: _scaled(one, factor) for name, one in value.items()}
-    return None if value is None else tuple(_scaled(one, factor) for one in value)
+        return {name: _scaled(item, factor) for name, item in value.items()}
+    return None if value is None else tuple(_scaled(item, factor) for item in value)
 
 
 SCHEME = "optimal"
@@ -167,16 +167,16 @@ MARGINS = (1.0, 0.75, 0.5, 1.3)
 """Over the sigmas of the probability required: margins that are tried first."""
 
 LESSER = (1.0, 0.8, 0.6)
-"""The same over the largest that can be kept, where that is not enough."""
+"""Multiples of the largest feasible margin, where that is not enough."""
 
 KEPT, HALVINGS = 1e-2, 6
-"""Share of a limit by which it may be passed while that is looked for, and steps of it."""
+"""Tolerance of a limit in that search, and its number of steps."""
 
 TRIED = 4_096
 """Cases in which a plan is tried while its margin is adapted, of a seed of its own."""
 
 TRYING = 101
-"""That seed."""
+"""Seed of the trial cases."""
 
 ROUNDS = 4
 """Times that the margin is adapted."""
@@ -197,24 +197,26 @@ LARGEST = 60_000
 """Slots of all channels up to which a plan is looked for."""
 
 
-def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Input, ...]]:
-    """How the dispersions of a symmetric ``body`` act, to first order, with pulses of ``on_times`` (K,) s; the inputs.
+def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[DispersedInput, ...]]:
+    """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s; the inputs.
 
     Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
     """
     pulses = [
-        channel_pulse(one, 100.0 + 1e3 * at, on)
-        for at, (one, on) in enumerate(zip(body.channels, on_times, strict=True))
+        channel_pulse(channel, 100.0 + 1e3 * at, on)
+        for at, (channel, on) in enumerate(zip(body.channels, on_times, strict=True))
     ]
-    model = Model(body, Schedule(tuple(pulses)))
-    drawn = [one for one in model.inputs.drawn if one.kind != "bias"]
+    model = DispersedModel(body, Schedule(tuple(pulses)))
+    drawn = [entry for entry in model.inputs.drawn if entry.kind != "bias"]
     biases: dict[str, np.ndarray | float] = {
-        one.name: np.full(len(drawn) + 1, one.size, dtype=complex) for one in model.inputs.drawn if one.kind == "bias"
+        entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex)
+        for entry in model.inputs.drawn
+        if entry.kind == "bias"
     }
     draws = dict(biases)
-    for at, one in enumerate(drawn):
-        draws[one.name] = np.zeros(len(drawn) + 1, dtype=complex)
-        draws[one.name][at] = 1j * STEP * one.sigma  # type: ignore[index]
+    for at, entry in enumerate(drawn):
+        draws[entry.name] = np.zeros(len(drawn) + 1, dtype=complex)
+        draws[entry.name][at] = 1j * STEP * entry.sigma  # type: ignore[index]
     cases = model.cases(draws)
 
     def parts(value: object) -> tuple[float, Vector]:
@@ -223,51 +225,53 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Inpu
         return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
 
     (A, dA), (C, dC) = parts(cases.A), parts(cases.C)
-    rates = [parts(one) for one in cases.omega0]
+    rates = [parts(component) for component in cases.omega0]
     spin, dspin = rates[2]
     a = 1.0 - C / A
     da = C / A**2 * dA - dC / A
     start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
     tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
     pointed = start + C * spin * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
-    impulses = [[parts(part) for part in one] for one in cases.impulses]
-    begun = [parts(one) for one in cases.starts]
+    impulses = [[parts(part) for part in impulse] for impulse in cases.impulses]
+    begun = [parts(start) for start in cases.starts]
     on = np.asarray(on_times)
-    torque = np.array([one[0][1] + 1j * one[1][1] for one in impulses]) / on[:, None]
-    axial = np.array([one[2][1] for one in impulses]) / on[:, None]
-    late = np.array([one[1] for one in begun])
+    torque = np.array([impulse[0][1] + 1j * impulse[1][1] for impulse in impulses]) / on[:, None]
+    axial = np.array([impulse[2][1] for impulse in impulses]) / on[:, None]
+    late = np.array([start[1] for start in begun])
     delay = np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)])
     mixed = mixing(drawn, model.groups)
-    found = Uncertain(
-        effect=np.asarray(np.array([complex(one[0][0], one[1][0]) for one in impulses]) / on, dtype=np.complex128),
-        axial=np.array([one[2][0] for one in impulses]) / on,
+    effects = Uncertain(
+        effect=np.asarray(
+            np.array([complex(impulse[0][0], impulse[1][0]) for impulse in impulses]) / on, dtype=np.complex128
+        ),
+        axial=np.array([impulse[2][0] for impulse in impulses]) / on,
         begin=np.asarray(np.array([start, pointed]) @ mixed, dtype=np.complex128),
         rates=np.array([a * dspin + da * spin, dspin]) @ mixed,
         torque=np.asarray(torque @ mixed, dtype=np.complex128),
         axial_torque=axial @ mixed,
         late=late @ mixed,
-        own=np.array([" pulse " in one.name for one in drawn], dtype=bool),
+        own=np.array([" pulse " in entry.name for entry in drawn], dtype=bool),
         spin=C * dspin @ mixed,
         delay=delay,
         less=(dC / C + dspin / spin) @ mixed,
     )
-    return found, tuple(drawn)
+    return effects, tuple(drawn)
 
 
 def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
-    """Plans that keep the requirement with margins, each with what sets it apart; none where nothing is required."""
+    """Plans that keep the requirement with margins, each with a label; none where nothing is required."""
     body = planning.known(spacecraft, planner.options_of(catalogue.SCHEMES[SCHEME], options))
     if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
     try:
-        search = _Search(spacecraft, body)
+        search = _MarginSearch(spacecraft, body)
     except Infeasible:
         return
     yield from search.plans()
 
 
-class _Search:
-    """The search for one spacecraft."""
+class _MarginSearch:
+    """Search for one spacecraft."""
 
     def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
         self.spacecraft, self.body = spacecraft, body
@@ -276,7 +280,7 @@ class _Search:
         bounds = requirements.required(spacecraft)
         parts = {bound.part: bound.most for bound in bounds}
         aimed = requirements.aim(spacecraft) in parts or body.goal.axis is not None
-        self.equations = Equations(shift=aimed, spin=body.goal.spin is not None)
+        self.equations = EndEquations(shift=aimed, spin=body.goal.spin is not None)
         self.options = OptimalOptions(free_axis=not aimed)
         self.problem = Problem(self.model.body, self.options)
         self.program = self.problem.program()
@@ -285,7 +289,7 @@ class _Search:
         flat = self.model.body
         spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
         self.limits = tuple(
-            Limit(kind, most)
+            ChanceLimit(kind, most)
             for part, kind, most in (
                 (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
                 (
@@ -298,14 +302,16 @@ class _Search:
             if part in parts
         )
         first = self.program.solve()
-        longest = max((one.on_time for one in first.burns), default=0.1)
-        ons = np.array([min(max(longest, one.min_on_time, 1e-3), one.max_on_time) for one in self.program.channels])
+        longest = max((burn.on_time for burn in first.burns), default=0.1)
+        ons = np.array(
+            [min(max(longest, channel.min_on_time, 1e-3), channel.max_on_time) for channel in self.program.channels]
+        )
         flat = replace(flat, channels=self.program.channels, dispersions=body.dispersions)
         dispersed, _ = uncertain(flat, ons)
         drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
         last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
         self.program.forbid(None, last, math.inf)
-        every = Equations(True, True)
+        every = EndEquations(True, True)
         goal = np.zeros(5)
         goal[every.chosen] = small_angles(flat, every).goal
         self.chance = ChanceProgram(self.program, dispersed, self.limits, goal)
@@ -313,7 +319,7 @@ class _Search:
 
     @property
     def sigmas(self) -> float:
-        """Of a plane normal distribution, within which the share lies that is required."""
+        """Sigmas of a plane normal distribution within which the required share lies."""
         return math.sqrt(-2.0 * math.log(max(1.0 - self.probability, 1e-9)))
 
     def plans(self) -> Iterator[tuple[str, Plan]]:
@@ -328,7 +334,7 @@ class _Search:
                 yield variant, plan
 
     def _first(self) -> list[float]:
-        """The margins to begin with: about that of the probability, or up to the largest that can be kept."""
+        """First margins: about that of the probability, or up to the largest that can be kept."""
         chance = self.chance
         low, high = 0.0, max(MARGINS) * self.sigmas
         if chance.solve(high).excess <= KEPT:
@@ -350,53 +356,53 @@ class _Search:
         return 0.5 * (best + (below if best - below > above - best else above))
 
     def tried(self, margin: float) -> Iterator[tuple[str, Plan, float]]:
-        """The plan of a margin, if there is one, and its share of cases that comply."""
-        made = self.made(margin)
-        if made is None:
+        """Plan of a margin, if there is one, and its share of complying cases."""
+        schedule = self.schedule(margin)
+        if schedule is None:
             return
-        plan = planning.judged(self.spacecraft, SCHEME, made, self.options)
+        plan = planning.judged(self.spacecraft, SCHEME, schedule, self.options)
         if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
             results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
             share = results.met_fraction or 0.0
             yield f"against dispersions, {margin:.3g} σ", plan, share
 
-    def _few(self, found: Sure) -> None:
+    def _few(self, solution: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""
         program, near = self.program, np.zeros_like(self.program.forbidden)
-        for burn in sorted(found.burns, key=lambda one: -one.impulse)[:MOST_BURNS]:
+        for burn in sorted(solution.burns, key=lambda burn: -burn.impulse)[:MOST_BURNS]:
             reach = 0.5 * burn.on_time + SLOTS // 8 * program.width
             near[program.channels.index(burn.channel), np.abs(program.centres - burn.t) < reach] = True
         program.forbidden |= ~near
 
-    def _parted(self, found: Sure) -> bool:
-        """Whether burns overlapped, or were too near: each of the two has the time on its side of the middle then."""
+    def _parted(self, solution: Sure) -> bool:
+        """Separate burns that overlap or are too near, at the middle; True if there were any."""
         program, gap, parted = self.program, self.program.spacecraft.limits.gap, False
-        for one, two in itertools.pairwise(found.burns):
-            end, begin = one.t + 0.5 * one.on_time, two.t - 0.5 * two.on_time
-            if begin >= end + gap - TOUCHING or one.channel is two.channel:
+        for earlier, later in itertools.pairwise(solution.burns):
+            end, begin = earlier.t + 0.5 * earlier.on_time, later.t - 0.5 * later.on_time
+            if begin >= end + gap - TOUCHING or earlier.channel is later.channel:
                 continue
-            middle = min(max(0.5 * (begin + end), one.t), two.t)
-            aside, half = 0.5 * (gap + program.width), 0.5 * two.on_time + program.width
+            middle = min(max(0.5 * (begin + end), earlier.t), later.t)
+            aside, half = 0.5 * (gap + program.width), 0.5 * later.on_time + program.width
             before = program.forbidden.copy()
-            program.forbid(one.channel, middle - aside, max(two.t + half, end + program.width))
-            program.forbid(two.channel, min(one.t - 0.5 * one.on_time, begin) - program.width, middle + aside)
+            program.forbid(earlier.channel, middle - aside, max(later.t + half, end + program.width))
+            program.forbid(later.channel, min(earlier.t - 0.5 * earlier.on_time, begin) - program.width, middle + aside)
             parted = parted or bool((before != program.forbidden).any())
         return parted
 
-    def made(self, margin: float) -> Schedule | None:
-        """The schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
+    def schedule(self, margin: float) -> Schedule | None:
+        """Schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
         allowed = self.program.forbidden.copy()
         chance = self.chance
-        found: Sure | None = None
+        solution: Sure | None = None
         try:
             self._few(chance.solve(margin))
             for _ in range(REPAIRS):
-                found = chance.solve(margin)
-                if not found.burns:
+                solution = chance.solve(margin)
+                if not solution.burns:
                     return None
-                if self._parted(found):
+                if self._parted(solution):
                     continue
-                broken = next(broken_by(self.program, found.burns), None)
+                broken = next(broken_by(self.program, solution.burns), None)
                 if broken is None:
                     break
                 self.program.forbid(*broken)
@@ -404,11 +410,13 @@ class _Search:
                 return None
         finally:
             self.program.forbidden = allowed
-        made = self.model.translate(as_pulses(self.model.body, found.burns))
+        schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
         plain = valve_commands.plain(self.body) if self.body.thrust_laws else self.body
-        aside = found.left[self.equations.chosen]
-        made = refine(plain, made, self.equations, aside, self.program.width, lambda one: propagation.flown(plain, one))
+        aside = solution.left[self.equations.chosen]
+        schedule = refine(
+            plain, schedule, self.equations, aside, self.program.width, lambda flown: propagation.flown(plain, flown)
+        )
         try:
-            return planner.as_commands(SCHEME, self.body, made, self.options) if self.body.thrust_laws else made
+            return planner.as_commands(SCHEME, self.body, schedule, self.options) if self.body.thrust_laws else schedule
         except Infeasible:
             return None

@@ -1,17 +1,7 @@
-"""Plans compared, the decision on one of them line by line, and remarks.
+"""Comparison of plans, the decision on one of them line by line, its notes, and simulations to a given time.
 
-What a reader should know of a plan, in sentences: what its scheme says, its bounds, why nutation is left, I1 ≠ I2.
-
-Also why there is no schedule, and which limits a schedule breaks. The plan gives the data; what is said of several
-plans together is in `nutdamp.views.verdicts`.
-
-Several plans for one spacecraft, and which of them is recommended.
-
-What is to be decided of a plan: each part of the requirement with its margin, the cases that comply, how it ends.
-
-Data, no sentences: `nutdamp.views.decisions` has the words, which every screen, page and file takes from there.
-
-The pulses of a plan propagated to a given time by both models: what ``simulate`` shows.
+Notes are sentences: those of the scheme, bounds, reasons for remaining nutation or for the lack of a schedule. All else
+is data; `nutdamp.views.verdicts` and `nutdamp.views.decisions` have the words for it.
 """
 
 from __future__ import annotations
@@ -39,16 +29,16 @@ from nutdamp.spacecraft.schedule import Schedule
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
-    from nutdamp.planning.screening import Candidate, Cases
+    from nutdamp.planning.screening import Cases, PlanCandidate
 
 
 BUG = "internal error, please report"
-"""Why there is no plan where a scheme raised what it should not; the name of the exception follows."""
+"""Message on a plan whose scheme raised an unexpected exception, which follows by name."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(results.Data, results.Tabled):
-    """Several plans for one spacecraft, and which of them is recommended on what ground.
+    """Plans for one spacecraft, and the recommended one with the ground of the choice.
 
     ``comparison["two-pulse"]`` is one of them, iterating gives all. ``flown``: the feasible ones in dispersed cases;
     None where these were not to be flown. ``named``: their schemes were; ``timed``: pulses may be timed one by one
@@ -57,7 +47,7 @@ class Comparison(results.Data, results.Tabled):
 
     spacecraft: Spacecraft
     plans: tuple[Plan, ...]
-    flown: Mapping[Plan, Candidate] | None = field(default=None, repr=False)
+    flown: Mapping[Plan, PlanCandidate] | None = field(default=None, repr=False)
     named: bool = False
     timed: bool = False
 
@@ -68,82 +58,82 @@ class Comparison(results.Data, results.Tabled):
         return iter(self.plans)
 
     def __getitem__(self, scheme: str) -> Plan:
-        for one in self.plans:
-            if one.scheme == scheme:
-                return one
+        for candidate in self.plans:
+            if candidate.scheme == scheme:
+                return candidate
         raise KeyError(scheme)
 
     @property
     def reason(self) -> str:
-        """Why the recommended one."""
+        """Reason for the recommendation."""
         return results.reason(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the recommended plan does not reach, and what hinders it."""
+        """Warnings on the recommended plan: unmet bounds and limiting factors."""
         return results.sentences(self)
 
     @cached_property
     def recommendation(self) -> Recommendation[Plan]:
-        """Which plan to fly, and what decided."""
+        """Recommended plan and deciding ground."""
         return recommend(self.eligible, self.shares)
 
     @property
     def only_commanded(self) -> bool:
-        """Whether only plans that can be commanded may be recommended.
+        """True if only commandable plans may be recommended.
 
         Others may, where pulses may be ``timed``, or schemes were ``named`` and none of their plans can be commanded.
         """
-        return not self.timed and (not self.named or any(one.feasible and one.commandable for one in self.plans))
+        return not self.timed and (not self.named or any(plan.feasible and plan.commandable for plan in self.plans))
 
     @property
     def eligible(self) -> tuple[Plan, ...]:
-        """The feasible plans that may be recommended."""
-        return tuple(one for one in self.plans if one.feasible and (one.commandable or not self.only_commanded))
+        """Feasible plans that may be recommended."""
+        return tuple(plan for plan in self.plans if plan.feasible and (plan.commandable or not self.only_commanded))
 
     @property
     def restricted(self) -> bool:
-        """Whether feasible plans were left out because they cannot be commanded."""
-        return len(self.eligible) < sum(one.feasible for one in self.plans)
+        """True if feasible plans were left out because they cannot be commanded."""
+        return len(self.eligible) < sum(plan.feasible for plan in self.plans)
 
     @property
     def needless(self) -> bool:
-        """Whether no pulse has to be fired: the recommended plan has none, or those named are not needed."""
+        """True if no pulse is needed: the recommended plan has none, or those named are not needed."""
         chosen = self.recommended
         return requirements.unaided(self.spacecraft) and (self.named or chosen is None or not len(chosen.pulses))
 
     @cached_property
     def shares(self) -> Mapping[Plan, Share]:
-        """The share of dispersed cases that comply with each feasible plan; nothing where they do not decide."""
+        """Share of dispersed cases that comply with each feasible plan; empty where they do not decide."""
         if self.flown is None:
             return {}
         from nutdamp.planning.screening import shares_of
 
-        return shares_of([one for one in self.plans if one.feasible], self.flown)
+        return shares_of([plan for plan in self.plans if plan.feasible], self.flown)
 
     def cases(self, plan: Plan) -> Cases | None:
-        """How a plan fares in dispersed cases; None where they were not flown."""
+        """Dispersed cases of a plan; None where they were not flown."""
         candidate = None if self.flown is None else self.flown.get(plan)
         return None if candidate is None else candidate.cases
 
     def results(self, plan: Plan) -> Results | None:
-        """All its dispersed cases; None where they have not flown."""
+        """All dispersed results of a plan; None where they have not flown."""
         candidate = None if self.flown is None else self.flown.get(plan)
         return None if candidate is None or not candidate.cases.decided else candidate.results
 
     def meets(self, plan: Plan) -> bool | None:
-        """Whether a plan meets the requirement, in enough dispersed cases too where they decide."""
+        """True if a plan meets the requirement, in enough dispersed cases too where they decide."""
         met = plan.meets_requirement
         return bool(self.shares[plan].met) if met and plan in self.shares else met
 
     @property
     def recommended(self) -> Plan | None:
-        """The plan to fly; None where no scheme is feasible."""
+        """Recommended plan; None where no scheme is feasible."""
         return self.recommendation.plan
 
     @cached_property
     def with_disturbances(self) -> Plan | None:
-        """What would be recommended of the same schemes if they planned with the disturbances, where they did not.
+        """Recommendation among the same schemes planned with the disturbances, where they were not.
 
         None where that is the case already. A scheme that is slow is planned only where no other one complies.
         """
@@ -153,10 +143,10 @@ class Comparison(results.Data, results.Tabled):
         others: tuple[Plan, ...] = ()
         try:
             for slow in (False, True):
-                for one in self.plans:
-                    if one.scheme in catalogue.SCHEMES and catalogue.SCHEMES[one.scheme].slow == slow:
-                        aware = replace(one.options, with_disturbances=True)
-                        others = (*others, attempt(body, one.scheme, aware))
+                for plan in self.plans:
+                    if plan.scheme in catalogue.SCHEMES and catalogue.SCHEMES[plan.scheme].slow == slow:
+                        aware = replace(plan.options, with_disturbances=True)
+                        others = (*others, attempt(body, plan.scheme, aware))
                 best = replace(self, plans=others, flown=None).recommended
                 if best is not None and best.standing is Standing.COMPLIES:
                     break
@@ -166,12 +156,12 @@ class Comparison(results.Data, results.Tabled):
 
     @property
     def failed(self) -> tuple[Plan, ...]:
-        """Those whose scheme has a bug."""
-        return tuple(one for one in self.plans if one.failure is not None)
+        """Plans whose scheme has a bug."""
+        return tuple(plan for plan in self.plans if plan.failure is not None)
 
 
 def usual(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """The schemes to compare where none is named: the classic ones and optimal, with a target those that can point.
+    """Default schemes of a comparison: the classic ones and optimal, with a target those that can point.
 
     Those that can set the spin are among them where it has to change, and `none` where no pulse may be needed.
     """
@@ -210,7 +200,7 @@ def compare(
 def compare_plans(
     plans: Sequence[Plan], *, named: bool = True, samples: int | None = None, timed: bool = False
 ) -> Comparison:
-    """The comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
+    """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
     spacecraft = plans[0].spacecraft
     nominal = Comparison(spacecraft, tuple(plans), named=named, timed=timed)
     wanted = requirements.judged(spacecraft) if samples is None else samples > 0
@@ -219,33 +209,33 @@ def compare_plans(
     return replace(nominal, flown=_dispersed(nominal, samples))
 
 
-def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, Candidate]:
-    """The feasible plans in dispersed cases."""
+def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, PlanCandidate]:
+    """Feasible plans in dispersed cases."""
     from nutdamp.montecarlo.study import SAMPLES
     from nutdamp.planning.screening import fly_compared
 
-    feasible = [one for one in compared.plans if one.feasible]
+    feasible = [plan for plan in compared.plans if plan.feasible]
     count = SAMPLES if samples is None else samples
     with work.budget("the dispersed cases", work.CASES * max(1.0, count / SAMPLES)):
         return fly_compared(feasible, count, lambda shares: recommend(compared.eligible, shares).plan)
 
 
 def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Plan:
-    """The plan of a scheme, or one that carries the exception which nobody expected."""
+    """Plan of a scheme, or one that carries its unexpected exception."""
     try:
-        made = plan(spacecraft, scheme, options)
+        planned = plan(spacecraft, scheme, options)
         # Judged here, where a failure is that of this scheme alone, and not when the first figure is shown.
-        _ = made.residual, made.delta_v, made.left_if_symmetric
+        _ = planned.residual, planned.delta_v, planned.left_if_symmetric
     except NutdampError:
         raise
     except Exception as failure:
         return Plan(spacecraft, scheme, None, f"{BUG}: {type(failure).__name__}", failure=failure)
-    return made
+    return planned
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A part of the requirement: its bound, and what is left with ``nominal`` values (rad, rad/s).
+    """Part of the requirement: its bound, and its residual with ``nominal`` values (rad, rad/s).
 
     ``dispersed``: what the share of cases required does not exceed, None where that is not known. ``met``: whether it
     is kept, None where the cases do not say.
@@ -258,13 +248,13 @@ class Line:
 
     @property
     def margin(self) -> float:
-        """By how much less is left than may be, rad (rad/s): of the dispersed value, where it is known."""
+        """Margin to the bound, rad (rad/s): of the dispersed value, where it is known."""
         return self.bound.most - (self.nominal if self.dispersed is None else self.dispersed)
 
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """The plan to decide on, the parts of its requirement, and how it fares in dispersed ``cases``, None if not flown.
+    """Plan to decide on, the parts of its requirement, and its dispersed ``cases``, None if not flown.
 
     ``unknown``: cases were to decide, but they could not be flown, or not all of them within the budget of work.
     ``seen``: the flight of the plan through its real widths as it has come by a certain time, None for that to the end
@@ -278,13 +268,13 @@ class Decision:
 
     @property
     def flight(self) -> Flight:
-        """What is judged."""
+        """Judged flight."""
         return self.plan.flight if self.seen is None else self.seen
 
     @property
     def lines(self) -> tuple[Line, ...]:
-        """The parts that are required, and those for which it is said what counts as damped or reached."""
-        return tuple(self._line(one.bound, one.left) for one in self._held)
+        """Required parts, and those with a definition of damped or reached."""
+        return tuple(self._line(line.bound, line.left) for line in self._held)
 
     @property
     def _held(self) -> tuple[Held, ...]:
@@ -292,23 +282,23 @@ class Decision:
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
-        """How near the spin axis comes to each direction that is watched, with nominal values."""
+        """Extreme angles of the spin axis from each watched direction, with nominal values."""
         return self.plan.aspects if self.seen is None else end_state.aspects(self.seen, self.seen.until)
 
     @property
     def strays(self) -> tuple[Aspect, ...]:
-        """Those of the `aspects` that break a cone."""
-        return tuple(one for one in self.aspects if not one.kept)
+        """Members of `aspects` that break a cone."""
+        return tuple(aspect for aspect in self.aspects if not aspect.kept)
 
     @property
     def damped(self) -> bool:
-        """Whether all of `lines` is kept with nominal values, what is not required as well."""
-        return all(one.met for one in self._held)
+        """True if all of `lines` is kept with nominal values, unrequired parts included."""
+        return all(line.met for line in self._held)
 
     @property
     def nominal(self) -> bool | None:
-        """Whether what is required at the end is met with nominal values; None where nothing is."""
-        required = [one.met for one in self._held if one.bound.required]
+        """Compliance at the end with nominal values; None where nothing is required."""
+        required = [line.met for line in self._held if line.bound.required]
         return all(required) if required else None
 
     def _line(self, bound: Bound, nominal: float) -> Line:
@@ -325,7 +315,7 @@ class Decision:
 
     @property
     def met(self) -> bool | None:
-        """Whether the requirement is met, with nominal values and in enough cases; None where nothing is required.
+        """Compliance with nominal values and in enough cases; None where nothing is required.
 
         It is not where the spin axis breaks a cone on the way.
         """
@@ -335,17 +325,17 @@ class Decision:
 
     @property
     def undispersed(self) -> bool:
-        """Whether the file says how far its values may be off, and no such cases were flown."""
+        """True if the file gives dispersions and no such cases were flown."""
         return self.cases is None and not self.unknown and self.plan.spacecraft.dispersions is not None
 
     @property
     def final(self) -> Final:
-        """Where spin axis and H end, and the spin."""
+        """Final spin axis, H and spin."""
         return self.flight.final
 
 
 def decide(compared: Comparison) -> Decision | None:
-    """The decision on the recommended plan, by its dispersed cases where they were flown; None where there is none."""
+    """Decision on the recommended plan, by its dispersed cases where they were flown; None without one."""
     plan = compared.recommended
     if plan is None:
         return None
@@ -356,7 +346,7 @@ def decide(compared: Comparison) -> Decision | None:
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A ``plan`` propagated to ``until`` s; ``real``: through real widths is what is shown, else the impulse sum (17).
+    """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum (17).
 
     Its track has ``samples`` rows.
     """
@@ -373,12 +363,12 @@ class Simulation:
 
     @cached_property
     def impulses(self) -> Flight:
-        """The flight by the impulse sum (17) as it has come by ``until``."""
+        """Flight by the impulse sum (17), truncated at ``until``."""
         return seen_at(self._both[0], self.until)
 
     @cached_property
     def flown(self) -> Flight:
-        """The flight through the real widths as it has come by ``until``."""
+        """Flight through the real widths, truncated at ``until``."""
         return seen_at(self._both[1], self.until)
 
     @cached_property
@@ -388,32 +378,32 @@ class Simulation:
 
     @cached_property
     def decision(self) -> Decision:
-        """How the flight through the real widths meets the requirement."""
+        """Compliance of the flight through the real widths."""
         return Decision(self.plan, seen=self.flown)
 
     @cached_property
     def extremes(self) -> Extremes:
-        """Of the axis track."""
+        """Extremes of the axis track."""
         return extremes(self.pieces())
 
     def pieces(self) -> Iterator[Track]:
-        """The track of the flight shown, in pieces."""
+        """Track of the flight shown, in pieces."""
         return self._both[self.real].pieces(self.samples, self.until)
 
     def track(self, samples: int, until: float) -> Track:
-        """Another track of it, to another end in s."""
+        """Track to another end in s."""
         return self._both[self.real].sampled(samples, until)
 
 
 TELLING = math.radians(1e-6)
-"""Nutation angle in rad from which what is left is worth a remark."""
+"""Remaining nutation angle in rad from which there is a note on it."""
 
 
 CUT = "the search ended at its limit of work"
 
 
 def remarks(plan: Plan, *, cones: bool = True) -> tuple[str, ...]:
-    """All of them, what the scheme says first; without ``cones`` where those that are broken are named elsewhere."""
+    """Notes, those of the scheme first; without ``cones`` where broken ones are named elsewhere."""
     notes = plan.pulses.notes
     if plan.cut:
         notes = (*notes, f"{CUT}: this is the best schedule found so far")
@@ -430,12 +420,12 @@ def remarks(plan: Plan, *, cones: bool = True) -> tuple[str, ...]:
 
 
 def _cones(plan: Plan) -> tuple[str, ...]:
-    """Cones that a plan without a target does not keep: it is not its task to."""
-    return tuple(f"warning: {strays(one)}" for one in plan.aspects if not one.kept)
+    """Warnings on broken cones of a plan without a target, which does not plan for them."""
+    return tuple(f"warning: {strays(aspect)}" for aspect in plan.aspects if not aspect.kept)
 
 
 def infeasibility(plan: Plan) -> str:
-    """Why there is no schedule; empty where there is one."""
+    """Reason for the lack of a schedule; empty where there is one."""
     why = _infeasibility(plan)
     return f"{why}; {CUT}" if why and plan.cut else why
 
@@ -459,13 +449,13 @@ def _by_itself(plan: Plan) -> str:
     return f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
 
 
-def strays(found: Aspect) -> str:
-    """How the spin axis breaks a cone."""
-    keep = found.keep
+def strays(aspect: Aspect) -> str:
+    """Message on a broken cone."""
+    keep = aspect.keep
     angle, at, bound = (
-        (found.least, found.least_at, f"min = {math.degrees(keep.least):.6g}°")
-        if found.too_near
-        else (found.largest, found.largest_at, f"max = {math.degrees(keep.most):.6g}°")
+        (aspect.least, aspect.least_at, f"min = {math.degrees(keep.least):.6g}°")
+        if aspect.too_near
+        else (aspect.largest, aspect.largest_at, f"max = {math.degrees(keep.most):.6g}°")
     )
     seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
     if math.isinf(at):
@@ -473,20 +463,20 @@ def strays(found: Aspect) -> str:
     return f"the spin axis comes to {seen} from {keep.name} at {at:.4g} s ({bound})"
 
 
-def said(plan: Plan) -> tuple[str, ...]:
-    """Why there is no schedule, or the `remarks` on it."""
+def notes_on(plan: Plan) -> tuple[str, ...]:
+    """Reason for the lack of a schedule, or the `remarks` on it."""
     return remarks(plan) if plan.feasible else (infeasibility(plan),)
 
 
-def broken_limits(spacecraft: Spacecraft, made: Schedule) -> list[str]:
-    """What a schedule does that limits or on-times forbid, a sentence each; empty where it keeps them all.
+def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
+    """Broken limits and on-times of a schedule, a sentence each; empty where it keeps them all.
 
     Each limit is named once, with the first pulse that breaks it and the number of others that do.
     """
-    found: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
-    for breach in breaches(spacecraft, made):
-        found.setdefault((breach.limit, breach.window), []).append(breach)
-    return [_broken(first) + _likewise(len(others)) for first, *others in found.values()]
+    grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
+    for breach in breaches(spacecraft, schedule):
+        grouped.setdefault((breach.limit, breach.window), []).append(breach)
+    return [_broken(first) + _likewise(len(others)) for first, *others in grouped.values()]
 
 
 def _likewise(others: int) -> str:
@@ -494,7 +484,7 @@ def _likewise(others: int) -> str:
 
 
 def _broken(breach: Breach) -> str:
-    """The pulse that breaks a limit, and how."""
+    """Message on a pulse that breaks a limit."""
     pulse, bound, limit = breach.pulse, f"{breach.bound:.6g} s", breach.limit
     if limit is Limit.MAX_PULSES:
         return f"{breach.number} pulses are more than {breach.bound:.0f}"
@@ -517,7 +507,7 @@ def _broken(breach: Breach) -> str:
 
 
 def _bounds(plan: Plan) -> Iterator[str]:
-    """How much cheaper another schedule could be."""
+    """Possible saving by another schedule."""
     bounds = plan.pulses.bounds
     if bounds is None or (bounds.unit == "kg" and plan.pulses.propellant is None):
         return
@@ -543,7 +533,7 @@ def _bounds(plan: Plan) -> Iterator[str]:
 
 
 def _remainder(plan: Plan) -> Iterator[str]:
-    """Why nutation is left."""
+    """Reasons for remaining nutation."""
     left = plan.flight.residual.nutation
     if left < TELLING or plan.options.uncorrected:
         return
@@ -554,27 +544,27 @@ def _remainder(plan: Plan) -> Iterator[str]:
 
 
 def obstacle(plan: Plan) -> str:
-    """What keeps a plan from leaving less nutation, as a clause."""
-    found = plan.hindrance
+    """Obstacle to less nutation, as a clause."""
+    hindrance = plan.hindrance
     return {
         Obstacle.UNPLANNED_DISTURBANCES: "the plan was made without the disturbances (--with-disturbances)",
-        Obstacle.STEADY_TILT: f"the disturbances leave a steady tilt of {_degrees(found.steady_tilt)}",
+        Obstacle.STEADY_TILT: f"the disturbances leave a steady tilt of {_degrees(hindrance.steady_tilt)}",
         Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} allows no more pulses",
-        Obstacle.RESOLUTION: f"rounding to limits.tick can leave up to {_degrees(found.rounding)}",
-        Obstacle.LIMITS: f"{plan.scheme} {_limited(found)}",
+        Obstacle.RESOLUTION: f"rounding to limits.tick can leave up to {_degrees(hindrance.rounding)}",
+        Obstacle.LIMITS: f"{plan.scheme} {_limited(hindrance)}",
         Obstacle.SCHEME: f"with these channels {plan.scheme} removes no more",
-    }[found.obstacle]
+    }[hindrance.obstacle]
 
 
-def _limited(found: Hindrance) -> str:
-    """By which limits a schedule is limited, and by which it may be."""
-    certain = f"is limited by {' and '.join(found.binding)}" if found.binding else ""
-    possible = f"may be limited by {' and '.join(found.suspected)}" if found.suspected else ""
+def _limited(hindrance: Hindrance) -> str:
+    """Certain and possible limits of a schedule, as a clause."""
+    certain = f"is limited by {' and '.join(hindrance.binding)}" if hindrance.binding else ""
+    possible = f"may be limited by {' and '.join(hindrance.suspected)}" if hindrance.suspected else ""
     return ", and ".join(text for text in (certain, possible) if text)
 
 
 def _asymmetry(plan: Plan) -> Iterator[str]:
-    """What the same pulses would leave if I1 and I2 were their mean."""
+    """Nutation left by the same pulses if I1 and I2 were their mean."""
     without, inertia = plan.left_if_symmetric, plan.spacecraft.inertia
     if without is None:
         return
@@ -587,7 +577,7 @@ def _asymmetry(plan: Plan) -> Iterator[str]:
 
 
 def _given_length(plan: Plan) -> Iterator[str]:
-    """That equal pulses of a given length do not end exactly, where they were planned on a simpler motion."""
+    """Note on equal pulses of a given length, which do not end exactly."""
     options, body, left = plan.options, plan.spacecraft, plan.left
     simple = body.inertia.symmetric and not body.disturbances and body.growth == 0.0
     if left is None or simple or not options.equal or options.resizable or options.uncorrected:
@@ -602,7 +592,7 @@ def _given_length(plan: Plan) -> Iterator[str]:
 
 
 def down(value: float) -> float:
-    """The largest number of four digits that is not above ``value``: a bound must not be rounded up."""
+    """Value rounded down to four digits: a bound must not be rounded up."""
     if value <= 0.0 or not math.isfinite(value):
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
@@ -610,5 +600,5 @@ def down(value: float) -> float:
 
 
 def _degrees(angle: float) -> str:
-    """An angle given in rad, as remarks show it; what is below 1e-9 deg is rounding."""
+    """Angle from rad for notes; below 1e-9 deg it is rounding."""
     return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"

@@ -1,12 +1,8 @@
-"""Plan one scheme, judge it, route it round exclusion cones.
+"""Planning: plan by a scheme, fly the schedule, judge it, route it round exclusion cones.
 
-Plan by a scheme, fly what it gives, judge it against limits and requirement.
-
-Ways round the cones that the spin axis has to keep: a scheme that points is planned leg by leg over way points.
-
-A route is a row of great circles: straight to the target in shorter legs, which swing the axis less, or by one or two
-dog-legs round what is in the way. Routes are found on the sphere, with a margin for nutation; whether the
-axis keeps the cones is for the flight to say.
+A scheme that points is planned leg by leg over way points. A route is a row of great circles: straight to the target in
+shorter legs, which swing the axis less, or by one or two dog-legs. Routes are sought on the sphere, with a margin for
+nutation; the flight judges the cones.
 """
 
 from __future__ import annotations
@@ -46,10 +42,10 @@ BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sig
 """rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest first."""
 
 PLACES = ((0.5,), (0.25, 0.75))
-"""Where the way points of one and of two dog-legs lie, as shares of the way to the target."""
+"""Way points of one and of two dog-legs, as shares of the way to the target."""
 
 PARTS = (1, 2, 4)
-"""Into how many each leg of a route is divided."""
+"""Numbers of parts of each leg of a route."""
 
 ROUTES = 16
 """Routes that are tried, at most."""
@@ -72,8 +68,8 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOpti
         if work.exhausted():
             return
         try:
-            made = _over(body, scheme, options, route)
-            yield made if as_it_is else planner.as_commands(scheme, spacecraft, made, options)
+            whole = _over(body, scheme, options, route)
+            yield whole if as_it_is else planner.as_commands(scheme, spacecraft, whole, options)
         except Infeasible:
             continue
 
@@ -81,15 +77,15 @@ def schedules(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOpti
 def routes(spacecraft: Spacecraft) -> list[Route]:
     """Way points from H at t = 0, the target last, at most `ROUTES`; the shortest first."""
     start = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
-    found: dict[tuple[float, ...], Route] = {}
+    shortest: dict[tuple[float, ...], Route] = {}
     for parts in PARTS:
         for margin in MARGINS:
             for places in ((), *PLACES):
                 bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
                 if bent is not None and len(bent) * parts > 1:
                     route = _divided(start, bent, parts)
-                    found.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
-    return sorted(found.values(), key=lambda route: (round(_length((start, *route)), 3), len(route)))[:ROUTES]
+                    shortest.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
+    return sorted(shortest.values(), key=lambda route: (round(_length((start, *route)), 3), len(route)))[:ROUTES]
 
 
 def _length(corners: Route) -> float:
@@ -99,7 +95,7 @@ def _length(corners: Route) -> float:
 def _bent(
     start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
 ) -> Route | None:
-    """The least bent route with way points at ``places`` that is clear by ``margin`` rad; None where there is none."""
+    """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where there is none."""
     if not places:
         return (target,) if _clear((start, target), keeps, margin) else None
     for bend in BENDS:
@@ -110,7 +106,7 @@ def _bent(
 
 
 def _aside(start: Vector, target: Vector, place: float, bend: float) -> Vector:
-    """The point at a share of the way, ``bend`` rad to the left of the great circle."""
+    """Point at a share of the way, ``bend`` rad to the left of the great circle."""
     on_the_way = _along(start, target, np.array([place]))[0]
     normal = np.cross(start, target)
     size = float(np.linalg.norm(normal))
@@ -128,7 +124,7 @@ def _along(start: Vector, end: Vector, shares: Vector) -> Vector:
 
 
 def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
-    """Whether great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly as their ends."""
+    """True if great circles between the ``corners`` keep the cones, by ``margin`` rad or as clearly as their ends."""
     shares = np.linspace(0.0, 1.0, STEPS)
     points = np.concatenate([_along(*leg, shares) for leg in pairwise(corners)])
     for keep in keeps:
@@ -140,13 +136,13 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
 
 
 def _divided(start: Vector, route: Route, parts: int) -> Route:
-    """The ``route`` with each leg in ``parts``."""
+    """Copy of the ``route`` with each leg in ``parts``."""
     shares = np.arange(1, parts + 1) / parts
     return tuple(point for leg in pairwise((start, *route)) for point in _along(*leg, shares))
 
 
 def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
-    """The schedule of a ``scheme`` that goes by way of the points of a ``route``; raises Infeasible with the reason.
+    """Schedule of a ``scheme`` by way of the points of a ``route``; raises Infeasible with the reason.
 
     Each leg has the share of the horizon that it has of the way.
     """
@@ -161,11 +157,11 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
             goal=replace(goal, axis=point, spin=spin),
             limits=replace(here.limits, horizon=share * here.horizon),
         )
-        made = planner.schedule(scheme, supply.behind(leg), options)
-        passed = _sun_pulses(spacecraft, builder) if made.blocks else 0
-        blocks += [replace(block, first=block.first + passed) for block in made.blocks]
-        builder.fire(made)
-        supply.count(made)
+        schedule = planner.schedule(scheme, supply.behind(leg), options)
+        passed = _sun_pulses(spacecraft, builder) if schedule.blocks else 0
+        blocks += [replace(block, first=block.first + passed) for block in schedule.blocks]
+        builder.fire(schedule)
+        supply.count(schedule)
     names, count = listed([keep.name for keep in spacecraft.keep]), len(route) - 1
     points = f"{count} way point{'s' * (count > 1)}"
     note = f"goes by {points}, so that the spin axis keeps its distance from {names}"
@@ -173,7 +169,7 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
 
 
 def _sun_pulses(spacecraft: Spacecraft, builder: FlownBuilder) -> int:
-    """How many Sun pulses came until the pulses of a ``builder`` are over: those of its next leg count from there."""
+    """Number of Sun pulses before the end of the pulses of a ``builder``, from where its next leg counts."""
     flown = propagation.flown(spacecraft, builder.schedule(), builder.now)
     return len(sun_pulses(flown, builder.now)) if builder.now > 0.0 else 0
 
@@ -182,12 +178,12 @@ NO_NUTATION = 1e-12
 """Nutation angle in rad below which there is nothing to plan."""
 
 ROUNDING = 1e-11
-"""Share by which the nutation that is left may be less for rounding alone."""
+"""Relative decrease of the remaining nutation that may be rounding."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(results.Data, results.Tabled):
-    """A scheme's schedule for a spacecraft, and how it was judged.
+    """Schedule of a scheme for a spacecraft, and its judgement.
 
     Without one: the ``refusal`` of the scheme in its words, or the first ``breach`` of the schedule found, or the cone
     that the spin axis would break (``astray``) on its way to a target, or the nutation (rad) that would be left where
@@ -211,22 +207,22 @@ class Plan(results.Data, results.Tabled):
 
     @property
     def feasible(self) -> bool:
-        """Whether the schedule keeps every limit and lowers the nutation."""
+        """True if the schedule keeps every limit and lowers the nutation."""
         return self.schedule is not None
 
     @property
     def pulses(self) -> Schedule:
-        """The schedule; empty where the plan is infeasible."""
+        """Schedule; empty where the plan is infeasible."""
         return Schedule() if self.schedule is None else self.schedule
 
     @property
     def why(self) -> str | None:
-        """Why there is no schedule; None where there is one."""
+        """Reason for the lack of a schedule; None where there is one."""
         return None if self.feasible else results.reason(self)
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader should know of it."""
+        """Notes for the reader."""
         return results.sentences(self)
 
     @property
@@ -263,32 +259,32 @@ class Plan(results.Data, results.Tabled):
 
     @cached_property
     def residual(self) -> Residual | None:
-        """What remains by the impulse sum (17)."""
+        """Residual by the impulse sum (17)."""
         return None if self.schedule is None else propagation.by_impulses(self.spacecraft, self.schedule).residual
 
     @cached_property
     def flight(self) -> Flight:
-        """The schedule flown through its real pulse widths; free motion where the plan is infeasible."""
+        """Flight through the real pulse widths; free motion where the plan is infeasible."""
         return propagation.flown(self.spacecraft, self.pulses)
 
     @property
     def flown(self) -> Residual | None:
-        """What remains when the real pulse widths are flown."""
+        """Residual of the flight through the real pulse widths."""
         return self.flight.residual if self.feasible else None
 
     @property
     def left(self) -> Left | None:
-        """What remains, flown, as `compliance` takes it."""
+        """Flown residual for `requirements`."""
         return left_by(self.flight) if self.feasible else None
 
     @property
     def commandable(self) -> bool:
-        """Whether the spacecraft can fire it: where it takes command blocks, only these, or nothing at all."""
+        """True if the spacecraft can fire it: by command blocks only, or nothing, where it takes such."""
         return self.spacecraft.commands is None or bool(self.pulses.blocks) or not len(self.pulses)
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
+        """True if the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
         None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
         shift of H counts from there.
@@ -299,24 +295,24 @@ class Plan(results.Data, results.Tabled):
 
     @property
     def ends_well(self) -> bool | None:
-        """Whether the flown residual keeps what is required at the end; None where nothing is."""
+        """Compliance of the flown residual at the end; None where nothing is required."""
         if self.left is None or not requirements.required(self.spacecraft):
             return None
         return not any(bound.required for bound in self.shortfalls)
 
     @property
     def held(self) -> tuple[Held, ...]:
-        """The flown residual beside each of the `compliance.bounds`; nothing for an infeasible plan."""
+        """Flown residual beside each of the `requirements.bounds`; empty for an infeasible plan."""
         return () if self.left is None else requirements.held(self.spacecraft, self.left)
 
     @property
     def shortfalls(self) -> tuple[Bound, ...]:
-        """The `compliance.bounds` that the flown residual does not keep."""
-        return tuple(one.bound for one in self.held if not one.met)
+        """Members of `requirements.bounds` that the flown residual breaks."""
+        return tuple(line.bound for line in self.held if not line.met)
 
     @property
     def standing(self) -> Standing:
-        """What it reaches at the end, whatever cones it breaks on the way; an infeasible plan misses all."""
+        """Standing at the end, regardless of cones; an infeasible plan misses all."""
         if self.left is None or self.ends_well is False:
             return Standing.MISSES
         if not self.shortfalls:
@@ -353,23 +349,23 @@ class Plan(results.Data, results.Tabled):
 
     @cached_property
     def aspects(self) -> tuple[Aspect, ...]:
-        """How near the spin axis comes to each direction that is watched, flown; see `aspect.aspects`."""
+        """Extreme angles of the flown spin axis from each watched direction; see `end_state.aspects`."""
         return end_state.aspects(self.flight)
 
     @property
     def kept(self) -> bool | None:
-        """Whether the spin axis keeps its cones, flown; None where the file names none."""
-        return all(one.kept for one in self.aspects) if self.spacecraft.keep else None
+        """True if the flown spin axis keeps its cones; None where the file names none."""
+        return all(aspect.kept for aspect in self.aspects) if self.spacecraft.keep else None
 
     @property
     def hindrance(self) -> Hindrance:
-        """What keeps the plan from leaving less nutation."""
+        """Limiting factors of the remaining nutation."""
         left = self.flight.residual.nutation
         return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
 
 
 def _lightening(flown: Flight) -> Flight:
-    """The flight with forces that grow as the mass at t = 0 falls with the propellant of a tank."""
+    """Flight with forces that grow as the mass falls with the propellant of a tank."""
     body = flown.spacecraft
     if body.tank is None or body.mass is None:
         return flown
@@ -383,7 +379,7 @@ def _lightening(flown: Flight) -> Flight:
 
 
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
-    """Plan one scheme and judge it; an infeasible plan says why.
+    """Plan one scheme and judge it; an infeasible plan gives the reason.
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
@@ -403,69 +399,74 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
     with work.budget(scheme, work.SCHEME) as spent:
         try:
             body = spacecraft if catalogue.SCHEMES[scheme].on_true_body else known(spacecraft, chosen)
-            made = judged(spacecraft, scheme, planner.schedule(scheme, body, chosen), chosen)
+            result = judged(spacecraft, scheme, planner.schedule(scheme, body, chosen), chosen)
         except Infeasible as reason:
-            made = Plan(spacecraft, scheme, None, str(reason))
-        if made.astray is not None and (catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands):
-            made = _routed(made, chosen)
-    return replace(made, cut=True) if spent.exhausted else made
+            result = Plan(spacecraft, scheme, None, str(reason))
+        if result.astray is not None and (catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands):
+            result = _routed(result, chosen)
+    return replace(result, cut=True) if spent.exhausted else result
 
 
 def _routed(astray: Plan, options: catalogue.SchemeOptions) -> Plan:
     """A plan of the same scheme by another way, on which the spin axis keeps its cones; else the one that does not."""
 
     body = astray.spacecraft
-    for made in schedules(known(body, options), astray.scheme, options):
-        plan_ = judged(body, astray.scheme, made, options)
+    for schedule in schedules(known(body, options), astray.scheme, options):
+        plan_ = judged(body, astray.scheme, schedule, options)
         if plan_.feasible:
             return plan_
     return astray
 
 
 def reaches_spin(spacecraft: Spacecraft) -> bool:
-    """Whether the spin is that of the goal from the beginning."""
+    """True if the spin is that of the goal from the beginning."""
     goal = spacecraft.goal.spin
     return goal is None or abs(spacecraft.spin - goal) <= requirements.SPIN_TOLERANCE * abs(goal)
 
 
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:
-    """The schemes that can set the spin: by command blocks only where there are commands."""
+    """Schemes that can set the spin: by command blocks only where there are commands."""
     commanded = spacecraft.commands is not None
-    return tuple(one for one in catalogue.SPINNING if commanded or not catalogue.SCHEMES[one].reads_commands)
+    return tuple(scheme for scheme in catalogue.SPINNING if commanded or not catalogue.SCHEMES[scheme].reads_commands)
 
 
 def alternatives(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> tuple[Plan, ...]:
-    """Feasible plans by schedules that the scheme weighs against the one that `plan` gives; it may be among them.
+    """Feasible plans by alternative schedules of the scheme, possibly including that of `plan`.
 
     Raises KeyError for a name not in `schemes.NAMES`.
     """
     chosen = planner.settled(catalogue.SCHEMES[scheme], options, spacecraft)
     try:
-        made = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
-        plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in made]
+        alternatives = planner.alternatives(scheme, known(spacecraft, chosen), chosen)
+        plans = [judged(spacecraft, scheme, schedule, chosen) for schedule in alternatives]
     except Infeasible:
         return ()
-    return tuple(one for one in plans if one.feasible)
+    return tuple(plan for plan in plans if plan.feasible)
 
 
 def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraft:
-    """The spacecraft as the schemes are to know it: with its disturbances only where they are requested.
+    """Spacecraft as known to the schemes: with its disturbances only where they are requested.
 
     A spin that nothing can change, and that is the one of the goal, is no goal for them.
     """
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
-    if body.goal.spin is None or not reaches_spin(body) or body.spin_drift or any(one.axial for one in body.channels):
+    if (
+        body.goal.spin is None
+        or not reaches_spin(body)
+        or body.spin_drift
+        or any(channel.axial for channel in body.channels)
+    ):
         return body
     return replace(body, goal=replace(body.goal, spin=None))
 
 
-def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: catalogue.SchemeOptions) -> Plan:
-    """The plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
+def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions) -> Plan:
+    """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
     if spacecraft.disturbances:  # which the scheme need not have known
-        made = made.without_proof
-    flown = Plan(spacecraft, scheme, made, options=options)
+        schedule = schedule.without_proof
+    flown = Plan(spacecraft, scheme, schedule, options=options)
     left = flown.flown
-    breach = next(breaches(spacecraft, made), None)
+    breach = next(breaches(spacecraft, schedule), None)
     if breach is not None:
         return Plan(spacecraft, scheme, None, breach=breach)
     if spacecraft.goal.axis is not None and scheme in catalogue.PLANNED:
@@ -478,7 +479,7 @@ def judged(spacecraft: Spacecraft, scheme: str, made: Schedule, options: catalog
 
 
 def _helps(judged: Plan, left: Residual) -> bool:
-    """Whether nutation, distance from the target axis or from the final spin requested is less than without pulses.
+    """True if nutation, distance from the target axis or from the requested spin is less than without pulses.
 
     Nutation that decays by itself must be less than what it has decayed to by the last pulse.
     """
@@ -492,7 +493,7 @@ def _helps(judged: Plan, left: Residual) -> bool:
 
 
 def unrounded(plan_: Plan) -> Schedule | None:
-    """The schedule as it would be with commands of any resolution.
+    """Schedule with commands of any resolution.
 
     None where there is no tick, no such schedule, or no scheme that planned it.
     """

@@ -1,10 +1,4 @@
-"""Ranking rules, limiting factors.
-
-Which of several plans to fly: the rule, on what the plans leave when flown and on what they cost.
-
-It gives data; `nutdamp.views.verdicts` has the words.
-
-What keeps a schedule from leaving less nutation: disturbances, limits of the file, or the scheme itself.
+"""Recommendation among plans, by flown residuals and cost, and factors that limit a schedule.
 
 It gives data; `nutdamp.planning.decision` and `nutdamp.views.verdicts` have the words.
 """
@@ -34,39 +28,39 @@ STEADIER_SHIFT = 0.2
 """Share of the recommended plan's shift of H below which another plan keeps H so much better..."""
 
 STEADIER_COST = 1.1
-"""... that it is worth a remark, if it costs at most so many times as much."""
+"""Largest cost ratio at which that is worth a note."""
 
 FEWER_PULSES = 0.5
 """Share of the recommended plan's pulses up to which another one is so much simpler..."""
 
 FEWER_COST = 1.05
-"""... that it is worth a remark, if it costs at most so many times as much."""
+"""Largest cost ratio at which that is worth a note."""
 
 SOONER_END = 0.5
 """Share of the recommended plan's end up to which another one, a nutation period earlier at least, is so much sooner...
 """
 
 SOONER_COST = 1.05
-"""... that it is worth a remark, if it costs at most so many times as much."""
+"""Largest cost ratio at which that is worth a note."""
 
 REAL_COST = 1.1
-"""So many times as much a plan may cost that fires real pulse widths beside one of ideal impulses, for a remark."""
+"""Largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note."""
 
 
 class Standing(Enum):
-    """What the recommended plan reaches, and so what it was chosen among; from the best down."""
+    """Standing of the recommended plan, and of those it was chosen among; from the best down."""
 
     COMPLIES = "complies"
-    """Meets the requirement, and damps what that does not bound."""
+    """Meets the requirement, and damps the parts that it does not bound."""
     MEETS = "meets"
-    """Meets the requirement, but leaves more of what that does not bound than counts as damped."""
+    """Meets the requirement, but leaves other parts undamped."""
     MISSES = "misses"
     """Does not meet the requirement; without one: does not damp."""
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """The share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
+    """Share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
 
     ``probability``: the share that must.
     """
@@ -77,17 +71,17 @@ class Share:
 
     @property
     def exact(self) -> float | None:
-        """The share; None where not all cases have flown."""
+        """Share; None where not all cases have flown."""
         return self.low if self.low == self.high else None
 
     @property
     def met(self) -> bool | None:
-        """Whether as many comply as must; None where the cases flown do not decide it."""
+        """Compliance in enough cases; None where the flown ones do not decide it."""
         return True if self.low >= self.probability else False if self.high < self.probability else None
 
 
 class Ground(Enum):
-    """What decided among the plans of one standing."""
+    """Deciding ground among the plans of one standing."""
 
     ONLY = "only"
     CASES = "cases"
@@ -103,51 +97,51 @@ class Ground(Enum):
 
 
 class Gain(Enum):
-    """In what another plan is much better than the recommended one."""
+    """Advantage of another plan over the recommended one."""
 
     STEADIER = "steadier"
-    """It keeps H."""
+    """Keeps H."""
     SIMPLER = "simpler"
-    """It takes far fewer pulses."""
+    """Far fewer pulses."""
     SOONER = "sooner"
-    """It ends far sooner."""
+    """Ends far sooner."""
     REAL = "real"
-    """It fires real pulse widths, where the recommended one fires ideal impulses."""
+    """Real pulse widths, where the recommended one fires ideal impulses."""
     COMMANDED = "commanded"
-    """It can be sent as command blocks, where the recommended one is fired pulse by pulse."""
+    """Command blocks, where the recommended one is fired pulse by pulse."""
 
 
 class Judged(Hashable, Protocol):
-    """A plan with what the rule goes by."""
+    """Interface of a plan for the ranking."""
 
     @property
     def spacecraft(self) -> Spacecraft:
-        """What it was planned for."""
+        """Spacecraft of the plan."""
         ...
 
     @property
     def pulses(self) -> Schedule:
-        """Its schedule."""
+        """Schedule."""
         ...
 
     @property
     def flown(self) -> Residual | None:
-        """What it leaves, flown; None where it is infeasible."""
+        """Flown residual; None where it is infeasible."""
         ...
 
     @property
     def standing(self) -> Standing:
-        """What it reaches."""
+        """Standing."""
         ...
 
     @property
     def kept(self) -> bool | None:
-        """Whether the spin axis keeps its cones; None where there are none."""
+        """True if the spin axis keeps its cones; None where there are none."""
         ...
 
     @property
     def delta_v(self) -> Vector | None:
-        """Velocity change, (3,) m/s; None where it is not known."""
+        """Velocity change, (3,) m/s; None where unknown."""
         ...
 
     @property
@@ -161,7 +155,7 @@ Plan = TypeVar("Plan", bound=Judged)
 
 @dataclass(frozen=True, eq=False)
 class Recommendation(Generic[Plan]):
-    """The plan to fly; None, as ``standing`` and ``ground``, where none is feasible.
+    """Recommended plan; None, as ``standing`` and ``ground``, where none is feasible.
 
     It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
     ``alternatives``: the cheapest plan that gains so much.
@@ -176,33 +170,33 @@ class Recommendation(Generic[Plan]):
 
 
 def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation[Plan]:
-    """The plan to fly.
+    """Recommendation among plans.
 
     Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
     is none, that with least nutation left (least distance from a target axis where that is more). Where plans that
     reach as much differ in whether the spin axis keeps its cones, those that do count alone. With ``shares`` a plan
     meets the requirement in enough dispersed cases or not at all; where none does, it is that with which most comply.
     """
-    feasible = [one for one in plans if one.flown is not None]
+    feasible = [plan for plan in plans if plan.flown is not None]
     if not feasible:
         return Recommendation()
-    reached = {one: one.standing if not shares or shares[one].met else Standing.MISSES for one in feasible}
-    standing = next(one for one in Standing if one in reached.values())
-    those = [one for one in feasible if reached[one] is standing]
-    those = [one for one in those if one.kept is not False] or those
+    reached = {plan: plan.standing if not shares or shares[plan].met else Standing.MISSES for plan in feasible}
+    standing = next(standing for standing in Standing if standing in reached.values())
+    those = [plan for plan in feasible if reached[plan] is standing]
+    those = [plan for plan in those if plan.kept is not False] or those
     if standing is Standing.COMPLIES:
         best, ground = cheapest(those)
         return Recommendation(best, standing, ground, len(those), by_propellant(those), _alternatives(best, those))
-    most = max(shares[one].low for one in those) if shares else 0.0
+    most = max(shares[plan].low for plan in those) if shares else 0.0
     if shares and standing is Standing.MISSES and most > 0.0 and len(those) > 1:
-        best, _ = cheapest([one for one in those if shares[one].low >= most])
+        best, _ = cheapest([plan for plan in those if shares[plan].low >= most])
         return Recommendation(best, standing, Ground.CASES, len(those), by_propellant(those))
     best, ground = _nearest(those)
     return Recommendation(best, standing, ground, len(those), by_propellant(those))
 
 
 def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Ground]:
-    """The plan of least propellant (impulse where one is not known), and what decided.
+    """Plan of least propellant (impulse where one is unknown), and the deciding ground.
 
     Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with fewer pulses, less
     ΔV, less shift of H (distance from the target axis), the earlier end; the first of these that leaves one decides.
@@ -210,74 +204,74 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
     if len(plans) == 1:
         return plans[0], Ground.ONLY
     known = by_propellant(plans)
-    least = min(_cost(one, known) for one in plans)
-    equal = [one for one in plans if _cost(one, known) <= least * (1.0 + SAME_COST)]
+    least = min(_cost(plan, known) for plan in plans)
+    equal = [plan for plan in plans if _cost(plan, known) <= least * (1.0 + SAME_COST)]
     if len(equal) == 1:
         return equal[0], Ground.COST
-    if usual is not None and any(one is usual for one in equal):
+    if usual is not None and any(plan is usual for plan in equal):
         return usual, Ground.NOMINAL
     for ground, measure, same in (
-        (Ground.PULSES, lambda one: float(len(one.pulses)), 0.0),
+        (Ground.PULSES, lambda plan: float(len(plan.pulses)), 0.0),
         (Ground.DELTA_V, _speed, SAME_SPEED),
         (Ground.SHIFT, _off, SAME_ANGLE),
     ):
-        values = [value for one in equal if (value := measure(one)) is not None]
+        values = [value for plan in equal if (value := measure(plan)) is not None]
         if len(values) < len(equal):  # not known of all
             continue
         least = min(values) + same
-        equal = [one for one, value in zip(equal, values, strict=True) if value <= least]
+        equal = [plan for plan, value in zip(equal, values, strict=True) if value <= least]
         if len(equal) == 1:
             return equal[0], ground
-    return min(equal, key=lambda one: one.pulses.end), Ground.END
+    return min(equal, key=lambda plan: plan.pulses.end), Ground.END
 
 
 def _nearest(plans: Sequence[Plan]) -> tuple[Plan, Ground]:
-    """The plan that leaves least, and what decided; of those that leave as little the nearest to the requirement.
+    """Plan of least residual, and the deciding ground; of equal ones the nearest to the requirement.
 
     Angles within `DAMPED_ANGLE` are as little; of those as near, but for 0.1 % or rounding, the one by `cheapest`.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
     least = min(map(_missed, plans))
-    as_little = [one for one in plans if _missed(one) <= least + DAMPED_ANGLE]
+    as_little = [plan for plan in plans if _missed(plan) <= least + DAMPED_ANGLE]
     if len(as_little) == 1:
         return as_little[0], Ground.LEFT
     body = as_little[0].spacecraft
-    least = min(one.severity for one in as_little)
+    least = min(plan.severity for plan in as_little)
     rounding = NEGLIGIBLE / min((bound.most for bound in required(body) if bound.part is not Part.SPIN), default=1.0)
-    near = [one for one in as_little if one.severity <= least * (1.0 + SAME_COST) + rounding]
+    near = [plan for plan in as_little if plan.severity <= least * (1.0 + SAME_COST) + rounding]
     return (near[0], Ground.NEAREST) if len(near) == 1 else cheapest(near)
 
 
 def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
-    """The cheapest of the ``plans`` that gains so much on the ``best``, by what it gains.
+    """Cheapest of the ``plans`` with each sufficient gain on the ``best``, by gain.
 
     For little more; one of command blocks for whatever it costs, since the spacecraft may fire nothing else.
     """
     known, body = by_propellant(plans), best.spacecraft
     few, soon = FEWER_PULSES * len(best.pulses), SOONER_END * best.pulses.end
-    found: dict[Gain, Plan] = {}
+    gains_of: dict[Gain, Plan] = {}
     for gain, times, gains in (
-        (Gain.STEADIER, STEADIER_COST, lambda one: _off(one) < STEADIER_SHIFT * _off(best)),
-        (Gain.SIMPLER, FEWER_COST, lambda one: len(one.pulses) <= few),
-        (Gain.SOONER, SOONER_COST, lambda one: one.pulses.end <= min(soon, best.pulses.end - body.inertial_period)),
-        (Gain.REAL, REAL_COST, lambda one: not one.pulses.idealised),
-        (Gain.COMMANDED, math.inf, lambda one: bool(one.pulses.blocks)),
+        (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < STEADIER_SHIFT * _off(best)),
+        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
+        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= min(soon, best.pulses.end - body.inertial_period)),
+        (Gain.REAL, REAL_COST, lambda plan: not plan.pulses.idealised),
+        (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks)),
     ):
         if gain is Gain.STEADIER and (body.goal.axis is not None or _off(best) <= DAMPED_ANGLE):
             continue
         if (gain is Gain.REAL and not best.pulses.idealised) or (gain is Gain.COMMANDED and best.pulses.blocks):
             continue
         most = times * _cost(best, known)
-        those = [one for one in plans if len(one.pulses) and gains(one) and _cost(one, known) <= most]
+        those = [plan for plan in plans if len(plan.pulses) and gains(plan) and _cost(plan, known) <= most]
         if those:
-            found[gain] = min(those, key=lambda one: _cost(one, known))
-    return found
+            gains_of[gain] = min(those, key=lambda plan: _cost(plan, known))
+    return gains_of
 
 
 def by_propellant(plans: Sequence[Plan]) -> bool:
-    """Whether the plans are compared by propellant: it is known for all of them; else by impulse."""
-    return all(one.pulses.propellant is not None for one in plans)
+    """True if propellant is known for all plans, which are compared by it; else by impulse."""
+    return all(plan.pulses.propellant is not None for plan in plans)
 
 
 def _cost(plan: Judged, known: bool) -> float:
@@ -286,7 +280,7 @@ def _cost(plan: Judged, known: bool) -> float:
 
 
 def _speed(plan: Judged) -> float | None:
-    """|ΔV| in m/s; None where it is not known."""
+    """|ΔV| in m/s; None where unknown."""
     return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
 
 
@@ -301,11 +295,11 @@ def _missed(plan: Judged) -> float:
 
 
 WORST = math.hypot(1.0, 1.5)
-"""What ticks leave at worst, over what chance leaves: the centre is off by half the on-time's error and the start's."""
+"""Worst over root-mean-square effect of ticks: the centre is off by half the on-time's error and the start's."""
 
 
 class Obstacle(Enum):
-    """What keeps a plan from leaving less nutation."""
+    """Obstacle to less nutation."""
 
     UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
     STEADY_TILT = "disturbances, under which a tilt stays"
@@ -317,7 +311,7 @@ class Obstacle(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Hindrance:
-    """What hinders ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
+    """Limiting factors of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
 
     spacecraft: Spacecraft
     pulses: Schedule
@@ -326,7 +320,7 @@ class Hindrance:
 
     @property
     def obstacle(self) -> Obstacle:
-        """What counts most."""
+        """Dominant obstacle."""
         body, limits = self.spacecraft, self.spacecraft.limits
         if self.full and self.to_the_end:
             return Obstacle.LIMITS
@@ -340,44 +334,44 @@ class Hindrance:
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Keys of the file that name the limits which the schedule itself shows to end it."""
-        found = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
-        if not any(found.values()):
-            found["min_on_time"] = self.shortest
-        return tuple(key for key in found if found[key])
+        """Keys of the file for the limits that certainly end the schedule."""
+        ends = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
+        if not any(ends.values()):
+            ends["min_on_time"] = self.shortest
+        return tuple(key for key in ends if ends[key])
 
     @property
     def suspected(self) -> tuple[str, ...]:
-        """Keys of those that the file gives and that may end it: to know it takes a plan without them."""
+        """Keys of the file for limits that may end it: certainty takes a plan without them."""
         limits = self.spacecraft.limits
         ticks = limits.tick is not None and not self.full and not self.to_the_end
-        found = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
-        return tuple(key for key in found if found[key])
+        suspects = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
+        return tuple(key for key in suspects if suspects[key])
 
     @property
     def full(self) -> bool:
-        """Whether every pulse is as long as its channel may be on; never where nothing says how long that is."""
+        """True if every pulse is as long as its channel may be on; False without such a limit."""
         longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
         most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
         return bool(most) and all(
-            one.loaded[1] >= long * (1.0 - 1e-9) for one, long in zip(self.pulses, most, strict=True)
+            pulse.loaded[1] >= long * (1.0 - 1e-9) for pulse, long in zip(self.pulses, most, strict=True)
         )
 
     @property
     def shortest(self) -> bool:
-        """Whether a pulse is no longer than its channel has to be on."""
+        """True if a pulse is no longer than its channel has to be on."""
         least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
-        return any(0.0 < one.loaded[1] <= least.get(one.channel, 0.0) * (1.0 + 1e-9) for one in self.pulses)
+        return any(0.0 < pulse.loaded[1] <= least.get(pulse.channel, 0.0) * (1.0 + 1e-9) for pulse in self.pulses)
 
     @property
     def to_the_end(self) -> bool:
-        """Whether less than one nutation period is left of the horizon after the last pulse."""
+        """True if less than one nutation period is left of the horizon after the last pulse."""
         body = self.spacecraft
         return body.horizon - self.pulses.end < body.nutation_period
 
     @property
     def rounding(self) -> float:
-        """The most, rad, that starts and on-times half a tick off leave, to first order; 0 without ticks."""
+        """Largest effect, rad, of half a tick in starts and on-times, to first order; 0 without ticks."""
         return WORST * math.fsum(rounded_off(self.spacecraft, self.pulses))
 
     @property

@@ -1,13 +1,8 @@
-"""Robust plans: selection by the share of cases that comply, and on-times shortened to it.
-
-Robust planning: the plan that complies in most dispersed cases, instead of the best one for nominal values.
+"""Robust plans: selection by the share of complying cases, and on-times shortened to the required share.
 
 Candidates are the schedules of the schemes and variants of them: later starts, channels left unused, other alignments;
 and, where `optimal` is among the schemes, its earliest ends, for errors of the rates grow with time, and those that
-`chance_plan` makes for the dispersions.
-All of them fly the same draws through real widths, so that what is compared is the plans and not their luck.
-
-On-times of a robust plan shortened until just as many dispersed cases comply as must.
+`chance_plan` makes for the dispersions. All fly the same draws through real widths.
 """
 
 from __future__ import annotations
@@ -29,7 +24,7 @@ from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
-from nutdamp.planning.screening import AS_GOOD, Candidate, Cases, cases_of, entered, equal_from, fly_all
+from nutdamp.planning.screening import AS_GOOD, Cases, PlanCandidate, cases_of, entered, equal_from, fly_all
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -37,7 +32,7 @@ from nutdamp.spacecraft.requirements import SAME_COST
 from nutdamp.spacecraft.schedule import channel_pulse
 
 SHORTEST = 0.8
-"""Share of on-times that is left at least when they are shortened: together, and then each alone once more."""
+"""Least share of on-times when they are shortened: together, and then each alone once more."""
 
 HALVINGS, FINER = 7, 3
 """Steps in which all on-times are shortened together, and then each alone."""
@@ -47,13 +42,13 @@ FEW = 8
 
 
 def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
-    """The plan with on-times as short as `complies` lets them be; the same one where nothing is to be gained.
+    """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
 
     Plans on ticks, of command blocks, or with pulses of no channel stay as they are.
     """
-    channels = {one.name: one for one in plan.spacecraft.channels}
+    channels = {channel.name: channel for channel in plan.spacecraft.channels}
     fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks)
-    if fixed or any(one.channel not in channels or one.on_time == 0.0 for one in plan.pulses):
+    if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
     everywhere = list(range(len(plan.pulses)))
     best = _shortened(plan, everywhere, HALVINGS, complies)
@@ -63,7 +58,7 @@ def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
 
 
 def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[Plan], bool]) -> Plan:
-    """The pulses with the indices ``which`` shortened alike, by bisection."""
+    """Pulses with the indices ``which`` shortened alike, by bisection."""
     low, high, best = SHORTEST, 1.0, plan
     for _ in range(halvings):
         middle = 0.5 * (low + high)
@@ -76,17 +71,17 @@ def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[
 
 
 def _scaled(plan: Plan, which: list[int], share: float) -> Plan | None:
-    """The plan with some of its on-times at a ``share``; None where it breaks a limit or its requirement."""
+    """Plan with some of its on-times at a ``share``; None where it breaks a limit or its requirement."""
     body = plan.spacecraft
-    channels = {one.name: one for one in body.channels}
+    channels = {channel.name: channel for channel in body.channels}
     pulses = tuple(
-        channel_pulse(channels[one.channel], one.t, share * one.on_time) if index in which else one
-        for index, one in enumerate(plan.pulses)
+        channel_pulse(channels[pulse.channel], pulse.t, share * pulse.on_time) if index in which else pulse
+        for index, pulse in enumerate(plan.pulses)
     )
     with suppress(Infeasible):
-        made = planning.judged(body, plan.scheme, replace(plan.pulses, pulses=pulses), plan.options)
-        if made.feasible and made.meets_requirement is not False and keeps_limits(body, made.pulses):
-            return made
+        scaled = planning.judged(body, plan.scheme, replace(plan.pulses, pulses=pulses), plan.options)
+        if scaled.feasible and scaled.meets_requirement is not False and keeps_limits(body, scaled.pulses):
+            return scaled
     return None
 
 
@@ -107,19 +102,19 @@ CHECKED = 6
 
 
 class Fresh(NamedTuple):
-    """How a plan fares in ``cases`` of a seed of their own, with the 95 % ``interval`` of the share that complies."""
+    """Result in ``cases`` of a fresh seed, with the 95 % ``interval`` of the share that complies."""
 
     cases: Cases
     interval: tuple[float, float]
 
     @property
     def met(self) -> float:
-        """The share of the cases that complies."""
+        """Share of the cases that complies."""
         return self.cases.complying or 0.0
 
 
 class Cost(NamedTuple):
-    """What one plan takes more than another: propellant kg (None: unknown), impulse N m s, time s, nutation rad."""
+    """Extra cost of one plan over another: propellant kg (None: unknown), impulse N m s, time s, nutation rad."""
 
     propellant: float | None
     impulse: float
@@ -129,7 +124,7 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RobustComparison:
-    """Candidates from the best down; ``usual`` is what the comparison recommends, ``chosen`` the robust plan.
+    """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by
     propellant or by impulse. Each candidate flew ``samples`` cases of ``seed``. ``chance_plan``: with which tolerances
@@ -138,9 +133,9 @@ class RobustComparison:
     """
 
     comparison: Comparison
-    candidates: tuple[Candidate, ...]
-    usual: Candidate | None
-    chosen: Candidate | None
+    candidates: tuple[PlanCandidate, ...]
+    usual: PlanCandidate | None
+    chosen: PlanCandidate | None
     ground: Ground | None
     equals: int
     by_propellant: bool
@@ -152,7 +147,7 @@ class RobustComparison:
 
     @property
     def cost(self) -> Cost | None:
-        """What the robust plan takes more than the usual one; None where there is only one of them."""
+        """Extra cost of the robust plan over the usual one; None where there is only one of them."""
         if self.chosen is None or self.usual is None:
             return None
         more, less = self.chosen.plan.pulses, self.usual.plan.pulses
@@ -166,18 +161,18 @@ class RobustComparison:
 
     @property
     def meets_requirement(self) -> bool | None:
-        """Whether the robust plan meets it, in enough cases and with nominal values; None where nothing is required."""
+        """Compliance of the robust plan in enough cases and nominally; None where nothing is required."""
         return None if self.decision is None else self.decision.met
 
     @property
     def decision(self) -> Decision | None:
-        """The decision on the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any schedule."""
+        """Decision on the robust plan, by the cases that `nutdamp.montecarlo.study` draws for any schedule."""
         return None if self.chosen is None else Decision(self.chosen.plan, self.chosen.cases)
 
     @property
     def joined(self) -> Comparison:
-        """The comparison with the robust plan in it, under the name `ROBUST`, unless it is one of those compared."""
-        if self.chosen is None or any(_kind(one) == _kind(self.chosen.plan) for one in self.comparison.plans):
+        """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared."""
+        if self.chosen is None or any(_kind(plan) == _kind(self.chosen.plan) for plan in self.comparison.plans):
             return self.comparison
         plan = replace(self.chosen.plan, scheme=ROBUST)
         flown = None if self.comparison.flown is None else {**self.comparison.flown, plan: self.chosen}
@@ -192,35 +187,35 @@ class RobustComparison:
 
     @property
     def lucky(self) -> bool:
-        """Whether enough cases comply, but too few of those by which the plan was not chosen."""
+        """True if enough cases comply, but too few of those by which the plan was not chosen."""
         if self.fresh is None or self.chosen is None:
             return False
         return self.fresh.met < self.probability <= (self.chosen.met or 0.0)
 
     @property
     def met(self) -> float | None:
-        """The share of cases that comply with the robust plan."""
+        """Share of cases that comply with the robust plan."""
         return None if self.chosen is None else self.chosen.met
 
 
 Attempt = Callable[[], Iterable[tuple[str, Plan]]]
-"""Makes plans when it is called, each with what sets it apart from the one that its scheme makes."""
+"""Lazy generator of plans, each with the label of its variant."""
 
 
 def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
-    """What `compare` is to try: the plans compared, and variants of each."""
+    """Attempts of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    planned, found = list[Attempt](), list[Attempt]()
+    planned, varied = list[Attempt](), list[Attempt]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
         planned.append(partial(list, [("as planned", base)]))
-        found.append(partial(_alignments, body, base.scheme, options))
-        found += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
+        varied.append(partial(_alignments, body, base.scheme, options))
+        varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            found.append(partial(_early, body, options))
-            found.append(partial(chance_plan.plans, body, options))
-    return [*planned, *found]
+            varied.append(partial(_early, body, options))
+            varied.append(partial(chance_plan.plans, body, options))
+    return [*planned, *varied]
 
 
 def compare(
@@ -237,59 +232,59 @@ def compare(
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
-    found: dict[object, Candidate] = {}
+    entries: dict[object, PlanCandidate] = {}
     with work.budget("the robust plans", work.FRONTS):
         for number, trial in enumerate(trials):
             watch(number)
             for variant, plan in () if work.exhausted() else trial():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
-                if not plan.feasible or kind in found or not keeps_limits(body, plan.pulses):
+                if not plan.feasible or kind in entries or not keeps_limits(body, plan.pulses):
                     continue
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                    found[kind] = entered(own, variant, study_of(body, own.pulses), samples)
-    candidates = list(found.values())
-    usual = None if comparison.recommended is None else found.get(_kind(comparison.recommended))
-    always = [one for one in candidates if one is usual]
+                    entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
+    candidates = list(entries.values())
+    usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
+    always = [candidate for candidate in candidates if candidate is usual]
     fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
     ranks = ranked(comparison, candidates, samples, probability)
     return ranks if ranks.chosen is None else _trimmed(_checked(ranks, candidates))
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
-    """The comparison with the on-times of the robust plan as short as the share required allows, in new cases too."""
+    """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too."""
     chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
     if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
         return ranks
-    flown: dict[Plan, tuple[Candidate, Fresh]] = {}
+    flown: dict[Plan, tuple[PlanCandidate, Fresh]] = {}
 
     def complies(plan: Plan) -> bool:
         with suppress(Infeasible):
-            one = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
-            fly_all([one], samples, required)
-            fresh = _fresh(one, samples) if one.cases.decided and (one.met or 0.0) >= required else None
+            trimmed = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
+            fly_all([trimmed], samples, required)
+            fresh = _fresh(trimmed, samples) if trimmed.cases.decided and (trimmed.met or 0.0) >= required else None
             if fresh is not None and fresh.met >= required:
-                flown[plan] = one, fresh
+                flown[plan] = trimmed, fresh
         return plan in flown
 
     best = trimmed(chosen.plan, complies)
     if best is chosen.plan or best.pulses.cost > chosen.plan.pulses.cost * (1.0 - SAME_COST):
         return ranks
-    made, fresh = flown[best]
-    return replace(ranks, chosen=made, candidates=(made, *ranks.candidates), ground=Ground.COST, fresh=fresh)
+    robust, fresh = flown[best]
+    return replace(ranks, chosen=robust, candidates=(robust, *ranks.candidates), ground=Ground.COST, fresh=fresh)
 
 
-def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> RobustComparison:
-    """The comparison with the chosen plan in cases that are new to the choice, which takes luck for merit now and then.
+def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
+    """Comparison with the chosen plan in fresh cases, against selection by luck.
 
     A plan with which too few of them comply gives way to the next one with which enough seem to. Then, where too few
     comply all the same, with which tolerances enough would.
     """
     comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
-    refused: list[Candidate] = []
+    refused: list[PlanCandidate] = []
     while (chosen := ranks.chosen) is not None:
         ranks = replace(ranks, fresh=_fresh(chosen, samples))
         if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
@@ -301,48 +296,52 @@ def _checked(ranks: RobustComparison, candidates: Sequence[Candidate]) -> Robust
     return replace(ranks, tightening=tightening(chosen.plan, required))
 
 
-def _fresh(chosen: Candidate, samples: int) -> Fresh | None:
-    """The chosen plan in cases that are new to the choice; None where nothing is required of it."""
+def _fresh(chosen: PlanCandidate, samples: int) -> Fresh | None:
+    """Chosen plan in fresh cases; None where nothing is required of it."""
     if chosen.met is None:
         return None
     study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH)
     try:
-        found = run(Results(study, samples), threads=threads_here())
+        results = run(Results(study, samples), threads=threads_here())
     except Infeasible:  # a case among them takes too long to fly
         return None
-    return Fresh(cases_of(found), found.interval)
+    return Fresh(cases_of(results), results.interval)
 
 
 def ranked(
     comparison: Comparison,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[PlanCandidate],
     samples: int,
     probability: float,
     *,
-    refused: Sequence[Candidate] = (),
+    refused: Sequence[PlanCandidate] = (),
 ) -> RobustComparison:
-    """The comparison of candidates that have flown, and which of them to take.
+    """Comparison of flown candidates, and the choice.
 
     That is the cheapest of the equals; of those that cost the same the plan that the comparison recommends.
     With the ``refused`` ones too few of other cases comply: they are taken where there is no plan with which enough do.
     """
     recommended = None if comparison.recommended is None else _kind(comparison.recommended)
-    usual = next((one for one in candidates if _kind(one.plan) == recommended), None)
-    others = [one for one in candidates if one not in refused]
-    enough = any(one.met is not None and one.met >= probability for one in others)
+    usual = next((candidate for candidate in candidates if _kind(candidate.plan) == recommended), None)
+    others = [candidate for candidate in candidates if candidate not in refused]
+    enough = any(other.met is not None and other.met >= probability for other in others)
     equals = _equals(others if enough else candidates, samples, probability)
     chosen, ground = None, None
     if equals:
-        best, ground = cheapest([one.plan for one in equals], None if usual is None else usual.plan)
-        chosen = next(one for one in equals if one.plan is best)
+        best, ground = cheapest([equal.plan for equal in equals], None if usual is None else usual.plan)
+        chosen = next(equal for equal in equals if equal.plan is best)
     return RobustComparison(
         comparison,
-        tuple(sorted(candidates, key=lambda one: (one is not chosen, one.rank, one.plan.pulses.cost))),
+        tuple(
+            sorted(
+                candidates, key=lambda candidate: (candidate is not chosen, candidate.rank, candidate.plan.pulses.cost)
+            )
+        ),
         usual,
         chosen,
         ground,
         len(equals),
-        by_propellant([one.plan for one in equals]),
+        by_propellant([equal.plan for equal in equals]),
         probability,
         samples,
         SEED,
@@ -350,7 +349,7 @@ def ranked(
 
 
 def _kind(plan: Plan) -> object:
-    """What two plans share whose pulses are the same but for rounding."""
+    """Key shared by plans whose pulses are equal but for rounding."""
     return tuple(
         (pulse.channel, round(pulse.t, 6), round(pulse.on_time, 6), *np.round(pulse.impulse, 6).tolist())
         for pulse in plan.pulses
@@ -358,13 +357,13 @@ def _kind(plan: Plan) -> object:
 
 
 def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tuple[str, Plan]]:
-    """The plans by other alignments that a scheme weighs, named by their channels."""
+    """Plans by other alignments of a scheme, named by their channels."""
     for plan in planning.alternatives(body, scheme, options):
         yield " then ".join(dict.fromkeys(pulse.channel for pulse in plan.pulses)), plan
 
 
 def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
-    """Spacecraft for which the scheme plans in another way: later, or without one of the channels that it fires."""
+    """Spacecraft for which the scheme plans differently: later, or without one of its channels."""
     for periods in LATER:
         earliest = body.limits.earliest + periods * body.nutation_period
         if earliest < body.horizon:
@@ -376,7 +375,7 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 
 def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
-    """The earliest end that `optimal` finds, and its cheapest plans that end little later."""
+    """Earliest end of `optimal`, and its cheapest plans that end little later."""
     first = attempt(body, chance_plan.SCHEME, Options(**{**options.chosen, "least": "time"}))
     if not first.feasible:
         return
@@ -392,16 +391,16 @@ def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> l
     return [(variant, attempt(body, scheme, options))]
 
 
-def _equals(candidates: Sequence[Candidate], samples: int, probability: float) -> list[Candidate]:
-    """The candidates that comply as often as is required; without any those that are as good as the best.
+def _equals(candidates: Sequence[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
+    """Candidates that comply as often as required; without any those as good as the best.
 
     But for what the sampling may make of them.
     """
-    enough = [one for one in candidates if one.met is not None and one.met >= probability]
+    enough = [candidate for candidate in candidates if candidate.met is not None and candidate.met >= probability]
     if enough or not candidates:
         return enough
-    best = min(candidates, key=lambda one: one.rank)
+    best = min(candidates, key=lambda candidate: candidate.rank)
     if best.met is None:
-        return [one for one in candidates if one.rank <= AS_GOOD * best.rank]
+        return [candidate for candidate in candidates if candidate.rank <= AS_GOOD * best.rank]
     low = equal_from(best.met, samples)
-    return [one for one in candidates if one.met is not None and one.met >= low]
+    return [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]

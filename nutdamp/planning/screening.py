@@ -1,8 +1,8 @@
-"""Flying many plans in dispersed cases: a few of all, all for those alone that can still be chosen after a few.
+"""Sequential screening: many plans in dispersed cases, few of all, all of those that may be chosen after a few.
 
-All plans fly the same draws, the first cases first. What part of all cases complies is bounded by an exact interval
-about what the first ones show (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that
-could not be chosen even at the favourable end of its interval is flown no further.
+All plans fly the same draws, the first cases first. The complying share of all cases is bounded by an exact interval
+from the first ones (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that could not be
+chosen even at the favourable end of its interval is flown no further.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from nutdamp.spacecraft.model import required_share
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 
 STAGES = (2_048, 8_192)
-"""Cases after which it is looked whether a plan can still be chosen."""
+"""Numbers of cases after which plans are screened."""
 
 CERTAIN = 1.0 - 1e-6
 """Confidence of the intervals by which plans are left out."""
 
 LIKELIER = 0.01
-"""Where too few cases comply with each plan: the share by which more must, perhaps, for a plan to be flown further."""
+"""Least possible gain in the complying share for a plan to be flown further, where too few cases comply with each."""
 
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
@@ -39,7 +39,7 @@ AS_GOOD = 1.05
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """How one schedule fares in ``samples`` of the ``requested`` dispersed cases of ``seed``.
+    """Result of one schedule in ``samples`` of the ``requested`` dispersed cases of ``seed``.
 
     ``complying``: the share that keeps every part of the requirement, None where nothing is required;
     ``probability``: the share that must. ``levels``: what that share of the cases does not exceed, rad, by part; the
@@ -55,17 +55,17 @@ class Cases:
 
     @property
     def decided(self) -> bool:
-        """Whether all cases have flown."""
+        """True if all cases have flown."""
         return self.samples >= self.requested
 
     @property
     def met(self) -> bool | None:
-        """Whether as many of those flown comply as must; None where nothing is required."""
+        """Compliance of enough of the flown cases; None where nothing is required."""
         return None if self.complying is None else self.complying >= self.probability
 
 
 def cases_of(results: Results, requested: int | None = None) -> Cases:
-    """What a study says of its schedule; ``requested``: cases to come in all, default those of the ``results``."""
+    """Result of a study; ``requested``: number of cases in all, default those of the ``results``."""
     probability, levels = results.probability, {}
     for part in (Part.NUTATION, requirements.aim(results.study.model.spacecraft)):
         distribution = results.distribution(part.value)
@@ -76,13 +76,13 @@ def cases_of(results: Results, requested: int | None = None) -> Cases:
 
 
 def equal_from(share: float, samples: int) -> float:
-    """The least share of ``samples`` cases that is equal to a ``share`` of them but for the sampling error."""
+    """Least share of ``samples`` cases equal to a ``share`` of them but for the sampling error."""
     return binomial_interval(round(share * samples), samples, CONFIDENCE)[0]
 
 
 @dataclass(eq=False)
-class Candidate:
-    """A plan and how it fares in the dispersed cases of its ``results``.
+class PlanCandidate:
+    """Plan and its dispersed ``results``.
 
     ``variant`` says how it differs from what its scheme plans. Of all cases the share that complies lies between
     ``low`` and ``high``; these are None where nothing is required.
@@ -102,42 +102,42 @@ class Candidate:
 
     @property
     def off(self) -> float:
-        """How far H ends from where it shall, rad, not exceeded in the share of cases required."""
+        """Distance of H from its goal, rad, not exceeded in the required share of cases."""
         return self.cases.levels[requirements.aim(self.plan.spacecraft)]
 
     @property
     def met(self) -> float | None:
-        """The share that complies; None where nothing is required."""
+        """Complying share; None where nothing is required."""
         return self.cases.complying
 
     @property
     def share(self) -> Share | None:
-        """The share of all cases; None where nothing is required."""
+        """Share of all cases; None where nothing is required."""
         if self.low is None or self.high is None:
             return None
         return Share(self.low, self.high, self.cases.probability)
 
     @property
     def left(self) -> float:
-        """What it leaves, rad: nutation, or the distance from a target axis where that is more."""
+        """Residual, rad: nutation, or the distance from a target axis where that is larger."""
         return float(requirements.missed(self.plan.spacecraft, self.nutation, self.off))
 
     @property
     def nominal(self) -> float | None:
-        """The same for nominal values, rad."""
+        """Residual with nominal values, rad."""
         body, flown = self.plan.spacecraft, self.plan.flown
         return None if flown is None else float(requirements.missed(body, flown.nutation, flown.axis_error))
 
     @property
     def rank(self) -> float:
-        """What candidates are ranked by, the least first: the share that does not comply, or what is left."""
+        """Rank, the least first: the share that does not comply, or the residual."""
         return self.left if self.met is None else 1.0 - self.met
 
 
-def entered(plan: Plan, variant: str, study: Study, samples: int) -> Candidate:
+def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    made = Candidate(plan, variant, cases_of(results, samples), results)
+    made = PlanCandidate(plan, variant, cases_of(results, samples), results)
     _bound(made, samples)
     return made
 
@@ -149,7 +149,7 @@ def _run(results: Results) -> Results:
 
 
 def affordable(study: Study, samples: int) -> bool:
-    """Whether the budget of work that is open is enough for so many cases, which are flown at once."""
+    """True if the open budget of work suffices for so many cases, which are flown at once."""
     return study.flies.effort * samples <= work.left()
 
 
@@ -157,13 +157,13 @@ def fly_compared(
     plans: Sequence[Plan],
     samples: int,
     choose: Callable[[Mapping[Plan, Share]], Plan | None],
-) -> dict[Plan, Candidate]:
-    """Fly so many of the ``samples`` cases with each plan that it is known whether enough comply.
+) -> dict[Plan, PlanCandidate]:
+    """Fly as many of the ``samples`` cases of each plan as decide on its compliance.
 
     All of them with the plan that `choose` takes by the shares. Plans with a case that cannot be flown are left out.
     Ends where the budget of work does.
     """
-    flown: dict[Plan, Candidate] = {}
+    flown: dict[Plan, PlanCandidate] = {}
     for plan in plans:
         study = study_of(plan.spacecraft, plan.pulses)
         if affordable(study, min(STAGES[0], samples)):
@@ -185,16 +185,16 @@ def fly_compared(
 
 def _undecided(
     plans: Sequence[Plan],
-    flown: Mapping[Plan, Candidate],
+    flown: Mapping[Plan, PlanCandidate],
     samples: int,
     choose: Callable[[Mapping[Plan, Share]], Plan | None],
-) -> Candidate | None:
-    """The next candidate to fly further; None where all is decided."""
+) -> PlanCandidate | None:
+    """Next candidate to fly further; None where all is decided."""
     shares = shares_of(plans, flown)
-    ahead = [one for one in flown.values() if one.cases.samples < samples]
-    for one in ahead:
-        if shares and shares[one.plan].met is None:
-            return one
+    ahead = [candidate for candidate in flown.values() if candidate.cases.samples < samples]
+    for value in ahead:
+        if shares and shares[value.plan].met is None:
+            return value
     chosen = choose(shares)
     if chosen is None or chosen not in flown:
         return None
@@ -202,47 +202,51 @@ def _undecided(
         return flown[chosen]
     if not shares or shares[chosen].met:
         return None
-    return next((one for one in ahead if shares[one.plan].high >= shares[chosen].low + LIKELIER), None)
+    return next(
+        (candidate for candidate in ahead if shares[candidate.plan].high >= shares[chosen].low + LIKELIER), None
+    )
 
 
-def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, Candidate]) -> dict[Plan, Share]:
-    """The share of cases that comply with each plan, from none to all where they have not flown.
+def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dict[Plan, Share]:
+    """Complying share of each plan, from none to all where cases have not flown.
 
     Nothing where nothing is required.
     """
     if not plans or not requirements.judged(plans[0].spacecraft):
         return {}
     unknown = Share(0.0, 1.0, required_share(plans[0].spacecraft.requirement))
-    return {one: (flown[one].share or unknown) if one in flown else unknown for one in plans}
+    return {plan: (flown[plan].share or unknown) if plan in flown else unknown for plan in plans}
 
 
-def _bound(one: Candidate, samples: int) -> None:
-    if one.met is not None:
-        known = one.cases.samples >= samples
-        count = round(one.met * one.cases.samples)
-        one.low, one.high = (one.met, one.met) if known else binomial_interval(count, one.cases.samples, CERTAIN)
+def _bound(candidate: PlanCandidate, samples: int) -> None:
+    if candidate.met is not None:
+        known = candidate.cases.samples >= samples
+        count = round(candidate.met * candidate.cases.samples)
+        candidate.low, candidate.high = (
+            (candidate.met, candidate.met) if known else binomial_interval(count, candidate.cases.samples, CERTAIN)
+        )
 
 
 def _stage(done: int, samples: int) -> int:
-    """Cases after which it is looked next whether a plan can still be chosen."""
+    """Number of cases after which to screen next."""
     return next((count for count in STAGES if done < count < samples), samples)
 
 
-def _further(one: Candidate, samples: int) -> None:
+def _further(candidate: PlanCandidate, samples: int) -> None:
     """Fly the cases of the next stage."""
-    assert one.results is not None
-    stage = _stage(one.cases.samples, samples)
+    assert candidate.results is not None
+    stage = _stage(candidate.cases.samples, samples)
     exact = stage <= EXACT_CASES  # beyond, cases are counted and not kept: from the first one on
-    one.results = _run(one.results.extended(stage) if exact else Results(one.results.study, stage))
-    one.cases = cases_of(one.results, samples)
-    _bound(one, samples)
+    candidate.results = _run(candidate.results.extended(stage) if exact else Results(candidate.results.study, stage))
+    candidate.cases = cases_of(candidate.results, samples)
+    _bound(candidate, samples)
 
 
 def fly_all(
-    candidates: list[Candidate],
+    candidates: list[PlanCandidate],
     samples: int,
     probability: float,
-    always: Sequence[Candidate] = (),
+    always: Sequence[PlanCandidate] = (),
     watch: Callable[[], None] = lambda: None,
 ) -> None:
     """Fly all ``samples`` cases of those that may be chosen, and of ``always``; ``watch`` is called after each step.
@@ -252,11 +256,13 @@ def fly_all(
     leave the ``candidates``.
     """
     while candidates:
-        some = [one for one in always if one in candidates] + _hopeful(candidates, samples, probability)
-        some = [one for one in some if one.cases.samples < samples]
+        some = [candidate for candidate in always if candidate in candidates] + _hopeful(
+            candidates, samples, probability
+        )
+        some = [candidate for candidate in some if candidate.cases.samples < samples]
         if not some:
             return
-        first = min(some, key=lambda one: (one not in always, *_promise(one, probability)))
+        first = min(some, key=lambda candidate: (candidate not in always, *_promise(candidate, probability)))
         try:
             _further(first, samples)
         except Infeasible:
@@ -264,41 +270,43 @@ def fly_all(
         watch()
 
 
-def _promise(one: Candidate, probability: float) -> tuple[bool, float]:
-    """What the next to be flown is least in."""
-    may = one.high is not None and one.high >= probability
-    return not may, one.plan.pulses.cost if may else one.rank
+def _promise(candidate: PlanCandidate, probability: float) -> tuple[bool, float]:
+    """Sort key of the next candidate to fly."""
+    may = candidate.high is not None and candidate.high >= probability
+    return not may, candidate.plan.pulses.cost if may else candidate.rank
 
 
-def _hopeful(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
-    """Those that may be chosen by what is known of all."""
-    if any(one.low is None for one in candidates):
+def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
+    """Candidates that may still be chosen."""
+    if any(candidate.low is None for candidate in candidates):
         return _as_near(candidates, samples, probability)
-    bounds = [(one, one.low or 0.0, one.high or 0.0) for one in candidates]
-    sure = [one.plan.pulses.cost for one, low, _ in bounds if low >= probability]
+    bounds = [(candidate, candidate.low or 0.0, candidate.high or 0.0) for candidate in candidates]
+    sure = [candidate.plan.pulses.cost for candidate, low, _ in bounds if low >= probability]
     if sure:
-        comparable = len({one.plan.pulses.propellant is None for one in candidates}) == 1
+        comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
         most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
-        return [one for one, _, high in bounds if high >= probability and one.plan.pulses.cost <= most]
+        return [
+            candidate for candidate, _, high in bounds if high >= probability and candidate.plan.pulses.cost <= most
+        ]
     least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
-    return [one for one, _, high in bounds if high >= least]
+    return [candidate for candidate, _, high in bounds if high >= least]
 
 
-def _as_near(candidates: list[Candidate], samples: int, probability: float) -> list[Candidate]:
-    """Where nothing is required: those that may leave as little as the best of those that have flown all cases."""
-    ranks = [one.rank for one in candidates if one.cases.samples >= samples]
+def _as_near(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
+    """Candidates that may leave as little as the best complete one, where nothing is required."""
+    ranks = [candidate.rank for candidate in candidates if candidate.cases.samples >= samples]
     if not ranks:
         return candidates
     most = AS_GOOD * min(ranks)
-    return [one for one in candidates if _share_within(one, most) >= probability]
+    return [candidate for candidate in candidates if _share_within(candidate, most) >= probability]
 
 
-def _share_within(one: Candidate, most: float) -> float:
-    """The largest share of all cases that may leave at most ``most`` rad."""
-    body = one.plan.spacecraft
-    if one.results is None or one.results.values is None:
+def _share_within(candidate: PlanCandidate, most: float) -> float:
+    """Largest share of all cases that may leave at most ``most`` rad."""
+    body = candidate.plan.spacecraft
+    if candidate.results is None or candidate.results.values is None:
         return 1.0
     parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, requirements.aim(body)]
-    rows = one.results.values[[OUTPUTS.index(part.value) for part in parts], : one.results.done]
+    rows = candidate.results.values[[OUTPUTS.index(part.value) for part in parts], : candidate.results.done]
     count = min(int(np.count_nonzero(row <= most)) for row in rows)
-    return binomial_interval(count, one.results.done, CERTAIN)[1]
+    return binomial_interval(count, candidate.results.done, CERTAIN)[1]

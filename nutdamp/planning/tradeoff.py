@@ -1,12 +1,8 @@
-"""Pareto fronts, optimality certificates.
+"""Pareto fronts of cost and time by the scheme optimal, and certificates of least cost.
 
-What time costs: schedules of the scheme optimal from the shortest that is found to the longest that still saves.
-
-The proof of a least cost, to be checked by others: the prices of a program of small angles, and its primer curve.
-
-q(t) of a channel is what a second of it is worth at t by the prices, over what it costs. Where q exceeds one nowhere,
-no schedule costs less than what the prices are worth at the goal (weak duality; Lawden 1963, the primer vector); the
-program fires where q is one.
+A certificate holds the prices of a program of small angles, and its primer curve q(t) of each channel: the worth of a
+second by the prices, over its cost. Where q exceeds one nowhere, no schedule costs less than the worth of the goal
+(weak duality; Lawden 1963, the primer vector); the program fires where q is one.
 """
 
 from __future__ import annotations
@@ -40,7 +36,7 @@ from nutdamp.spacecraft.schedule import Bounds
 SCHEME = "optimal"
 
 ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
-"""What the equations are about."""
+"""Subjects of the equations."""
 
 SAME = 1e-9
 """Relative difference up to which a bound is that of the plan."""
@@ -54,7 +50,7 @@ MOST_LOOKS = 6_000
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """The ``proof`` of what a plan of optimal costs at least, by a ``program`` of small angles and its ``burns``.
+    """Proof of a lower cost bound for a plan of optimal, by a ``program`` of small angles and its ``burns``.
 
     ``problem`` has the unit of the cost; its spacecraft is the symmetric body that the scheme plans on.
     """
@@ -67,17 +63,17 @@ class Certificate:
 
     @property
     def bound(self) -> float:
-        """The least cost that is proved."""
+        """Proved lower bound of the cost."""
         return self.proof.bound
 
     @property
     def rows(self) -> list[str]:
-        """What each equation is about, see `ROWS`."""
+        """Subject of each equation, see `ROWS`."""
         return [ROWS[row] for row in self.problem.equations.chosen]
 
     @property
     def windows(self) -> list[tuple[float, float]]:
-        """When pulses may be on, (begin, end) s."""
+        """Windows for pulses, (begin, end) s."""
         return free_windows(self.spacecraft, self.program.end)
 
     def primer(self, times: Vector) -> Vector:
@@ -86,18 +82,18 @@ class Certificate:
 
     @property
     def spacecraft(self) -> Spacecraft:
-        """The symmetric body that the program is of."""
+        """Symmetric body of the program."""
         return self.program.spacecraft
 
     @property
     def last(self) -> float:
-        """Moment, s, from which what a pulse does to decaying nutation counts in full; 0 where it grows or stays."""
+        """Time, s, from which pulses count in full against decaying nutation; 0 where it grows or stays."""
         return growth_from(self.spacecraft)
 
     @property
     def cost(self) -> float:
         """Cost of the burns."""
-        price = dict(zip((one.name for one in self.program.channels), self.program.costs.tolist(), strict=True))
+        price = dict(zip((channel.name for channel in self.program.channels), self.program.costs.tolist(), strict=True))
         return math.fsum(price[burn.channel.name] * burn.on_time for burn in self.burns)
 
     def moments(self) -> list[Vector]:
@@ -110,7 +106,7 @@ class Certificate:
 
 
 def certificate(plan: Plan) -> Certificate:
-    """The certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
+    """Certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
     known = plan.pulses.bounds
     if plan.scheme != SCHEME:
         raise BadRequest(f"a certificate is of a plan of {SCHEME}, not of {plan.scheme}")
@@ -135,7 +131,7 @@ def certificate(plan: Plan) -> Certificate:
 
 
 class Point(NamedTuple):
-    """One schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) it was looked for within.
+    """Schedule of a front: a ``plan`` that ends in time, and the ``horizon`` (s) of its search.
 
     Its cost is counted in ``unit`` (kg or N m s), for all points alike.
     """
@@ -146,12 +142,12 @@ class Point(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """What the schedule costs, in its unit."""
+        """Cost of the schedule, in its unit."""
         return self.plan.pulses.cost_in(self.unit)
 
     @property
     def bounds(self) -> Bounds:
-        """What other schedules within the same horizon must cost; of another scheme than optimal not known."""
+        """Lower bounds on other schedules within the same horizon; unknown for schemes other than optimal."""
         return self.plan.pulses.bounds or Bounds(None, None, self.unit, self.horizon)
 
 
@@ -167,11 +163,13 @@ class Front:
     why: str | None = None
 
     def least(self, point: Point) -> float | None:
-        """The first-order least of a ``point`` of it; no more than those of points that have less time."""
-        found, within = point.bounds.first_order, point.bounds.within
-        known = [one.bounds for one in self.points if one.bounds.within <= within]
+        """First-order lower bound for a ``point``; no more than those of points that have less time."""
+        first, within = point.bounds.first_order, point.bounds.within
+        known = [point.bounds for point in self.points if point.bounds.within <= within]
         return (
-            None if found is None else min([found, *(one.first_order for one in known if one.first_order is not None)])
+            None
+            if first is None
+            else min([first, *(bounds.first_order for bounds in known if bounds.first_order is not None)])
         )
 
 
@@ -183,7 +181,7 @@ def fronts(
     shifts: Sequence[float],
     progress: Callable[[int], None] = lambda _: None,
 ) -> tuple[Front, ...]:
-    """One front for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
+    """Fronts for each of the ``shifts`` (rad, infinite for any), of at most ``count`` searches each.
 
     What is traded is propellant, with ``options.least`` of impulse that (then pulses do not tell their propellant).
     Whichever search found it, a schedule counts for every front whose shift it keeps. Where the scheme optimal finds
@@ -194,87 +192,87 @@ def fronts(
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
     ordered = sorted(set(shifts))
-    found: list[tuple[float, Plan, float]] = []
+    entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
     with work.budget("the fronts", work.FRONTS) as spent:
         searches = _Searches(count * len(ordered), spent, progress)
         for number, shift in enumerate(ordered, start=1):
-            made = _searched(spacecraft, _allowing(options, shift), count, searches)
-            if isinstance(made, str):
-                why[shift] = made
+            searched = _searched(spacecraft, _allowing(options, shift), count, searches)
+            if isinstance(searched, str):
+                why[shift] = searched
             else:
-                found += [(shift, *one) for one in made]
+                entries += [(shift, *entry) for entry in searched]
             searches.done = count * number
     others = _others(spacecraft, options) if why else []
-    unit = "N m s" if options.least == "impulse" else _unit([*(one for _, one, _ in found), *others])
+    unit = "N m s" if options.least == "impulse" else _unit([*(plan for _, plan, _ in entries), *others])
     result: list[Front] = []
-    made_for = [(kept, Point(one, horizon, unit)) for kept, one, horizon in found]
+    made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
     for shift in ordered:
         own = [point for kept, point in made_for if kept <= shift]
         others_too = [
             point
             for kept, point in made_for
-            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, one) for one in own))
+            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, rival) for rival in own))
         ]
         points = [*own, *others_too]
         if not points:
-            points = [Point(one, spacecraft.horizon, unit) for one in others if _keeps(one, shift)]
+            points = [Point(plan, spacecraft.horizon, unit) for plan in others if _keeps(plan, shift)]
         kept = undominated(points, result[-1].points if result else ())
         result.append(Front(shift, kept, why.get(shift) if _by_others(kept) else None))
     return tuple(result)
 
 
 def _unit(plans: Sequence[Plan]) -> str:
-    """The one in which the costs of all of them, and their bounds, are known."""
-    bounds = [one.pulses.bounds for one in plans if one.pulses.bounds is not None]
-    return "kg" if by_propellant(plans) and all(one.unit == "kg" for one in bounds) else "N m s"
+    """Unit in which all costs and bounds are known."""
+    bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
+    return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
 
 
 def _by_others(points: Sequence[Point]) -> bool:
-    """Whether no point is of the scheme optimal."""
+    """True if no point is of the scheme optimal."""
     return all(point.plan.scheme != OPTIMAL.name for point in points)
 
 
-def _keeps(one: Plan, shift: float) -> bool:
-    """Whether H ends no farther from its target than ``shift`` rad."""
-    return one.flight.residual.axis_error <= shift + LEFT
+def _keeps(plan: Plan, shift: float) -> bool:
+    """True if H ends no farther from its target than ``shift`` rad."""
+    return plan.flight.residual.axis_error <= shift + LEFT
 
 
 def _serves(point: Point, instead_of: Point) -> bool:
-    """Whether a schedule costs as little, ends as soon and leaves H as near: on ticks none leaves it just there."""
+    """True if a schedule costs as little, ends as soon and leaves H as near: ticks prevent exact ends."""
     one, other = point.plan, instead_of.plan
     as_near = one.flight.residual.axis_error <= other.flight.residual.axis_error
     return as_near and one.pulses.end <= other.pulses.end and point.cost <= instead_of.cost
 
 
 def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
-    """What the other schemes of the usual comparison plan, where that complies but for where H ends."""
+    """Plans of the other usual schemes that comply but for the end of H."""
     names = [name for name in usual(spacecraft) if name != OPTIMAL.name]
     plans = compare(spacecraft, names, Options(with_disturbances=options.with_disturbances))
     ends = {Part.SHIFT, Part.DISTANCE}
-    return [one for one in plans if len(one.pulses) and {bound.part for bound in one.shortfalls} <= ends]
+    return [plan for plan in plans if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
 
 
 @dataclass(eq=False)
 class _Searches:
-    """The searches of all fronts, within their ``budget``.
+    """Searches of all fronts, within their ``budget``.
 
     The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may; of
     what they leave, all searches to come have equal shares.
     """
 
     count: int
-    budget: work.Budget
+    budget: work.WorkBudget
     progress: Callable[[int], None]
     done: int = 0
 
     def __call__(self, spacecraft: Spacecraft, options: OptimalOptions) -> Plan:
         left = self.budget.most - self.budget.done
         with work.budget("a point", left if options.least == "time" else left / (self.count - self.done)):
-            found = plan(spacecraft, OPTIMAL.name, options)
+            planned = plan(spacecraft, OPTIMAL.name, options)
         self.done += 1
         self.progress(self.done)
-        return found
+        return planned
 
 
 def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
@@ -285,26 +283,26 @@ def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
 def _searched(
     spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
 ) -> list[tuple[Plan, float]] | str:
-    """The schedule of the whole horizon, the fastest, and those of horizons between their ends, evenly by their ratios.
+    """Schedules of the whole horizon, the fastest, and of horizons between, evenly by their ratios.
 
     Each with its horizon, s; or why there is none.
     """
     whole = searches(spacecraft, options)
     if whole.schedule is None or whole.schedule.bounds is None:
         return infeasibility(whole) or "there is nothing to do"
-    found = [(whole, spacecraft.horizon)]
+    entries = [(whole, spacecraft.horizon)]
     fastest = searches(spacecraft, replace(options, least="time")) if count > 1 else whole
     if fastest.schedule is None or not len(fastest.schedule):
-        return found
-    found.append((fastest, spacecraft.horizon))
+        return entries
+    entries.append((fastest, spacecraft.horizon))
     begin, end, last = spacecraft.limits.earliest, fastest.pulses.end, max(whole.pulses.end, fastest.pulses.end)
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        made = searches(body, options)
-        if made.schedule is not None and made.schedule.bounds is not None:
-            found.append((made, horizon))
-    return found
+        planned = searches(body, options)
+        if planned.schedule is not None and planned.schedule.bounds is not None:
+            entries.append((planned, horizon))
+    return entries
 
 
 def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tuple[Point, ...]:
@@ -314,14 +312,14 @@ def undominated(points: Sequence[Point], stricter: Sequence[Point] = ()) -> tupl
     """
     given = {id(point.plan) for point in stricter}
     kept: list[Point] = []
-    for point in sorted(points, key=lambda one: (one.plan.pulses.end, one.cost)):
+    for point in sorted(points, key=lambda point: (point.plan.pulses.end, point.cost)):
         saved = 0.0 if id(point.plan) in given else SAME_COST
         if not kept or point.cost < kept[-1].cost * (1.0 - saved):
             kept.append(point)
     return tuple(kept)
 
 
-def numbered(found: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
+def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
     """All points of all fronts, numbered from 1."""
-    pairs = ((front, point) for front in found for point in front.points)
+    pairs = ((front, point) for front in all_fronts for point in front.points)
     return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))

@@ -1,13 +1,9 @@
-"""What a command block does, closed form; Sun pulses of a flight.
-
-What blocks of pulses fired from the Sun pulse do, in closed form, for very many blocks at once.
+"""Closed-form model of command blocks fired from the Sun pulse, and Sun pulses of a flight.
 
 H follows a rhumb line about the Sun (`precession`), and the nutation is the impulse sum (17) over pulses at even
-times. Commands count by the impulse, the centroid and the spread of the thrust that they give; cold nozzles and falling
-pressure by the impulse of each pulse, but for the nutation, which takes the mean pressure along a block. What is left
-out: that the nutation jitters the Sun pulses, and what is of second order in the turn by one pulse.
-
-Sun pulses of the nutating body, and firing blocks of pulses from them.
+times, for very many blocks at once. Commands count by the impulse, the centroid and the spread of their thrust; cold
+nozzles and falling pressure by the impulse of each pulse, but for the nutation, which takes the mean pressure along a
+block. Neglected are the jitter of the Sun pulses by nutation, and second order in the turn by one pulse.
 """
 
 from __future__ import annotations
@@ -27,8 +23,8 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import Flight, make_dynamics, shed
 from nutdamp.flight.propellant import Supply
 from nutdamp.physics import attitude, precession
-from nutdamp.physics.batch import Bodies, Stretch
-from nutdamp.physics.sky import Push, SunClock
+from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics.sky import SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Valve, spread
 from nutdamp.spacecraft.equipment import Block, Channel, SunSensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -42,7 +38,7 @@ ITERATIONS = 60
 """Steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual."""
 
 EXACT = 1e-13
-"""Share of a spin turn to which it is found."""
+"""Tolerance of the time of a Sun pulse, in spin turns."""
 
 BLIND = 32
 """Spin turns in a row without a Sun pulse, after which none is waited for."""
@@ -62,7 +58,7 @@ def spin_turn(spacecraft: Spacecraft) -> float:
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
-    """The times (n,) s from 0 to ``until`` s of the Sun pulses that the sensor gives; the flight must reach so far.
+    """Times (n,) s from 0 to ``until`` s of the Sun pulses of the sensor; the flight must reach so far.
 
     Raises Infeasible where the sensor never sees the Sun.
     """
@@ -74,18 +70,18 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
-    found = times[index] + ahead[index] * turn / (2.0 * math.pi)
+    times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
     for _ in range(ITERATIONS):
-        off = (to_sun_pulse(flown, np.minimum(found, until)) + math.pi) % (2.0 * math.pi) - math.pi
-        found += off * turn / (2.0 * math.pi)
-        if not len(found) or np.abs(off).max() < 2.0 * math.pi * EXACT:
+        off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
+        times_of += off * turn / (2.0 * math.pi)
+        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
-    found = found[(found >= 0.0) & (found <= until)]
-    angles = attitude.angle_between(flown.axis(found), body.sun)
+    times_of = times_of[(times_of >= 0.0) & (times_of <= until)]
+    angles = attitude.angle_between(flown.axis(times_of), body.sun)
     seen = np.array([sensor.sees(angle) for angle in angles.tolist()], dtype=bool)
-    if len(found) and not seen.any():
-        _expect_seen(sensor, float(found[0]), float(angles[0]))
-    return np.asarray(found[seen])
+    if len(times_of) and not seen.any():
+        _expect_seen(sensor, float(times_of[0]), float(angles[0]))
+    return np.asarray(times_of[seen])
 
 
 def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
@@ -98,7 +94,7 @@ def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
 
 
 def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
-    """By what angle (n,) in [0, 2π) the body has to turn until the Sun passes the sensor."""
+    """Angle (n,) in [0, 2π) by which the body has to turn until the Sun passes the sensor."""
     body = flown.spacecraft
     assert body.sun_sensor is not None
     assert body.sun is not None
@@ -109,7 +105,7 @@ def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
 
 
 class SunPulses:
-    """The Sun pulses of a spacecraft as its sensor gives them, one after the other.
+    """Sun pulses of a spacecraft as its sensor gives them, one after the other.
 
     ``seen``: whether the sensor saw each passage of the Sun through its azimuth so far; those that it saw count. Raises
     Infeasible where there is no Sun or no sensor.
@@ -120,67 +116,67 @@ class SunPulses:
         assert spacecraft.sun_sensor is not None
         self._sensor = spacecraft.sun_sensor
 
-    def next(self, number: int) -> Stretch:
-        """The motion as the Sun pulse of this ``number`` comes, 1 the first after t = 0; none goes back.
+    def next(self, number: int) -> MotionStretch:
+        """Motion at the Sun pulse of this ``number``, 1 the first after t = 0; numbers must not decrease.
 
         Raises Infeasible where there is none: the axis is too near to the Sun, or the sensor sees it no more.
         """
-        found, sensor = self.clock.here, self._sensor
+        motion, sensor = self.clock.here, self._sensor
         if sensor.sees_all:
             before = float(self.clock.time[0])
             self.seen += [True] * (number - len(self.seen))
-            found = self.clock.sun_pulse(number)
+            motion = self.clock.sun_pulse(number)
             self._expect_found(before)
-            return found
+            return motion
         unseen: list[tuple[float, float]] = []
         while self._count < number:
             before = float(self.clock.time[0])
-            found = self.clock.sun_pulse(len(self.seen) + 1)
+            motion = self.clock.sun_pulse(len(self.seen) + 1)
             self._expect_found(before)
-            angle = float(self.clock.angle(found)[0])
+            angle = float(self.clock.angle(motion)[0])
             self.seen.append(bool(sensor.sees(angle)))
             self._count += self.seen[-1]
-            unseen = [] if self.seen[-1] else [*unseen, (float(found.since[0]), angle)]
+            unseen = [] if self.seen[-1] else [*unseen, (float(motion.since[0]), angle)]
             if len(unseen) > BLIND:
                 _expect_seen(sensor, *unseen[0])
-        return found
+        return motion
 
     def _expect_found(self, before: float) -> None:
         if self.clock.lost[0]:
             raise Infeasible(f"no Sun pulse comes after {max(before, 0.0):.4g} s: the spin axis is too near to the Sun")
 
 
-def sun_clock(spacecraft: Spacecraft) -> SunClock:
-    """The Sun pulses of a spacecraft from t = 0; raises Infeasible where it has none."""
+def sun_clock(spacecraft: Spacecraft) -> SunPulseClock:
+    """Sun pulses of a spacecraft from t = 0; raises Infeasible where it has none."""
     sensor, sun = spacecraft.sun_sensor, spacecraft.sun
     if sensor is None or sun is None:
         raise Infeasible("there is no Sun pulse; the file needs sun and sun_sensor")
     dynamics, start = make_dynamics(spacecraft), spacecraft.initial
     bodies = Bodies(np.array(dynamics.moments)[:, None], dynamics.constant, dynamics.forcing)
-    state = Stretch(bodies, np.zeros(1), start.rates[:, None], start.quaternion[:, None])
-    return SunClock(state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
+    state = MotionStretch(bodies, np.zeros(1), start.rates[:, None], start.quaternion[:, None])
+    return SunPulseClock(state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
 
 
-def pushes(pulse: Pulse, torque: Vector) -> list[Push]:
-    """The torques of a pulse, from when its command begins, that has the ``torque`` (3, n) N m of cases."""
+def pushes(pulse: Pulse, torque: Vector) -> list[TorqueRamp]:
+    """Torques of a pulse, from the start of its command, with the ``torque`` (3, n) N m of cases."""
     if pulse.command is None:
-        return [Push(0.0, pulse.on_time, torque, torque)]
+        return [TorqueRamp(0.0, pulse.on_time, torque, torque)]
     back, ramps = pulse.command.start, pulse.command.ramps
-    return [Push(one.begin - back, one.end - back, torque * one.first, torque * one.last) for one in ramps]
+    return [TorqueRamp(ramp.begin - back, ramp.end - back, torque * ramp.first, torque * ramp.last) for ramp in ramps]
 
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
-    """When the first Sun pulse comes, s; raises Infeasible where there is none."""
+    """Time of the first Sun pulse, s; raises Infeasible where there is none."""
     return float(SunPulses(spacecraft).next(1).since[0])
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
-    """The pulses that ``blocks`` fire, see `fire`."""
+    """Pulses fired by ``blocks``, see `fire`."""
     return fire(spacecraft, blocks, seed)[0]
 
 
 def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> tuple[Schedule, list[bool]]:
-    """The pulses that ``blocks`` fire, with the Sun pulses of the motion that they make, and `SunPulses.seen`.
+    """Pulses fired by ``blocks``, with the Sun pulses of their own motion, and `SunPulses.seen`.
 
     With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. Raises Infeasible
     where there is no Sun pulse, where a channel is not known, where a pulse would begin before the one before is over,
@@ -197,15 +193,15 @@ def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = Non
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
         for number in block.sun_pulses:
             work.spend(FIRED if spacecraft.inertia.symmetric and not spacecraft.disturbances else INTEGRATED)
-            found, over = sun_pulses.next(number), clock.over[0]
-            delay = found.since * 0.0 + jitter * errors.standard_normal() + block.delay
-            due = float(found.since[0] + delay[0])
+            motion, over = sun_pulses.next(number), clock.over[0]
+            delay = motion.since * 0.0 + jitter * errors.standard_normal() + block.delay
+            due = float(motion.since[0] + delay[0])
             if due < over - 1e-9:
                 raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
             given = supply.fire(on_command(channel, 0.0, block.width), channel)
             sheds = None if per_kg is None else (per_kg * (given.propellant or 0.0))[:, None]
             torque = np.zeros(3) if given.torque is None else given.torque
-            start = float(clock.fire(found, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
+            start = float(clock.fire(motion, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
             pulses.append(given.moved(start))
     supply.expect_to_last()
     return Schedule(tuple(pulses), blocks=tuple(blocks)), sun_pulses.seen
@@ -240,11 +236,11 @@ class Acts(NamedTuple):
 
 
 def acts(channel: Channel, widths: Any) -> Acts:
-    """What commands of ``widths`` s of a channel give."""
+    """Response to commands of ``widths`` s of a channel."""
     if channel.valve is None:
         return Acts(widths, 0.5 * widths, widths, widths)
-    found, index = np.unique(widths, return_inverse=True)
-    rows = np.array([_acts(channel.valve, width) for width in found.tolist()])
+    distinct, index = np.unique(widths, return_inverse=True)
+    rows = np.array([_acts(channel.valve, width) for width in distinct.tolist()])
     return Acts(*(row[index].reshape(np.shape(widths)) for row in rows.T))
 
 
@@ -255,14 +251,14 @@ def _acts(valve: Valve, width: float) -> Acts:
 
 
 def evenly(values: Any, most: int) -> Any:
-    """At most so many of the ``values``, evenly."""
+    """At most ``most`` of the ``values``, evenly."""
     index = np.unique(np.linspace(0, len(values) - 1, min(most, len(values))).round().astype(int))
     return np.asarray(values[index])
 
 
 @dataclass(frozen=True)
-class State:
-    """The motion between two blocks: one, or many at once.
+class BlockState:
+    """Motion between two blocks: one, or many at once.
 
     ``sun_angle`` and ``longitude`` of H about the Sun, rad; ``sun_pulse``: when the next one comes, s; ``phasor``:
     A ω (N m s) at that moment; ``spin`` rad/s; ``used`` kg of propellant, 0 where every pulse is of full thrust;
@@ -278,23 +274,23 @@ class State:
     cost: Any = 0.0
     fired: Mapping[str, Any] = field(default_factory=Counter)
 
-    def shifted(self, off: State) -> State:
-        """The same, with H, the nutation and the spin ``off`` by so much."""
+    def shifted(self, off: BlockState) -> BlockState:
+        """Copy with H, the nutation and the spin ``off`` by so much."""
         here = replace(self, sun_angle=self.sun_angle + off.sun_angle, longitude=self.longitude + off.longitude)
         return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
 
-    def at(self, index: tuple[Any, ...], shape: tuple[int, ...]) -> State:
-        """That of one of many, which have a ``shape``."""
+    def at(self, index: tuple[Any, ...], shape: tuple[int, ...]) -> BlockState:
+        """State at one index of many, which have a ``shape``."""
 
         def one(value: Any) -> Any:
             return np.broadcast_to(value, shape)[index]
 
         parts = {part.name: one(getattr(self, part.name)) for part in fields(self) if part.name != "fired"}
-        return State(**parts, fired={name: int(one(count)) for name, count in self.fired.items()})
+        return BlockState(**parts, fired={name: int(one(count)) for name, count in self.fired.items()})
 
 
 class BlockModel:
-    """The closed form of one spacecraft, and what of its motion it is judged by."""
+    """Closed form of one spacecraft, with the bounds by which its motion is judged."""
 
     def __init__(self, spacecraft: Spacecraft) -> None:
         sun, sensor = spacecraft.sun, spacecraft.sun_sensor
@@ -312,7 +308,7 @@ class BlockModel:
         self.rate, supply = self.inertia.body_rate, Supply(spacecraft)
         first = first_sun_pulse(spacecraft)
         rate = self.rate * spacecraft.spin
-        self.start = State(
+        self.start = BlockState(
             sun_angle=math.atan2(sine, float(sun @ start)),
             longitude=0.0,
             phasor=self.inertia.A * complex(*spacecraft.omega0[:2].tolist()) * cmath.exp(-1j * rate * first),
@@ -326,13 +322,13 @@ class BlockModel:
         self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
-        """By how much one pulse turns H, rad."""
+        """Turn of H by one pulse, rad."""
         given = acts(channel, width)
         momentum = self.inertia.C * abs(spin)
         return precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
 
-    def full_pulses(self, state: State, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
-        """How many pulses of full thrust blocks from ``state`` are worth, and the propellant used after them, kg."""
+    def full_pulses(self, state: BlockState, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
+        """Equivalent number of full pulses of blocks from ``state``, and the propellant used after them, kg."""
         if self.steady:
             return count, state.used
         on_times, index = np.unique(acts(channel, width).on_time, return_inverse=True)
@@ -347,15 +343,15 @@ class BlockModel:
         full, spent = self._tables[key]
         return full[at], spent[at]
 
-    def pulses(self, state: State, channel: Channel, widths: Any, full: Any, most: int) -> Any:
-        """Numbers of pulses, nearly whole and about ``most`` at most, that are worth so many ``full`` ones."""
+    def pulses(self, state: BlockState, channel: Channel, widths: Any, full: Any, most: int) -> Any:
+        """Numbers of pulses, nearly whole and about ``most`` at most, that are equivalent to ``full`` full ones."""
         needed = full
         for _ in range(0 if self.steady else INVERTED):
             count = np.rint(needed).clip(1, most).astype(int)
             needed = full + count - self.full_pulses(state, channel, widths, count)[0]
         return needed
 
-    def kicks(self, state: State, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
+    def kicks(self, state: BlockState, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
         """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step}; ``back``: the last
         has none, those before it e^{-i step} each.
         """
@@ -369,8 +365,8 @@ class BlockModel:
             cold = cold * np.exp(-1j * (trial.count - 1) * step)
         return acts(channel, trial.width).on_time * mean * (total - cold)
 
-    def _cold(self, state: State, channel: Channel, trial: Trial, step: Any) -> Any:
-        """What the sum of e^{ik step} lacks by cold pulses: a geometric series, as the factor of the k-th decays."""
+    def _cold(self, state: BlockState, channel: Channel, trial: Trial, step: Any) -> Any:
+        """Deficit of the sum of e^{ik step} by cold pulses: a geometric series, as the factor of the k-th decays."""
         cold = self.body.cold
         if cold is None:
             return 0.0
@@ -390,12 +386,12 @@ class BlockModel:
         return self.sense * (from_sun - math.pi)
 
     def delay(self, channel: Channel, heading: Any, width: Any) -> Any:
-        """The delay in [0, one spin turn) s that gives a ``heading``: the inverse of `heading`."""
+        """Delay in [0, one spin turn) s that gives a ``heading``: the inverse of `heading`."""
         azimuth = self.sense * heading + math.pi - cmath.phase(channel.transverse) + self.sensor.azimuth
         return (azimuth / self.body.spin - acts(channel, width).centroid) % (2.0 * math.pi / abs(self.body.spin))
 
-    def damping_delay(self, state: State, channel: Channel, trial: Trial) -> Any:
-        """The first delay, s, at which blocks take most of the nutation; ``trial.delay`` is not looked at.
+    def damping_delay(self, state: BlockState, channel: Channel, trial: Trial) -> Any:
+        """First delay, s, at which blocks take most of the nutation; ``trial.delay`` is not used.
 
         The kicks of the block, each carried to the first one, add up to a phasor; ω must then point against it.
         """
@@ -408,18 +404,18 @@ class BlockModel:
             else 0.0 * to_go
         )
 
-    def course(self, state: State) -> tuple[Any, Any]:
+    def course(self, state: BlockState) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""
         goal_angle = math.atan2(math.hypot(self.goal[0], self.goal[1]), self.goal[2])
         return precession.rhumb_course(state.sun_angle, goal_angle, self.ahead(state))
 
-    def ahead(self, state: State) -> Any:
-        """By how much the target axis is ahead of H about the Sun the shorter way round, rad, -π to π."""
+    def ahead(self, state: BlockState) -> Any:
+        """Angle of the target axis ahead of H about the Sun the shorter way round, rad, -π to π."""
         goal_longitude = math.atan2(self.goal[1], self.goal[0])
         return (goal_longitude - state.longitude + math.pi) % (2.0 * math.pi) - math.pi
 
-    def after(self, state: State, channel: Channel, trial: Trial) -> State:
-        """The motion after blocks of a ``channel`` from ``state``."""
+    def after(self, state: BlockState, channel: Channel, trial: Trial) -> BlockState:
+        """Motion after blocks of a ``channel`` from ``state``."""
         given = acts(channel, trial.width)
         full, used = self.full_pulses(state, channel, trial.width, trial.count)
         gained = channel.axial * given.on_time / self.inertia.C
@@ -437,7 +433,7 @@ class BlockModel:
         since_last = turn - trial.delay - given.centroid
         kicks = self.kicks(state, channel, trial, rate * interval, back=True)
         gathered = kick * np.exp(-1j * rate * since_last) * kicks
-        return State(
+        return BlockState(
             sun_angle=rhumb.sun_angle,
             longitude=state.longitude + rhumb.longitude,
             phasor=state.phasor * np.exp(-1j * rate * (following - state.sun_pulse)) + gathered,
@@ -448,12 +444,12 @@ class BlockModel:
             fired={**state.fired, channel.name: state.fired.get(channel.name, 0) + trial.count},
         )
 
-    def apart(self, state: State, flown: Flight) -> State:
-        """By how much the motion as it was ``flown`` is off ``state``, to be added to the states of other blocks."""
+    def apart(self, state: BlockState, flown: Flight) -> BlockState:
+        """Difference of the motion as ``flown`` from ``state``, to be added to the states of other blocks."""
         end, rate = flown.settled, self.rate * flown.settled.spin
         axis = self._frame @ flown.final.momentum
         since = float(state.sun_pulse) - flown.schedule.end
-        return State(
+        return BlockState(
             sun_angle=math.atan2(math.hypot(axis[0], axis[1]), axis[2]) - state.sun_angle,
             longitude=(math.atan2(axis[1], axis[0]) - state.longitude + math.pi) % (2.0 * math.pi) - math.pi,
             phasor=self.inertia.A * end.omega * cmath.exp(-1j * rate * since) - state.phasor,
@@ -461,8 +457,8 @@ class BlockModel:
             spin=end.spin - state.spin,
         )
 
-    def left(self, state: State) -> Left:
-        """What of it is left, as `compliance` takes it."""
+    def left(self, state: BlockState) -> Left:
+        """Residual for `requirements`."""
         across = np.sin(state.sun_angle)
         axis = np.stack(
             np.broadcast_arrays(

@@ -21,7 +21,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_model import BlockModel, State, Trial, acts, evenly, fired
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fired
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
@@ -86,7 +86,7 @@ LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
 
 
-class Found(NamedTuple):
+class BlockSequence(NamedTuple):
     """Blocks, the motion after them in closed form, and how good that is: the less, the better.
 
     ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
@@ -94,17 +94,17 @@ class Found(NamedTuple):
     """
 
     blocks: tuple[Block, ...]
-    state: State
+    state: BlockState
     rank: tuple[float, float, float]
     share: float = math.inf
 
 
-class Flown(NamedTuple):
+class FlownSequence(NamedTuple):
     """What was found, flown: how good it is, those that break a limit last, then the earlier end, and its pulses."""
 
     rank: tuple[bool, float, float, float]
     made: Schedule
-    found: Found
+    found: BlockSequence
 
 
 class BlockSearch:
@@ -116,8 +116,8 @@ class BlockSearch:
         self.bounds = [self._lowered(bound) for bound in requirements.bounds(spacecraft)]
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
-        self._flights: dict[tuple[Block, ...], Flown] = {}
-        self.doubtful: list[Found] = []  # those that may comply in a flight, the cheapest first
+        self._flights: dict[tuple[Block, ...], FlownSequence] = {}
+        self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
         self.pause = math.ceil(limits.gap / self.model.turn)
@@ -131,11 +131,11 @@ class BlockSearch:
             return bound
         return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
-    def best(self, most: int) -> list[Found]:
+    def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
-        start = Found((), self.model.start, (math.inf, math.inf, math.inf))
+        start = BlockSequence((), self.model.start, (math.inf, math.inf, math.inf))
         found = self._single(start)
-        firsts: list[Found] = []
+        firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
             self.most = self.least_cost(found)
             if work.exhausted() or (self.most < math.inf and not self.small):
@@ -163,7 +163,7 @@ class BlockSearch:
         more = {one.blocks: one for one in (*of_each_kind(ranked)[:FLOWN], *gentle) if one.blocks not in first}
         return [*first.values(), *islice(more.values(), 2 * FLOWN)]
 
-    def least_cost(self, sequences: Iterable[Found]) -> float:
+    def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
         complying = {sequence.blocks: sequence for sequence in sequences if sequence.rank[0] <= 0.0}
         cheapest = sorted(complying.values(), key=lambda sequence: sequence.rank)
@@ -175,15 +175,19 @@ class BlockSearch:
                     return sequence.rank[1]
         return math.inf
 
-    def _largest_pulse(self, found: Found) -> float:
+    def _largest_pulse(self, found: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
         named = {one.name: one for one in self.channels}
         spin = self.body.spin
         return max(float(self.model.turned_by(named[one.channel], one.width, spin)) for one in found.blocks)
 
     def behind(
-        self, before: Found, trials: Iterator[tuple[Channel, Trial]], few: int = FLOWN, off: State | None = None
-    ) -> Iterator[Found]:
+        self,
+        before: BlockSequence,
+        trials: Iterator[tuple[Channel, Trial]],
+        few: int = FLOWN,
+        off: BlockState | None = None,
+    ) -> Iterator[BlockSequence]:
         """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``.
 
         ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
@@ -216,7 +220,7 @@ class BlockSearch:
                     block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, interval)
                     here = state.at(at, shape)
                     rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
-                    yield Found((*before.blocks, block), here, rank, float(severity.ravel()[index]))
+                    yield BlockSequence((*before.blocks, block), here, rank, float(severity.ravel()[index]))
 
     def share(self, bound: requirements.Bound, left: requirements.Left) -> Array:
         """Share of a ``bound`` that is ``left``: 1 or less keeps it."""
@@ -226,14 +230,14 @@ class BlockSearch:
         """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
-    def _counts(self, start: State, every: int) -> NDArray[np.int64]:
+    def _counts(self, start: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
         if not self._spaced(every):
             return np.arange(0)
         return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
 
-    def _single(self, start: Found) -> list[Found]:
+    def _single(self, start: BlockSequence) -> list[BlockSequence]:
         """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
 
         What surely ends worse than the best ones found is left out: see `_short_by`.
@@ -257,7 +261,7 @@ class BlockSearch:
                 return found
             within = min(enough, 10.0 * within, most)
 
-    def _short_by(self, state: State, channel: Channel, every: int) -> Array:
+    def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
         """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
 
         Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
@@ -279,7 +283,7 @@ class BlockSearch:
         length = full * self.model.turned_by(channel, widths, self.body.spin)
         return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
 
-    def _chosen(self, state: State, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
+    def _chosen(self, state: BlockState, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
         """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
         if len(index):
             widths = commandable_widths(self.commands, channel)[index[:, 0]]
@@ -287,7 +291,7 @@ class BlockSearch:
             for wait in self._waits(state, self.earliest, WAITS if abs(state.phasor) > 0.0 else 1):
                 yield self._at_delays(state, channel, wait, widths, counts, every)
 
-    def _rest(self, before: Found) -> Iterator[tuple[Channel, Trial]]:
+    def _rest(self, before: BlockSequence) -> Iterator[tuple[Channel, Trial]]:
         """Blocks that go the rest of the way, or take the nutation that is left."""
         state, least = before.state, self.pause if before.blocks else self.earliest
         if self.small:
@@ -310,7 +314,7 @@ class BlockSearch:
                 for wait in self._waits(state, least, LATER_WAITS):
                     yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
 
-    def _parts(self, start: Found) -> Iterator[Found]:
+    def _parts(self, start: BlockSequence) -> Iterator[BlockSequence]:
         """First blocks that go a part of the way to the target."""
         heading, way = self.model.course(start.state)
         every = next((one for one in self.commands.every if self._spaced(one)), None)
@@ -345,7 +349,7 @@ class BlockSearch:
     def _all_counts(self) -> NDArray[np.int64]:
         return np.arange(1, min(self.commands.max_count, self.allowed) + 1)
 
-    def _grid(self, state: State, least: int) -> Iterator[tuple[Channel, Trial]]:
+    def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """All blocks of each channel, from ``least`` Sun pulses on: by wait, delay, width and number of pulses."""
         waits = np.array(self._waits(state, least, LATER_WAITS))[:, None, None, None]
         for channel in self.channels:
@@ -356,24 +360,24 @@ class BlockSearch:
             for every in filter(self._spaced, self.commands.every):
                 yield channel, Trial(wait, delay, width, count, every)
 
-    def _all_firsts(self, start: Found) -> list[Found]:
+    def _all_firsts(self, start: BlockSequence) -> list[BlockSequence]:
         """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
         found = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
         return sorted(found, key=lambda one: one.rank[1])[:ALL_FIRSTS]
 
-    def _waits(self, state: State, least: int, few: int) -> list[int]:
+    def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
         after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
-    def _longer_round(self, before: State, after: State) -> NDArray[np.bool_]:
+    def _longer_round(self, before: BlockState, after: BlockState) -> NDArray[np.bool_]:
         """Whether H has gone round the Sun the longer way to the target, or once more: far for a few degrees."""
         if self.body.goal.axis is None:
             return np.zeros((), dtype=bool)
         return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
 
-    def _dark(self, state: State, channel: Channel, trial: Trial, after: State) -> NDArray[np.bool_]:
+    def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
         """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
         found = np.zeros(shape, dtype=bool)
@@ -392,7 +396,7 @@ class BlockSearch:
         return found
 
     def _at_delays(
-        self, state: State, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
+        self, state: BlockState, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
     ) -> Trial:
         """The blocks at the delays that serve the heading best, and at those that serve the nutation best."""
         widths, counts = np.broadcast_arrays(widths, counts)
@@ -418,7 +422,7 @@ class BlockSearch:
         most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
-    def flown(self, found: Found) -> Flown:
+    def flown(self, found: BlockSequence) -> FlownSequence:
         """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
         if found.blocks in self._flights:
             return self._flights[found.blocks]
@@ -427,10 +431,10 @@ class BlockSearch:
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
         rank = not keeps_limits(self.body, made), missed, made.cost, made.end
-        self._flights[found.blocks] = Flown(rank, made, found)
+        self._flights[found.blocks] = FlownSequence(rank, made, found)
         return self._flights[found.blocks]
 
-    def doubted(self, flights: list[Flown]) -> None:
+    def doubted(self, flights: list[FlownSequence]) -> None:
         """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
         best = min((one.rank for one in flights if not one.rank[0]), default=None)
         most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
@@ -444,12 +448,12 @@ class BlockSearch:
                 if flights[-1].rank[:2] == (False, 0.0):
                     return
 
-    def nearer(self, flights: Sequence[Flown]) -> list[Found]:
+    def nearer(self, flights: Sequence[FlownSequence]) -> list[BlockSequence]:
         """Neighbours of the best of ``flights`` that leave least where the closed form errs as it does for those.
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
-        named, found = {one.name: one for one in self.channels}, list[Found]()
+        named, found = {one.name: one for one in self.channels}, list[BlockSequence]()
         made = {one.found.blocks: one for one in sorted(flights, key=lambda one: one.rank)}
         best = of_each_kind([one.found for one in made.values()])
         for one in (made[each.blocks] for each in best[:CORRECTED]):
@@ -459,7 +463,7 @@ class BlockSearch:
                 trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
                 state = self.model.after(state, named[block.channel], trial)
                 number = block.first + (block.count - 1) * block.every + 1
-            before = Found(tuple(earlier), state, (math.inf, math.inf, math.inf))
+            before = BlockSequence(tuple(earlier), state, (math.inf, math.inf, math.inf))
             off = self.model.apart(one.found.state, propagation.flown(self.body, one.made))
             trials = iter([(channel, self._around(before, channel, last, number))])
             found += self.behind(before, trials, off=off)
@@ -468,13 +472,13 @@ class BlockSearch:
         chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
         return [self._in_form(one) for one in {one.blocks: one for one in chosen}.values()]
 
-    def _in_form(self, found: Found) -> Found:
+    def _in_form(self, found: BlockSequence) -> BlockSequence:
         """The same, ranked by the closed form alone."""
         left = self.model.left(found.state)
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         return found._replace(rank=(share if share > 1.0 else 0.0, *found.rank[1:]), share=share)
 
-    def _around(self, before: Found, channel: Channel, last: Block, number: int) -> Trial:
+    def _around(self, before: BlockSequence, channel: Channel, last: Block, number: int) -> Trial:
         """Blocks about as long and as late as the ``last`` one, from the Sun pulse of that ``number`` on."""
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
@@ -492,17 +496,17 @@ class BlockSearch:
         return Trial(wait, delay, width, count, last.every)
 
 
-def of_each_kind(ranked: Iterable[Found]) -> list[Found]:
+def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
     """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
-    kinds: dict[tuple[tuple[str, int], ...], Found] = {}
+    kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
     for one in ranked:
         kinds.setdefault(tuple((block.channel, block.every) for block in one.blocks), one)
     return list(kinds.values())
 
 
-def _promising(found: Iterable[Found], most: int) -> list[Found]:
+def _promising(found: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
     """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
-    ranked, front = sorted(found, key=lambda one: one.rank), list[Found]()
+    ranked, front = sorted(found, key=lambda one: one.rank), list[BlockSequence]()
     for one in ranked:
         if not front or one.rank[1] < front[-1].rank[1]:
             front.append(one)

@@ -1,10 +1,7 @@
-"""The schemes by name, what each can do, and its options.
+"""Catalogue of the schemes: names, properties, options.
 
-What may be chosen of each scheme: one frozen class a scheme, checked when it is made.
-
-The command line makes its options, their help and their headings from the fields.
-
-The schemes there are, and what each can do. Loads none of them: the command line needs the names alone.
+Options are one frozen class a scheme, checked on creation; the command line makes its options, their help and their
+headings from the fields. No scheme is loaded: the command line needs the names alone.
 """
 
 from __future__ import annotations
@@ -18,12 +15,12 @@ from nutdamp.errors import BadRequest, SenselessOption
 from nutdamp.units import as_given, is_count, is_number
 
 LEAST = ("propellant", "impulse", "time", "pulses")
-"""What the scheme optimal can save."""
+"""Quantities that the scheme optimal can minimise."""
 
 
 @dataclass(frozen=True)
-class Kind:
-    """What values an option takes: ``expected`` in words, and ``unit`` (a dimension of `units`) of a quantity."""
+class OptionKind:
+    """Kind of the values of an option: ``expected`` in words, and ``unit`` (a dimension of `units`) of a quantity."""
 
     expected: str
     unit: str | None = None
@@ -32,7 +29,7 @@ class Kind:
     none: bool = True
 
     def takes(self, value: Any) -> bool:
-        """Whether a value makes sense."""
+        """True if a value is valid."""
         if value is None:
             return self.none
         if self.names:
@@ -43,23 +40,23 @@ class Kind:
 
     @property
     def flag(self) -> bool:
-        """Whether it is on or off."""
+        """True for an on/off option."""
         return not (self.names or self.unit or self.least)
 
 
-FLAG = Kind("True or False", none=False)
-COUNT = Kind("a whole number of at least 1", least=1)
-TIME = Kind("a time above zero, in s", "time")
-ANGLE = Kind("an angle of at least 0, in rad", "angle")
+FLAG = OptionKind("True or False", none=False)
+COUNT = OptionKind("a whole number of at least 1", least=1)
+TIME = OptionKind("a time above zero, in s", "time")
+ANGLE = OptionKind("an angle of at least 0, in rad", "angle")
 
 
-def _option(default: Any, kind: Kind, text: str) -> Any:
+def _option(default: Any, kind: OptionKind, text: str) -> Any:
     return dataclasses.field(default=default, metadata={"kind": kind, "help": text})
 
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeOptions:
-    """What may be chosen of every scheme. Raises SenselessOption for a value that makes no sense."""
+    """Options of every scheme. Raises SenselessOption for an invalid value."""
 
     with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
 
@@ -70,102 +67,102 @@ class SchemeOptions:
                 raise SenselessOption(field.name, as_given(value), f"expected {kind.expected}")
 
     def settled(self, *, keeps_axis: bool) -> Self:  # noqa: ARG002 - what some schemes go by
-        """The same with what the spacecraft decides: ``keeps_axis``, whether something is asked of where H ends."""
+        """Copy with the defaults of the spacecraft: ``keeps_axis``, whether something is asked of where H ends."""
         return self
 
     @property
     def uncorrected(self) -> bool:
-        """Whether the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
+        """True if the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
         return False
 
     @property
     def frees_axis(self) -> bool:
-        """Whether H may end anywhere."""
+        """True if H may end anywhere."""
         return False
 
     @property
     def equal(self) -> bool:
-        """Whether the pulses are of one size, which whoever corrects them keeps."""
+        """True if the pulses are of one size, which corrections keep."""
         return False
 
     @property
     def resizable(self) -> bool:
-        """Whether pulses may be made longer or shorter by whoever corrects them."""
+        """True if corrections may change the length of pulses."""
         return True
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoPulseOptions(SchemeOptions):
-    """What may be chosen of two-pulse."""
+    """Options of two-pulse."""
 
     literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.")
 
     @property
     def uncorrected(self) -> bool:
-        """As printed."""
+        """True as printed."""
         return self.literal
 
 
 @dataclass(frozen=True, kw_only=True)
 class FourPulseOptions(SchemeOptions):
-    """What may be chosen of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
+    """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
     coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.")
 
     @property
     def uncorrected(self) -> bool:
-        """Only full pulses."""
+        """True for full pulses only."""
         return self.coarse
 
 
 @dataclass(frozen=True, kw_only=True)
 class HalfConeOptions(SchemeOptions):
-    """What may be chosen of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
+    """Options of half-cone; ``cones`` None: the fewest that are nearly cheapest."""
 
     cones: int | None = _option(None, COUNT, "Half cones; default: until one more saves less than 1 %.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class CommandBlockOptions(SchemeOptions):
-    """What may be chosen of command-block; ``max_blocks`` None: three, of which as few are used as will do."""
+    """Options of command-block; ``max_blocks`` None: three, of which as few are used as suffice."""
 
     max_blocks: int | None = _option(None, COUNT, "Largest number of command blocks; default 3.")
 
     @property
     def uncorrected(self) -> bool:
-        """What is commanded is what is fired."""
+        """Always True: commands are not corrected."""
         return True
 
 
 @dataclass(frozen=True, kw_only=True)
 class RhumbLineOptions(SchemeOptions):
-    """What may be chosen of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
+    """Options of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
 
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
 
     @property
     def equal(self) -> bool:
-        """The width is one command."""
+        """Always True: the width is one command."""
         return True
 
     @property
     def resizable(self) -> bool:
-        """Not where a length was requested."""
+        """False where a length was requested."""
         return self.on_time is None
 
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
-    """What may be chosen of optimal; ``shift`` rad, how far from its target H may end.
+    """Options of optimal; ``shift`` rad, how far from its target H may end.
 
     ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
     """
 
     least: str = _option(
         LEAST[0],
-        Kind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
+        OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
         "What to save; impulse if propellant is unknown.",
     )
     free_axis: bool | None = _option(
@@ -181,11 +178,11 @@ class OptimalOptions(SchemeOptions):
 
     @property
     def frees_axis(self) -> bool:
-        """Whether H may end anywhere."""
+        """True if H may end anywhere."""
         return bool(self.free_axis)
 
     def settled(self, *, keeps_axis: bool) -> Self:
-        """Whether H is free, where that was not said; no ``shift`` at all is none."""
+        """Copy with the default freedom of H; no ``shift`` at all is none."""
         if self.shift is not None:
             return dataclasses.replace(self, free_axis=False, shift=self.shift or None)
         return self if self.free_axis is not None else dataclasses.replace(self, free_axis=not keeps_axis)
@@ -220,13 +217,13 @@ class Options:
             self.of(kind)
 
     def of(self, kind: type[Chosen]) -> Chosen:
-        """Those of one scheme."""
+        """Options of one scheme."""
         names = names_of(kind)
         return kind(**{name: value for name, value in self.chosen.items() if name in names})
 
     @property
     def with_disturbances(self) -> bool:
-        """Whether all of them plan with the disturbances of the file."""
+        """True if all of them plan with the disturbances of the file."""
         return self.of(SchemeOptions).with_disturbances
 
     def without_effect(self, kinds: list[type[SchemeOptions]]) -> Iterator[str]:
@@ -322,8 +319,8 @@ NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
 COMPARED = (*CLASSIC, OPTIMAL.name)
-"""What is planned where none is named and there is no target."""
-POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda one: one.slow) if scheme.points)
+"""Default schemes without a target."""
+POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
 """In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)

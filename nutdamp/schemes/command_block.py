@@ -14,7 +14,7 @@ from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.flight.propagation import shed
 from nutdamp.schemes.block_model import BlockModel, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockSearch, Flown
+from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockSearch, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
@@ -27,7 +27,7 @@ ANY = "finer steps of delay and width in commands, or a longer limits.horizon"
 """What may help where nothing is known to hinder."""
 
 
-def scope_note(search: BlockSearch, chosen: Flown, *, first: bool) -> str:
+def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> str:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
     form, flown = search.model.left(chosen.found.state), left_by(propagation.flown(search.body, chosen.made))
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
@@ -52,7 +52,7 @@ def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
     )
 
 
-def cures(search: BlockSearch, chosen: Flown, most: int) -> str:
+def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> str:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
     left = left_by(propagation.flown(search.body, chosen.made))
     missed = {bound.part: bound.most for bound in search.bounds if float(search.share(bound, left)) > 1.0}
@@ -126,7 +126,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = BlockSearch(spacecraft, channels, commands)
-    flights: list[Flown] = []
+    flights: list[FlownSequence] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
@@ -151,7 +151,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     return replace(chosen.made, notes=tuple(notes))
 
 
-def _cheapest(flights: Sequence[Flown]) -> Flown:
+def _cheapest(flights: Sequence[FlownSequence]) -> FlownSequence:
     """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
     best = min(flights, key=lambda one: one.rank)
     broken, missed, cost, _ = best.rank

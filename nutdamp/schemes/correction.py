@@ -1,13 +1,8 @@
-"""Schedules corrected by least squares on the flown motion, whole or stage by stage.
+"""Correction of schedules by least squares on the flown motion, whole or stage by stage.
 
-Correct a schedule on the flown motion: adjust moments, on-times and directions until nothing is left.
-
-A damped Gauss-Newton iteration with bounds for a handful of unknowns. scipy.optimize would do it too, but loading it
-takes longer than a whole plan.
-
-A schedule laid stage by stage along the flown motion: what the schemes that point the spin axis share.
-
-Taking the nutation out before H is turned: at a moment at which the spin axis, where H goes, is near the target.
+Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a handful of unknowns.
+scipy.optimize would do it too, but loading it takes longer than a whole plan. Schemes that point the spin axis lay
+their schedules stage by stage along the flown motion, after damping at a time at which H ends near the target.
 """
 
 from __future__ import annotations
@@ -44,7 +39,7 @@ ALIKE = 1e-9
 STEPS = 30
 
 INTEGRATED = 50_000
-"""Steps of integration after which a correction is left as it is: some seconds."""
+"""Steps of integration after which a correction stops: some seconds."""
 
 PROGRESS = 0.01
 """Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
@@ -60,7 +55,7 @@ BEFORE, AFTER = 12, 24
 """Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
 
 CLEARLY = 0.5
-"""A later or dearer candidate is taken only if it leaves less than this share of what an earlier one leaves."""
+"""Largest residual, over that of an earlier candidate, with which a later or dearer one is taken."""
 
 EXACT = 1e-11
 """rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
@@ -77,24 +72,24 @@ def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
-    """Of schedules with what they leave (rad), the preferred first, the one to take; and the first that breaks a limit.
+    """Choice among schedules with residuals (rad), the preferred first; and the first that breaks a limit.
 
     The first that is exact is taken, else the first that none behind it beats clearly.
     """
     best: tuple[float, Schedule] | None = None
     broken: Schedule | None = None
-    for made, left in tried:
-        if not keeps_limits(spacecraft, made.pulses):
-            broken = broken or made
+    for schedule, left in tried:
+        if not keeps_limits(spacecraft, schedule.pulses):
+            broken = broken or schedule
         elif best is None or left < CLEARLY * best[0]:
-            best = left, made
+            best = left, schedule
             if left <= EXACT:
                 break
     return None if best is None else best[1], broken
 
 
 def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
-    """What the flown schedule leaves, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+    """Residual of the flown schedule, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
 
     The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
@@ -103,7 +98,7 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
-    """`misses` of a flight; ``spin`` adds a fifth, by how much of itself the final spin of the goal is missed."""
+    """`misses` of a flight; ``spin`` adds a fifth, the relative error of the final spin."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
     moments = np.asarray(flight_.last_moments)
     body = flight_.settled.rates * moments
@@ -116,7 +111,7 @@ def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
 
 
 def _across(axis: Vector, vector: Vector) -> Vector:
-    """The two components of ``vector`` square to the unit vector ``axis``."""
+    """Components of ``vector`` perpendicular to the unit vector ``axis``."""
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(axis, other)
     first /= float(np.linalg.norm(first))
@@ -125,7 +120,7 @@ def _across(axis: Vector, vector: Vector) -> Vector:
 
 def correct(
     spacecraft: Spacecraft,
-    made: Schedule,
+    schedule: Schedule,
     *,
     chosen: Sequence[int],
     momentum: bool,
@@ -133,35 +128,35 @@ def correct(
     equal: bool = False,
     resizable: bool = True,
 ) -> Schedule:
-    """``made`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
+    """``schedule`` with the ``chosen`` pulses corrected on the flown motion of ``spacecraft``, if that leaves less.
 
     Starts, on-times within their bounds, and directions of steerable pulses are free. Of ``equal`` pulses, those
     as large as the last one, the sizes stay as they are, or all change alike where they are ``resizable`` and commands
     have no ticks. ``momentum``: H too is to be brought to the target axis (without one, back), not only the nutation
     taken out; ``spin``: and the spin to the rate requested. A schedule without pulses stays as it is.
     """
-    if not made.pulses:
-        return made
-    chosen = sorted({index % len(made) for index in chosen})
-    kept = tuple(pulse for index, pulse in enumerate(made) if index not in chosen)
-    moving = [made.pulses[index] for index in chosen]
-    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(made, pulse))) for pulse in moving]
-    ends = np.cumsum([len(one.start) for one in pulses])
-    together = equal and resizable and spacecraft.limits.tick is None and _size(made.pulses[-1]) > 0.0
-    common = [_Common(spacecraft, made)] if together else []
+    if not schedule.pulses:
+        return schedule
+    chosen = sorted({index % len(schedule) for index in chosen})
+    kept = tuple(pulse for index, pulse in enumerate(schedule) if index not in chosen)
+    moving = [schedule.pulses[index] for index in chosen]
+    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(schedule, pulse))) for pulse in moving]
+    ends = np.cumsum([len(part.start) for part in pulses])
+    together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
+    common = [_Common(spacecraft, schedule)] if together else []
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)
         factor = float(parts[-1][0]) if common else 1.0
         others = common[0].resized(kept, factor) if common else kept
         moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
-        return Schedule(supplied(spacecraft, (*others, *moved)), made.notes, made.bounds)
+        return Schedule(supplied(spacecraft, (*others, *moved)), schedule.notes, schedule.bounds)
 
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
-    def left(made: Schedule) -> Vector:
+    def left(schedule: Schedule) -> Vector:
         nonlocal steps
-        flown = propagation.flown(spacecraft, made, dynamics=dynamics)
+        flown = propagation.flown(spacecraft, schedule, dynamics=dynamics)
         steps += flown.steps
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
@@ -169,9 +164,9 @@ def correct(
     freedom = _stacked(*pulses, *common)
     x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
-    corrected = Schedule(rounded, made.notes, made.bounds)
-    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(made))
-    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else made
+    corrected = Schedule(rounded, schedule.notes, schedule.bounds)
+    better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
+    return corrected if better and keeps_limits(spacecraft, corrected.pulses) else schedule
 
 
 MOST_CORRECTED = 1_000
@@ -187,49 +182,52 @@ class Correction:
 
     @property
     def momentum(self) -> bool:
-        """Whether H too is to end where it should."""
+        """True if H too has an end condition."""
         return self.scheme.points and not self.options.frees_axis
 
     @property
     def equal(self) -> bool:
-        """Whether the pulses are planned to be equal."""
+        """True if the pulses are planned to be equal."""
         return self.options.equal
 
-    def __call__(self, spacecraft: Spacecraft, made: Schedule, free: int = TAIL) -> Schedule:
-        """``made`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        if self.options.uncorrected or not made.pulses or len(made) > MOST_CORRECTED or work.exhausted():
-            return made
+    def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
+        if self.options.uncorrected or not schedule.pulses or len(schedule) > MOST_CORRECTED or work.exhausted():
+            return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable
         last = free if not (whole and self.options.equal) else AFTER if given else MOVED
-        chosen = tuple(range(-min(len(made), last), 0)) if self.momentum else (-1,)
+        chosen = tuple(range(-min(len(schedule), last), 0)) if self.momentum else (-1,)
         if self.momentum and whole and given:  # moments alone hardly turn H further; what damped before them does
-            damping = [index for index, pulse in enumerate(made) if not alike(made, pulse)]
+            damping = [index for index, pulse in enumerate(schedule) if not alike(schedule, pulse)]
             chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and whole:  # and the pulse that gives most to the spin
-            chosen = (*chosen, max(range(len(made)), key=lambda number: abs(float(made.pulses[number].impulse[2]))))
+            chosen = (
+                *chosen,
+                max(range(len(schedule)), key=lambda number: abs(float(schedule.pulses[number].impulse[2]))),
+            )
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
-        return correct(spacecraft, made, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
+        return correct(spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
 
 
 def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
-    """Start, scale, lower and upper bound of all that is free."""
+    """Start, scale, lower and upper bound of all free parameters."""
     start, scale, lower, upper = (
-        np.concatenate([getattr(one, name) for one in parts]) for name in ("start", "scale", "lower", "upper")
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "scale", "lower", "upper")
     )
     return start, scale, lower, upper
 
 
-def alike(made: Schedule, pulse: Pulse) -> bool:
-    """Whether a pulse is as large as the last one of a schedule."""
-    last = made.pulses[-1]
-    one, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
-    return abs(one - other) <= ALIKE * other
+def alike(schedule: Schedule, pulse: Pulse) -> bool:
+    """True if a pulse is as large as the last one of a schedule."""
+    last = schedule.pulses[-1]
+    size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
+    return abs(size - other) <= ALIKE * other
 
 
 class _Movable:
-    """What can be turned of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
+    """Free parameters of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
     Without the last of them where it is not ``sized`` for itself.
     """
@@ -252,7 +250,7 @@ class _Movable:
         self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
 
     def turn(self, x: Vector, factor: float) -> Pulse:
-        """The pulse with these settings; ``factor`` times as large where it is not sized for itself."""
+        """Pulse with these settings; ``factor`` times as large where it is not sized for itself."""
         size = float(x[-1]) if self.sized else factor * self.size
         if self.channel is not None:
             return channel_pulse(self.channel, x[0] + 0.5 * size, size)
@@ -263,18 +261,18 @@ class _Movable:
 
 
 class _Common:
-    """What equal pulses change alike: one factor on the size of all that are as large as the last one."""
+    """Common factor of equal pulses, on the size of all that are as large as the last one."""
 
     start = scale = np.ones(1)
 
-    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
-        self.spacecraft, self.made, last = spacecraft, made, made.pulses[-1]
-        bounds = np.array([_bounds(spacecraft, pulse) for pulse in made if alike(made, pulse)]) / _size(last)
+    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
+        self.spacecraft, self.made, last = spacecraft, schedule, schedule.pulses[-1]
+        bounds = np.array([_bounds(spacecraft, pulse) for pulse in schedule if alike(schedule, pulse)]) / _size(last)
         self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
-        """The ``pulses`` about their centres, those alike ``factor`` times as large."""
-        return [self._resized(one, factor) if alike(self.made, one) else one for one in pulses]
+        """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
+        return [self._resized(pulse, factor) if alike(self.made, pulse) else pulse for pulse in pulses]
 
     def _resized(self, pulse: Pulse, factor: float) -> Pulse:
         moved = _Movable(self.spacecraft, pulse, sized=False)
@@ -282,12 +280,12 @@ class _Common:
 
 
 def _size(pulse: Pulse) -> float:
-    """What a pulse is measured by: on-time of a channel, s, impulse of a steerable torquer, N m s."""
+    """Size of a pulse: on-time of a channel, s, impulse of a steerable torquer, N m s."""
     return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
 
 
 def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
-    """The least and the largest size of a pulse."""
+    """Least and largest size of a pulse."""
     channel = channel_of(spacecraft, pulse)
     if channel is None:
         return 0.0, math.inf
@@ -355,10 +353,10 @@ def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lowe
 
 
 LEFT_OVER = 0.05
-"""Share of nutation and turn together above which what is left makes a schedule no way to the target."""
+"""Largest residual, over nutation and turn together, of a schedule that reaches the target."""
 
 LEFT_OVER_BY_TICKS = 0.5
-"""The same where the resolution of commands may be to blame."""
+"""Largest residual where the resolution of commands may be to blame."""
 
 
 ROUNDING = 1e-12
@@ -366,7 +364,7 @@ ROUNDING = 1e-12
 
 
 class FlownBuilder:
-    """The pulses chosen so far, and the spacecraft as it is after them.
+    """Pulses chosen so far, and the spacecraft after them.
 
     ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there: attitude, rates,
     limits and disturbances are those of that moment, its goal is where the builder is to end. ``steps``: of integration
@@ -386,13 +384,13 @@ class FlownBuilder:
 
     @property
     def allowed(self) -> float:
-        """How many pulses the limits still allow."""
+        """Number of further pulses within the limits."""
         most = self.here.limits.max_pulses
         return math.inf if most is None else most
 
     @property
     def left(self) -> float:
-        """What is left, rad: nutation and distance of H from the target, whichever is more."""
+        """Residual, rad: nutation or distance of H from the target, whichever is larger."""
         return max(self.here.nutation, self.here.to_turn)
 
     def fork(self) -> FlownBuilder:
@@ -432,18 +430,18 @@ class FlownBuilder:
         self.fire(correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0))
 
     def schedule(self, *notes: str) -> Schedule:
-        """What has been chosen."""
+        """Chosen pulses."""
         return Schedule(tuple(self.pulses), notes)
 
 
 def tolerable(spacecraft: Spacecraft) -> float:
-    """What a schedule may leave, rad, and still count as having reached the target: more where commands have ticks."""
+    """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
     share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
 def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
-    """The spacecraft as it is when ``pulse`` ends, with its time counted from there; and the steps that it took."""
+    """Spacecraft at the end of ``pulse``, with its time counted from there; and the steps taken."""
     flown = propagation.flown(spacecraft, Schedule((pulse,)))
     settled, since, limits = flown.settled, pulse.over, spacecraft.limits
     to_principal = attitude.from_matrix(spacecraft.inertia.axes.T)
@@ -453,8 +451,8 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
         omega0=settled.rates,
         attitude=replace(given, quaternion=attitude.multiply(settled.quaternion, to_principal), epoch=None),
         disturbances=tuple(
-            replace(one, transverse=one.transverse * cmath.exp(1j * one.rate * since))
-            for one in spacecraft.disturbances
+            replace(disturbance, transverse=disturbance.transverse * cmath.exp(1j * disturbance.rate * since))
+            for disturbance in spacecraft.disturbances
         ),
         limits=replace(
             limits,
@@ -498,17 +496,17 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
         if number > 0 and earliest > IN_REACH * here.horizon:
             break
         try:
-            made = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+            damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
         except Infeasible as why:
             reason = why
             continue
         builder = start.fork()
         try:
-            builder.fire(made, bounded=True)
+            builder.fire(damping, bounded=True)
         except Infeasible as why:
             reason = why
             break
-        cost = made.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        cost = damping.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps

@@ -62,13 +62,13 @@ def _turning(
 
 
 def _next(builder: ImpulseBuilder, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
-    """The next pulse of ``channel``: a full one, or in fine damping just what is left."""
+    """Next pulse of ``channel``: a full one, or in fine damping one of the remaining size."""
     just_enough = None if coarse else builder.on_time_for(channel, builder.left, on_time)
     return builder.align(channel, on_time if just_enough is None else just_enough)
 
 
 def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPulseOptions) -> None:
-    """A sphere: ω does not turn, so the two channels on either side of -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
+    """Pulses on a sphere: ω does not turn, so the channels beside -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
     shares = _shares(channels, -builder.A * builder.omega)
     for channel, impulse in shares:
         unit = impulse / abs(channel.transverse)
@@ -90,15 +90,15 @@ def _shares(channels: list[Channel], target: complex) -> list[tuple[Channel, flo
     """Impulses >= 0 (N m s) along channel directions that sum to ``target`` with least total; else the nearest."""
     best: list[tuple[Channel, float]] = []
     least = math.inf
-    for one, two in itertools.combinations(channels, 2):
-        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (one, two))
+    for left, right in itertools.combinations(channels, 2):
+        d1, d2 = (channel.transverse / abs(channel.transverse) for channel in (left, right))
         area = (d1.conjugate() * d2).imag
         if abs(area) < 1e-9:
             continue
         first, second = (target.conjugate() * d2).imag / area, (d1.conjugate() * target).imag / area
         if min(first, second) >= -1e-12 * abs(target) and first + second < least:
             least = first + second
-            best = [(one, first), (two, second)]
+            best = [(left, first), (right, second)]
     if not best:
         along = {
             channel.name: (target * channel.transverse.conjugate()).real / abs(channel.transverse)

@@ -35,7 +35,7 @@ MOST_CONES = 60
 """Cones tried at most where their number is not given."""
 
 PATIENCE = 5
-"""Numbers of cones that may fail before it is given up."""
+"""Numbers of cones that may fail before the search ends."""
 
 SHARES = np.linspace(0.6, 1.3, 15)
 """Sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone needs."""
@@ -44,10 +44,10 @@ WORTH_WAITING = 0.05
 """Share of one pulse that waiting for a better phase must save."""
 
 UNEQUAL = 0.3
-"""How much a cone may be wider or narrower than equal ones, as a share: enough for a channel to be in phase."""
+"""Largest relative difference of a cone from equal ones: enough for a channel to be in phase."""
 
 LAGGING = 1.1
-"""How much wider a pulse may leave the cones to come than equal ones would be; else the last have too much to do."""
+"""Largest ratio of the remaining cones to equal ones after a pulse; beyond, the last have too much to do."""
 
 SAMPLES = 96
 """Moments looked at in each turn of the body."""
@@ -61,7 +61,7 @@ PLACE = 1e-3
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
-    """``options.cones`` half cones; where that is None the fewest of which one more would save less than 1 %.
+    """Schedule of ``options.cones`` half cones; if None the fewest of which one more would save less than 1 %.
 
     Raises Infeasible with the reason.
     """
@@ -77,15 +77,15 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     failed = 0
     for cones in _counts(_fewest(here), _most(here)):
         try:
-            made = _row(builder.fork(), cones)
+            row = _row(builder.fork(), cones)
         except Infeasible as why:
             reason, failed = why, failed + 1
             if best is not None or failed > PATIENCE or work.exhausted():
                 break
             continue
-        if best is not None and made.cost > (1.0 - WORTH_A_CONE) * best.cost:
+        if best is not None and row.cost > (1.0 - WORTH_A_CONE) * best.cost:
             break
-        best = made
+        best = row
         if work.exhausted():
             break
     if best is None:
@@ -111,12 +111,13 @@ def _reach(spacecraft: Spacecraft) -> float:
     if torquer is not None:
         return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
     return max(
-        (precession.reach(abs(one.transverse), spin, one.max_on_time) for one in usable(spacecraft)), default=0.0
+        (precession.reach(abs(channel.transverse), spin, channel.max_on_time) for channel in usable(spacecraft)),
+        default=0.0,
     )
 
 
 def _fewest(spacecraft: Spacecraft) -> int:
-    """The least number of cones whose pulses are not beyond reach."""
+    """Least number of cones whose pulses are not beyond reach."""
     reach, turn = _reach(spacecraft) / _axial(spacecraft), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
     for cones in range(1, MOST_CONES):
         pulse = (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))
@@ -126,7 +127,7 @@ def _fewest(spacecraft: Spacecraft) -> int:
 
 
 def _most(spacecraft: Spacecraft) -> int:
-    """The largest number of cones for which there are time and pulses."""
+    """Largest number of cones for which there are time and pulses."""
     half_turn = math.pi * spacecraft.inertia.A / _axial(spacecraft)
     room = int(max(spacecraft.horizon - spacecraft.limits.earliest, 0.0) / half_turn) + 1
     most = spacecraft.limits.max_pulses
@@ -150,7 +151,7 @@ def _no_time(spacecraft: Spacecraft) -> Infeasible:
 
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
-    """That many half cones, each planned from the motion that the one before leaves."""
+    """Row of half cones, each planned from the motion that the one before leaves."""
     spacecraft, damped = builder.here, len(builder.pulses)
     if builder.allowed < cones + 1:
         raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {builder.allowed}")
@@ -161,17 +162,17 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     builder.fire(pulse_pairs.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
     ideal = precession.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
-    made = builder.schedule()
+    schedule = builder.schedule()
     note = f"{cones} half cone{'s' if cones > 1 else ''}"
     if damped:
         note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
-    elif len(made) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
-        note += f"; {made.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
+    elif len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
+        note += f"; {schedule.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
     return builder.schedule(note)
 
 
 def _fixed(here: Spacecraft, cones: int) -> Pulse:
-    """The earliest firing of a channel from which the row costs hardly more than from the best one.
+    """Earliest firing of a channel from which the row costs hardly more than from the best one.
 
     A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
     and what it misses then is made up for by the cones that follow.

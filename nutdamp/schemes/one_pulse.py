@@ -100,7 +100,7 @@ def _train(
     if spacecraft.growth > 0.0 and builder.pulses and builder.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
         longer = _fire_train(spacecraft, count + 1, strongest, fire)
-        builder = min(builder, longer, key=lambda one: one.left)
+        builder = min(builder, longer, key=lambda train: train.left)
     return builder
 
 

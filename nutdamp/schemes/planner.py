@@ -1,6 +1,6 @@
-"""The schemes: one flat module each, `optimal` in a package, and the `tools` that they share.
+"""Interface of the schemes: options, planning, correction.
 
-A scheme's module has ``schedule(spacecraft, options) -> Schedule``; `registry` says which there are.
+A scheme's module has ``schedule(spacecraft, options) -> Schedule``; `catalogue` lists the schemes.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 
 Choice = Options | SchemeOptions | None
-"""What callers may hand over as options: those of one scheme, those of several, or none for the defaults."""
+"""Options of one scheme, of several, or None for the defaults."""
 
 
 def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
-    """The options of a scheme; raises BadRequest for those of another."""
+    """Options of a scheme; raises BadRequest for those of another."""
     if chosen is None:
         return scheme.options()
     if isinstance(chosen, Options):
@@ -45,7 +45,7 @@ def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:
 
 
 def settled(scheme: Scheme, chosen: Choice, spacecraft: Spacecraft) -> SchemeOptions:
-    """The options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift."""
+    """Options of a scheme for a ``spacecraft``: H is kept where it has a target, or a bound on its shift."""
     required = spacecraft.requirement
     bound = required is not None and required.momentum_shift is not None
     return options_of(scheme, chosen).settled(keeps_axis=bound or spacecraft.goal.axis is not None)
@@ -86,17 +86,17 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
 
 LONGER = 4.0
-"""Times the horizon, and the default one, up to which a plan is looked for, to name a horizon that is long enough."""
+"""Multiple of the horizon, and of the default one, up to which a sufficient horizon is sought."""
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
-    """A horizon within which the whole schedule is ``planned``, in words: it was tried; else that none was found.
+    """Message on a horizon within which the whole schedule was ``planned``; else that none was found.
 
     Empty where the budget of work ends before that is known.
     """
 
     def end(horizon: float) -> float | None:
-        """When the schedule within a horizon ends; None where there is none."""
+        """End of the schedule within a horizon; None where there is none."""
         try:
             return planned(replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))).end
         except Infeasible:
@@ -129,14 +129,16 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     if spacecraft.thrust_laws:
         from nutdamp.schemes import valve_commands
 
-        found = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
-        return [as_commands(name, spacecraft, made, chosen) for made in found]
+        schedules = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
+        return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
-    return [_corrected(scheme, model, made, chosen) for made in _loaded(scheme).alternatives(model.body, chosen)]
+    return [
+        _corrected(scheme, model, schedule, chosen) for schedule in _loaded(scheme).alternatives(model.body, chosen)
+    ]
 
 
-def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choice = None) -> Schedule:
-    """A schedule ``made`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
+def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None) -> Schedule:
+    """A schedule ``schedule`` for the `plain` body of a ``spacecraft`` as its commands, corrected on its motion.
 
     Raises KeyError for a name not in `NAMES`.
     """
@@ -144,23 +146,25 @@ def as_commands(name: str, spacecraft: Spacecraft, made: Schedule, options: Choi
 
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
-    return valve_commands.as_commands(spacecraft, made, correction.Correction(scheme, chosen))
+    return valve_commands.as_commands(spacecraft, schedule, correction.Correction(scheme, chosen))
 
 
 def _loaded(scheme: Scheme) -> ModuleType:
-    """The scheme's module, loaded when it is planned first."""
+    """Module of the scheme, loaded when it is planned first."""
     return import_module(scheme.module)
 
 
-def _corrected(scheme: Scheme, model: SymmetricModel, made: Schedule, options: SchemeOptions) -> Schedule:
+def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions) -> Schedule:
     """A schedule for the ``model`` as one for the true spacecraft, corrected on its motion where that differs."""
-    made = model.translate(made)
+    schedule = model.translate(schedule)
     if not model.exact:
-        made = made.without_proof
-    if model.spacecraft.goal.axis is not None and not scheme.points and made.pulses:
-        made = replace(made, notes=(*made.notes, f"does not point: the target is left to {', '.join(POINTING)}"))
+        schedule = schedule.without_proof
+    if model.spacecraft.goal.axis is not None and not scheme.points and schedule.pulses:
+        schedule = replace(
+            schedule, notes=(*schedule.notes, f"does not point: the target is left to {', '.join(POINTING)}")
+        )
     if model.exact:
-        return made
+        return schedule
     from nutdamp.schemes import correction
 
-    return correction.Correction(scheme, options)(model.spacecraft, made)
+    return correction.Correction(scheme, options)(model.spacecraft, schedule)

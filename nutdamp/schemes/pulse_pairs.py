@@ -1,16 +1,9 @@
-"""Two pulses to a target axis.
+"""Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
 
-Two pulses that leave no nutation, with H and the spin axis on the target axis: from any motion, exact at any angle.
-
-A steerable torquer is placed by `steerable_pair`. Body-fixed channels are searched: for the first, its moment alone
-says how large its jump of H must be for H to have the component C|ω3| along the target that it keeps when the spin axis
-comes there; the moments are kept at which the second channel then points the right way. Both are corrected on the real
-widths.
-
-Where a steerable torquer is to push so that H and the spin axis come to the target axis: exact at any angle.
-
-The two pulses of an acquisition, and the first pulse of a row of half cones, are placed by `precession`; what is
-free, the moment of the first pulse and how far aside H goes between two, is chosen for least impulse.
+A steerable torquer is placed for least impulse by `precession`: free are the time of the first pulse and how far aside
+H goes between two. Body-fixed channels are searched: the time of the first alone determines the jump after which H has
+the component C|ω3| along the target that it keeps when the spin axis comes there; times are kept at which the second
+channel then points the right way. Both are corrected on the real widths.
 """
 
 from __future__ import annotations
@@ -78,7 +71,7 @@ NOTHING = 1e-12
 
 
 class SteerablePair:
-    """The choices of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
+    """Placement of a steerable torquer from the motion of a ``spacecraft`` at t = 0 to its target axis."""
 
     def __init__(self, spacecraft: Spacecraft, torquer: Steerable) -> None:
         self.spacecraft, self.torquer = spacecraft, torquer
@@ -110,7 +103,7 @@ class SteerablePair:
 
     def pulses(self, jumps: list[tuple[float, Vector]]) -> tuple[Pulse, ...]:
         """Pulses that bring H to the given vectors (3,) N m s at the given moments, in order."""
-        made, state, now, momentum = [], self.start, 0.0, self.momentum
+        pulses, state, now, momentum = [], self.start, 0.0, self.momentum
         for moment, after in jumps:
             rates, quaternions = self._arc(now, state).motion(np.array([moment]))
             body = attitude.matrix(quaternions[0]).T @ (after - momentum)
@@ -120,10 +113,10 @@ class SteerablePair:
                 requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
                 pulse = steerable_pulse(self.torquer, moment, angle, **requested)
-                made.append(commandable(self.spacecraft, pulse))
+                pulses.append(commandable(self.spacecraft, pulse))
             state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
             now, momentum = moment, after
-        return tuple(made)
+        return tuple(pulses)
 
     # --- what can be chosen ------------------------------------------------------------------------------------------
 
@@ -138,7 +131,7 @@ class SteerablePair:
         return np.asarray(times[times <= self.windows.horizon])
 
     def one(self, cones: int) -> tuple[Pulse, ...]:
-        """The first pulse of ``cones`` half cones in a row, at the moment from which all of them cost least."""
+        """First pulse of ``cones`` half cones in a row, at the time from which all of them cost least."""
 
         def cost(times: Vector) -> tuple[Vector, Vector]:
             middle, rest = precession.half_cone(self.h, self.axes(times), self.target, cones)
@@ -157,7 +150,7 @@ class SteerablePair:
         return self.pulses([(moment, cost(np.array([moment]))[1][0])])
 
     def two(self, straight: bool = False) -> tuple[Pulse, ...]:
-        """The two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
+        """Two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
         times = self.moments()
         plain = np.zeros(len(times))
         if len(times) == 0:
@@ -166,21 +159,21 @@ class SteerablePair:
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
         if not np.isfinite(least):
             raise Infeasible(self.no_room(1))
-        found = self._best(times, plain, straight, FURTHER_TURNS)
-        if (found is None or found.cost > least * (1.0 + 1e-6)) and not straight:
+        choice = self._best(times, plain, straight, FURTHER_TURNS)
+        if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
             some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
             beside = np.repeat(times[some], len(ASIDE)), (ASIDE * free.cost[some, None]).ravel()
             other = self._best(*beside, straight, FURTHER_BESIDE)
-            if other is not None and (found is None or other.cost < found.cost * (1.0 - EQUAL)):
-                found = other
-        if found is None:
+            if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
+                choice = other
+        if choice is None:
             raise Infeasible(self.no_room(1))
         point = _descend(
-            lambda points: self._costs(points[:, 0], points[:, 1], found.further, straight)[0],
-            np.array([found.moment, found.aside]),
-            self._steps(0.0 if straight else 0.02 * found.jumps),
+            lambda points: self._costs(points[:, 0], points[:, 1], choice.further, straight)[0],
+            np.array([choice.moment, choice.aside]),
+            self._steps(0.0 if straight else 0.02 * choice.jumps),
         )
-        _, second, jumps = self._costs(point[:1], point[1:], found.further, straight)
+        _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
         return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
 
     def _steps(self, aside: float) -> Vector:
@@ -203,9 +196,9 @@ class SteerablePair:
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
-    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Found | None:
-        """The cheapest choice with up to ``most`` further turns, of equal ones that which ends first."""
-        best: _Found | None = None
+    def _best(self, times: Vector, aside: Vector, straight: bool, most: int) -> _Placement | None:
+        """Cheapest choice with up to ``most`` further turns, of equal ones the first to end."""
+        best: _Placement | None = None
         for further in range(most):
             costs, second, jumps = self._costs(times, aside, further, straight)
             least = float(costs.min())
@@ -213,13 +206,13 @@ class SteerablePair:
                 near = np.flatnonzero(costs <= least * (1.0 + EQUAL))
                 index = near[np.argmin(second[near])]
                 size = float(jumps.cost[index])
-                best = _Found(least, float(times[index]), float(aside[index]), further, size)
+                best = _Placement(least, float(times[index]), float(aside[index]), further, size)
             if not (second < self.windows.horizon).any() or (best is not None and not self.spacecraft.limits.blackout):
                 break
         return best
 
     def no_room(self, cones: int) -> str:
-        """Why no pulse could be placed."""
+        """Reason why no pulse could be placed."""
         torque, spin, horizon = self.torquer.torque, abs(self.spacecraft.spin), self.windows.horizon
         if torque is not None:
             once = 2.0 * torque / spin
@@ -244,7 +237,7 @@ class SteerablePair:
         )
 
 
-class _Found(NamedTuple):
+class _Placement(NamedTuple):
     cost: float
     moment: float
     aside: float
@@ -253,7 +246,7 @@ class _Found(NamedTuple):
 
 
 def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> Vector:
-    """The least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass that narrows from ``steps`` (k,)."""
+    """Least ``cost`` (points (n, k) -> (n,)) near ``point`` (k,), by a compass search narrowing from ``steps`` (k,)."""
     rose = np.vstack([np.diag(steps), -np.diag(steps)])
     rose = rose[np.any(rose != 0.0, axis=1)]
     best = float(cost(point[None, :])[0])
@@ -300,7 +293,7 @@ BESIDE = 0.05
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
-    """The two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
+    """Two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
 
     Raises Infeasible with the reason.
     """
@@ -309,22 +302,22 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
     torquer = spacecraft.torquer
     if torquer is not None:
-        made = Schedule(SteerablePair(spacecraft, torquer).two(straight))
-        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, made.pulses):
+        schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
+        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, schedule.pulses):
             raise Infeasible(_off_limits())
         if torquer.torque is not None or not model_of(spacecraft).exact:
-            made = correction.correct(spacecraft, made, chosen=range(len(made)), momentum=True)
-        return _checked(spacecraft, made)
+            schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
+        return _checked(spacecraft, schedule)
     return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
 
 
-def _checked(spacecraft: Spacecraft, made: Schedule) -> Schedule:
-    """The schedule, if it keeps the limits and comes near the target."""
-    if not keeps_limits(spacecraft, made.pulses):
+def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
+    """Schedule, if it keeps the limits and comes near the target."""
+    if not keeps_limits(spacecraft, schedule.pulses):
         raise Infeasible(_off_limits())
-    if not _left(spacecraft, made) <= tolerable(spacecraft):
-        raise Infeasible(_too_wide(spacecraft, made.pulses))
-    return made
+    if not _left(spacecraft, schedule) <= tolerable(spacecraft):
+        raise Infeasible(_too_wide(spacecraft, schedule.pulses))
+    return schedule
 
 
 def _off_limits() -> str:
@@ -341,14 +334,14 @@ def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
     )
 
 
-def _left(spacecraft: Spacecraft, made: Schedule) -> float:
-    return float(np.linalg.norm(correction.misses(spacecraft, made)))
+def _left(spacecraft: Spacecraft, schedule: Schedule) -> float:
+    return float(np.linalg.norm(correction.misses(spacecraft, schedule)))
 
 
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
-class Candidate(NamedTuple):
+class PairCandidate(NamedTuple):
     """Two channels, the moments (s) at which ideal impulses of theirs acquire the target, and their on-times (s)."""
 
     cost: float
@@ -359,36 +352,36 @@ class Candidate(NamedTuple):
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
-    search = _Search(spacecraft, channels)
-    candidates = sorted(search.all_candidates(), key=lambda found: found.cost)
+    search = _PairSearch(spacecraft, channels)
+    candidates = sorted(search.all_candidates(), key=lambda candidate: candidate.cost)
     if not candidates:
         raise Infeasible(search.reason())
-    near = [one for one in candidates if one.cost <= candidates[0].cost * CLOSE_IN_COST]
-    near.sort(key=lambda found: found.end)
-    others = [one for one in candidates if one.cost > candidates[0].cost * CLOSE_IN_COST]
+    near = [candidate for candidate in candidates if candidate.cost <= candidates[0].cost * CLOSE_IN_COST]
+    near.sort(key=lambda candidate: candidate.end)
+    others = [candidate for candidate in candidates if candidate.cost > candidates[0].cost * CLOSE_IN_COST]
     best, _ = correction.best_of(spacecraft, _tried(spacecraft, [*near[: SHORTLIST // 2], *others][:SHORTLIST]))
     if best is None:
         raise Infeasible(search.reason())
-    made = _checked(spacecraft, best)
+    schedule = _checked(spacecraft, best)
     floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
-    one, two = (pulse.channel for pulse in made)
-    note = f"{one} then {two} after {made.pulses[1].t - made.pulses[0].t:.4g} s"
-    return Schedule(made.pulses, (f"{note}; {made.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
+    first, two = (pulse.channel for pulse in schedule)
+    note = f"{first} then {two} after {schedule.pulses[1].t - schedule.pulses[0].t:.4g} s"
+    return Schedule(schedule.pulses, (f"{note}; {schedule.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
 
 
-def _tried(spacecraft: Spacecraft, candidates: list[Candidate]) -> Iterator[tuple[Schedule, float]]:
-    """The candidates, corrected on the flown motion, with the residual (rad) that each leaves."""
+def _tried(spacecraft: Spacecraft, candidates: list[PairCandidate]) -> Iterator[tuple[Schedule, float]]:
+    """Candidates, corrected on the flown motion, with the residual (rad) of each."""
     for candidate in candidates:
-        made = correction.fired(spacecraft, candidate.channels, candidate.timing)
-        if spacecraft.limits.tick is None or keeps_limits(spacecraft, made.pulses):
-            made = correction.correct(spacecraft, made, chosen=(0, 1), momentum=True)
-            yield made, _left(spacecraft, made)
+        schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
+        if spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses):
+            schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+            yield schedule, _left(spacecraft, schedule)
 
 
 Indices = NDArray[np.intp]
 
 
-class _Search:
+class _PairSearch:
     """Pairs of channels and moments at which ideal impulses acquire the target."""
 
     def __init__(self, spacecraft: Spacecraft, channels: list[Channel]) -> None:
@@ -411,7 +404,7 @@ class _Search:
         return np.asarray(times[times <= self.windows.horizon])
 
     def after(self, channel: Channel, times: Vector) -> _After:
-        """What follows when ``channel`` fires at ``times`` (n,) s as much as it must."""
+        """Motion after ``channel`` fires at ``times`` (n,) s as much as it must."""
         direction = channel.transverse / abs(channel.transverse)
         _, quaternions = self.arc.motion(times)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
@@ -432,7 +425,7 @@ class _Search:
             body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
         return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
 
-    def all_candidates(self) -> list[Candidate]:
+    def all_candidates(self) -> list[PairCandidate]:
         """Candidates for the target; where the first jump would be nothing, for targets beside it, to be corrected.
 
         That is where the target lies on the cone of the spin axis itself.
@@ -440,22 +433,22 @@ class _Search:
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
         if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
             return self.candidates()
-        found, target = [], self.target
+        candidates, target = [], self.target
         side = np.cross(self.momentum, target)
         for beside in (side, np.cross(side, target)):
             for sense in (1.0, -1.0):
                 moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
                 self.target = moved / float(np.linalg.norm(moved))
-                found += self.candidates()
+                candidates += self.candidates()
         self.target = target
-        return found
+        return candidates
 
-    def candidates(self) -> list[Candidate]:
-        """The pairs that close and keep the limits, the cheapest of each first channel."""
+    def candidates(self) -> list[PairCandidate]:
+        """Pairs that close and keep the limits, the cheapest of each first channel."""
         times = self.times()
-        found: list[Candidate] = []
+        candidates: list[PairCandidate] = []
         if len(times) < 2:
-            return found
+            return candidates
         adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / abs(self.spacecraft.spin) / BODY_SAMPLES
         for one in self.channels:
             if work.exhausted():
@@ -471,13 +464,13 @@ class _Search:
                     off = np.angle(needed * two.transverse.conjugate())
                     near = np.abs(off) < 0.5 * math.pi
                     crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
-                    found += self._placed(one, two, further, times, after, off, crosses)
-        return found
+                    candidates += self._placed(one, two, further, times, after, off, crosses)
+        return candidates
 
     def _placed(
         self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Indices
-    ) -> list[Candidate]:
-        """The pairs at the zeros of ``off`` behind the rows ``crosses``, as far as on-times and limits allow them."""
+    ) -> list[PairCandidate]:
+        """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
         if len(crosses) == 0:
             return []
         here, there = off[crosses], off[crosses + 1]
@@ -495,24 +488,25 @@ class _Search:
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
         known = all(channel.mass_flow is not None for channel in self.channels)
         prices = [channel.cost_rate(by_propellant=known) for channel in (one, two)]
-        made = []
+        pairs = []
         for row in np.flatnonzero(allowed):
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
             cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
-            made.append(Candidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
-        return sorted(made, key=lambda candidate: candidate.cost)[:SHORTLIST]
+            pairs.append(PairCandidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
+        return sorted(pairs, key=lambda candidate: candidate.cost)[:SHORTLIST]
 
     def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
-        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number where it cannot."""
+        """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number beyond its reach."""
         on_times = precession.on_times_to_turn(jumps, abs(channel.transverse), self.spacecraft.spin)
         outside = (on_times < channel.min_on_time) | (on_times > channel.max_on_time)
         return np.where(outside, np.nan, on_times)
 
     def reason(self) -> str:
-        """Why there is no candidate."""
+        """Reason why there is no candidate."""
         names = ", ".join(channel.name for channel in self.channels)
         strongest = max(
-            precession.reach(abs(one.transverse), self.spacecraft.spin, one.max_on_time) for one in self.channels
+            precession.reach(abs(channel.transverse), self.spacecraft.spin, channel.max_on_time)
+            for channel in self.channels
         )
         if 2.0 * strongest < self.floor:
             return (

@@ -1,18 +1,11 @@
-"""Sun-synchronous pulse train.
-
-What a train of short pulses at a fixed inertial phase can do: its moments, how many of them close, the next pulse.
-
-From one pulse to the next the phasor that a pulse gives the nutation turns by 2πC/(AK) for K pulses a turn; the sum of
-the phasors says which numbers of pulses leave no nutation.
-
-A train of short pulses at a fixed inertial phase, which walks H to the target; one or more in each spin turn.
+"""Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin turn.
 
 Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
 2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
 chosen so that they close, a nutation at t = 0 included. All pulses are equal, as the width is one command: it is chosen
-so that they just reach the target, and phases do the rest. What is too much is bent away: the train heads a little to
-one side of its course (a spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π,
-which is C = A for one pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
+so that they just reach the target. An excess is bent away: the train heads a little to one side of its course (a
+spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π, which is C = A for one
+pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
 
 The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
 """
@@ -57,7 +50,7 @@ OPEN = 1.2
 MOST_PULSES = 600
 
 LAST = 20
-"""How many of the last pulses may be moved, at most."""
+"""Largest number of last pulses that are moved."""
 
 TRIES = 4
 """Counts that are flown, at most."""
@@ -86,7 +79,7 @@ class Shot(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """A train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
+    """Train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
 
     ``closes``: whether they leave little nutation as they are, so that correction costs little. ``resizable``: whether
     the size is not that of a command, and may be corrected.
@@ -99,7 +92,7 @@ class Attempt(NamedTuple):
 
 
 class Train:
-    """What a train from the motion of ``here`` can do."""
+    """Trains from the motion of ``here``."""
 
     def __init__(self, here: Spacecraft, options: RhumbLineOptions) -> None:
         self.here, self.options = here, options
@@ -126,12 +119,12 @@ class Train:
         self.ahead, self.way = precession.course(here.momentum, here.target_axis, self.sun)
 
     def turns_by(self, size: float) -> float:
-        """By how much a pulse of a ``size`` as in `Attempt` turns H, N m s."""
+        """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
         return size if math.isinf(self.torque) else self.torque * size * precession.arc_efficiency(self.here.spin, size)
 
     @property
     def strongest(self) -> float:
-        """By how much a full pulse of the train turns H, N m s."""
+        """Turn of H by a full pulse of the train, N m s."""
         return self.turns_by(STEP * self.h if math.isinf(self.torque) else self.on_time)
 
     def _check(self, given: float) -> None:
@@ -149,7 +142,7 @@ class Train:
             raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
 
     def size(self, count: int, spare: float) -> float:
-        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on the ticks, rounded up.
+        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on ticks, rounded up.
 
         Not a number where that is too far.
         """
@@ -162,7 +155,7 @@ class Train:
         return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
     def rounding(self, size: float) -> float:
-        """What it may leave, rad, that the start of one pulse is rounded to a tick."""
+        """Residual, rad, by rounding the start of one pulse to a tick."""
         return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
 
     def attempts(self) -> list[Attempt]:
@@ -171,7 +164,7 @@ class Train:
         return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
 
     def _spare(self, count: int, left: Vector) -> float:
-        """Pulses to spare for a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
+        """Spare pulses of a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
 
         A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
         of its square.
@@ -199,14 +192,14 @@ class Train:
         free = self.here.limits.tick is None
         tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
         if free:
-            tried.sort(key=lambda one: float(left[one.pulses - 1]))
+            tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]))
         else:
-            tried.sort(key=lambda one: one.pulses * one.size)
+            tried.sort(key=lambda attempt: attempt.pulses * attempt.size)
         tried = tried[:TRIES]
-        for count in [one.pulses for one in tried[:2]]:
+        for count in [attempt.pulses for attempt in tried[:2]]:
             tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
         widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
-        possible = list({one[:2]: one for one in reversed(tried) if one.size <= widest}.values())[::-1]
+        possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
         if not possible:
             raise self._too_few(most + 1, len(left))
         return possible
@@ -232,14 +225,14 @@ class Train:
         return self.h * self.way / precession.arc_efficiency(self.here.spin, given)
 
     def lengths_near(self, given: float) -> list[float]:
-        """On-times (s) of trains that may close, in the order of how near they are to the one ``given``."""
+        """On-times (s) of trains that may close, in the order of their distance from the ``given`` one."""
         left = self.left_by(self.shots())
         closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
         sizes = {self.size(count, self._spare(count, left)) for count in closing}
         if self.here.limits.tick is not None:
             sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
-        possible = [one for one in sizes if self.shortest <= one <= self.widest and one > 0.0]
-        return sorted(possible, key=lambda one: abs(one - given))
+        possible = [size for size in sizes if self.shortest <= size <= self.widest and size > 0.0]
+        return sorted(possible, key=lambda size: abs(size - given))
 
     @property
     def widest(self) -> float:
@@ -247,7 +240,7 @@ class Train:
         return min(self.longest, WIDEST * self.turn)
 
     def fewest(self) -> int:
-        """Pulses that it takes with the on-time given; two at least, to close."""
+        """Least number of pulses with the on-time given; two at least, to close."""
         return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
 
     def _most(self) -> int:
@@ -261,7 +254,9 @@ class Train:
     def left_by(self, shots: list[Shot]) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
         start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
-        pushes = np.array([_in_body(self.here, self.ahead, t) if one is None else one.transverse for t, one in shots])
+        pushes = np.array(
+            [_in_body(self.here, self.ahead, t) if channel is None else channel.transverse for t, channel in shots]
+        )
         turned = a * spin * np.array([shot.t for shot in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
         counts = np.arange(1, len(shots) + 1)
@@ -269,13 +264,13 @@ class Train:
 
     def shots(self) -> list[Shot]:
         """Moments of right phase, one pulse after the other as the limits allow them."""
-        found: list[Shot] = []
+        shots: list[Shot] = []
         ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
         firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
         for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
-            if start is None or len(found) == MOST_PULSES:
+            if start is None or len(shots) == MOST_PULSES:
                 break
             centre = start + 0.5 * on_time
             if firsts:
@@ -293,14 +288,14 @@ class Train:
             if free is not None:
                 ready = max(free, ready + 0.25 * self.turn)
                 continue
-            found.append(shot)
+            shots.append(shot)
             ready = shot.t + 0.5 * on_time + gap
             if not firsts:
                 ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
-        return found
+        return shots
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
-        """The next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no moment."""
+        """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
         windows, limits = Windows(here), here.limits
         ahead = self._heading(here, remaining, attempt)
         on_time = 0.0 if math.isinf(self.torque) else attempt.size
@@ -319,7 +314,7 @@ class Train:
         return steerable_pulse(here.torquer, centre, cmath.phase(_in_body(here, ahead, centre)), **given)
 
     def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
-        """The course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
+        """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
         ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
         bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
@@ -327,10 +322,10 @@ class Train:
         return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
     def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
-        """The first firing of a channel as it passes the phase that the limits allow."""
+        """First firing of a channel at the required phase within the limits."""
         for _ in range(MOST_PULSES):
             moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
-            t, channel = min(moments, key=lambda one: one[0])
+            t, channel = min(moments, key=lambda passage: passage[0])
             start = windows.nearest_tick(t - 0.5 * on_time)
             free = windows.blocked_until(start, on_time)
             if start + on_time > windows.horizon + 1e-9:
@@ -345,7 +340,7 @@ class Train:
         return Infeasible(sequential.in_phase(self.here, self.options.per_turn, fewest, most, nutation))
 
     def _too_few(self, needed: int, moments: int) -> Infeasible:
-        """That the limits do not leave moments for as many pulses as are needed, or allow too few."""
+        """Message on limits that leave too few times or pulses."""
         most = self.here.limits.max_pulses
         if most is not None and most < needed:
             return Infeasible(
@@ -377,7 +372,7 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
 
 
 def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
-    """What an inertial ``direction`` (3,) has along axes 1 and 2 of the body at ``t`` s, undisturbed."""
+    """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s, undisturbed."""
     _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
@@ -387,11 +382,11 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
     """``count`` channels of directions as different as can be, the one that costs least for its torque first."""
     if not channels:
         raise Infeasible("once the nutation is taken out no time is left for the turn")
-    chosen = [min(channels, key=lambda one: (one.price, -abs(one.transverse)))]
+    chosen = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
     while len(chosen) < count:
 
         def apart(channel: Channel) -> float:
-            return min(abs(cmath.phase(channel.transverse * one.transverse.conjugate())) for one in chosen)
+            return min(abs(cmath.phase(channel.transverse * other.transverse.conjugate())) for other in chosen)
 
         farthest = max(channels, key=apart)
         if apart(farthest) < 0.2:
@@ -408,12 +403,12 @@ def _too_long(turn: float) -> str:
 
 
 def _ratio(whole: float, part: float) -> float:
-    """How often ``part`` goes into ``whole``; a billion times at most."""
+    """Ratio of ``whole`` to ``part``; a billion at most."""
     return whole / part if whole < 1e9 * part else 1e9
 
 
 MOVED = (6, 12, LAST)
-"""How many of the last pulses are moved, one number after the other until nothing is left."""
+"""Numbers of last pulses that are moved, one after the other until nothing is left."""
 
 SHORT = 60
 """Pulses up to which their size is corrected on the flown motion too: a longer train has little to spare."""
@@ -422,14 +417,14 @@ EXACT = 1e-10
 """rad of flown residual that counts as nothing."""
 
 CLEARLY = 0.01
-"""Share of the cost of a train that is worth more pulses."""
+"""Relative saving that is worth more pulses."""
 
 OTHERS = 4
 """Other lengths of the pulses that are tried where the one requested does not do."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """The train, after one pulse (or a train against ω) where there is more nutation than it can take along.
+    """Train, after one pulse (or a train against ω) where there is more nutation than it can absorb.
 
     ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
@@ -443,7 +438,7 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """The train from t = 0, or else after what damps the nutation. Raises Infeasible with the reason."""
+    """Train from t = 0, or else after damping of the nutation. Raises Infeasible with the reason."""
     builder, reason = FlownBuilder(spacecraft), Infeasible("")
     train = Train(builder.here, options)
     if spacecraft.least_impulse <= 0.5 * train.strongest and train.way > ROUNDING:
@@ -460,7 +455,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 
 
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
-    """Which pulse length would do instead of the one requested, the nearest first, in words."""
+    """Advice on a pulse length that works instead of the requested one, the nearest first."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
         if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
@@ -472,17 +467,17 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
         digits = 3 - math.floor(math.log10(length))
         rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
         try:
-            made = _train(spacecraft, replace(options, on_time=rounded))
+            train = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
-        if float(np.linalg.norm(correction.misses(spacecraft, made))) > max(10.0 * EXACT, exact):
+        if float(np.linalg.norm(correction.misses(spacecraft, train))) > max(10.0 * EXACT, exact):
             continue
-        return f"--on-time {rounded:.4g}s works, with {len(made)} pulses in all"
+        return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
     return "no other length was found that works"
 
 
 def _best(builder: FlownBuilder, train: Train) -> Schedule:
-    """The train from where the ``builder`` is that leaves least; raises Infeasible where that is too much.
+    """Train of least residual from the ``builder``; raises Infeasible where that is too much.
 
     Of those that leave nothing the first one, unless a later one costs clearly less.
     """
@@ -492,10 +487,10 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
         nothing = max(EXACT, train.rounding(attempt.size))
         if best is not None and best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
-        made, left = _flown(builder.fork(), train, attempt)
+        schedule, left = _flown(builder.fork(), train, attempt)
         left = max(left, nothing)
-        if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(made, best[1], before)):
-            best = left, made
+        if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(schedule, best[1], before)):
+            best = left, schedule
         cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
         # Of pulses of a given length the trains come in the order of their cost.
         if work.exhausted() or (left <= nothing and (cheap or train.options.on_time is not None)):
@@ -505,13 +500,13 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     return best[1]
 
 
-def _cheaper(made: Schedule, other: Schedule, before: float) -> bool:
-    """Whether a train costs clearly less than another, ``before`` N m s that came before them apart."""
-    return made.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
+def _cheaper(schedule: Schedule, other: Schedule, before: float) -> bool:
+    """True if a train costs clearly less than another, ``before`` N m s of earlier pulses apart."""
+    return schedule.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
-    """The train, each pulse aimed from where H then is, the last ones moved; and what it leaves, rad."""
+    """Train, each pulse aimed from the current H, the last ones moved; and its residual, rad."""
     count = attempt.pulses
     for remaining in range(count, 0, -1):
         pulse = train.next_pulse(builder.here, remaining, attempt)
@@ -531,7 +526,7 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
 
 
 def _note(builder: FlownBuilder, train: Train, count: int) -> str:
-    """What the train is, in words."""
+    """Description of the train."""
     on_time = builder.pulses[-1].on_time
     efficiency = precession.arc_efficiency(train.here.spin, on_time)
     line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
@@ -547,7 +542,7 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> str:
 
 
 def _reason(train: Train, best: tuple[float, Schedule] | None) -> str:
-    """Why the ``best`` train found, with what it leaves (rad), is none."""
+    """Reason why the ``best`` train, with its residual (rad), is none."""
     requested = train.options.on_time
     held = "" if requested is None else f" of {requested:.4g} s"
     text = f"no train of equal pulses{held} was found that ends on the target within the limits"

@@ -1,14 +1,8 @@
-"""The equivalent symmetric body; schedules built on it pulse by pulse; reasons of infeasibility.
-
-A schedule laid pulse by pulse along the closed-form motion; what the body-fixed schemes share.
-
-The body that schemes plan on: symmetric, and moving as the true one does at small angles.
+"""Schedules laid pulse by pulse on the equivalent symmetric body; reasons of infeasibility.
 
 Three different moments turn in the body at another rate than their mean, on an ellipse instead of a circle; lasting
 disturbances move the point about which ω turns. Both are taken out here, so that every scheme plans free motion of
 a symmetric body, and put back in: the schedule is translated to the true actuators and corrected on the true motion.
-
-Why a scheme cannot work, and what it leaves, in words.
 """
 
 from __future__ import annotations
@@ -38,11 +32,11 @@ MOST_PULSES = 2000
 
 
 CORRECTED = 1e-4
-"""Share of A|ω0| that is left to correction under dissipation: `rates.width_factor` knows it at small angles only."""
+"""Share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles only."""
 
 
 class ImpulseBuilder:
-    """The transverse rate as it will be, and the pulses chosen so far.
+    """Predicted transverse rate, and the pulses chosen so far.
 
     ``omega`` and ``spin`` (rad/s) hold just after the centre of the last pulse at ``now`` s; ``ready`` is the first
     moment at which the next pulse may start.
@@ -65,18 +59,18 @@ class ImpulseBuilder:
 
     @property
     def settled(self) -> bool:
-        """Whether what is left is rounding; under dissipation, what the last pulse can be corrected by."""
+        """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
         corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
         return self.left <= max(1e-13 * self.C * abs(self.spin), corrected)
 
     @property
     def growing(self) -> bool:
-        """Whether the nutation grows by itself."""
+        """True if the nutation grows by itself."""
         return self.spacecraft.growth > 0.0
 
     @property
     def full(self) -> bool:
-        """Whether no more pulses are allowed."""
+        """True if no more pulses are allowed."""
         return len(self.pulses) >= self.most
 
     @property
@@ -93,7 +87,7 @@ class ImpulseBuilder:
 
     @property
     def uniform(self) -> bool:
-        """Whether ω turns in the body at a constant rate between pulses."""
+        """True if ω turns in the body at a constant rate between pulses."""
         return not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
     def _coast(self, time: float) -> tuple[complex, float]:
@@ -101,8 +95,8 @@ class ImpulseBuilder:
         since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
         omega, spin, turned = self.omega, self.spin, since
         if growth != 0.0:
-            found = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
-            omega, spin, turned = omega * found.transverse, spin * found.axial, found.turned
+            effect = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
+            omega, spin, turned = omega * effect.transverse, spin * effect.axial, effect.turned
         angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
         return omega * cmath.exp(-1j * angle), spin + drift * since
 
@@ -115,12 +109,12 @@ class ImpulseBuilder:
         return self.spacecraft.growth, math.sqrt(axial / size), across / size
 
     def _turned(self, time: float) -> float:
-        """How long, s, the present spin takes to turn the body as far as it turns from now to ``time`` s."""
+        """Time, s, in which the present spin turns the body as far as it turns from now to ``time`` s."""
         since = time - self.now
         return since if self.spacecraft.growth == 0.0 else energy_sink.course(*self._sink(), since).turned
 
     def _when(self, turned: float) -> float:
-        """The moment at which `_turned` is ``turned`` s."""
+        """Time at which `_turned` is ``turned`` s."""
         return self.now + (turned if self.spacecraft.growth == 0.0 else energy_sink.time_to_turn(*self._sink(), turned))
 
     def omega_at(self, time: float) -> complex:
@@ -132,7 +126,7 @@ class ImpulseBuilder:
         return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)
 
     def _driven(self, disturbance: Disturbance, since: float) -> complex:
-        """What a turning disturbance has added to ω since the last pulse (`forced.rotating_torques` for one)."""
+        """Contribution of a turning disturbance to ω since the last pulse (`response.rotating_torques` for one)."""
         if disturbance.transverse == 0.0:
             return 0.0 + 0.0j
         torque = disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)
@@ -156,11 +150,11 @@ class ImpulseBuilder:
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
     def left_after(self, pulse: Pulse) -> float:
-        """What would be left, N m s, if ``pulse`` were fired next."""
+        """Residual, N m s, if ``pulse`` were fired next."""
         return abs(self.A * self.omega_at(pulse.t) + self.acts(pulse))
 
     def helps(self, pulse: Pulse) -> bool:
-        """Whether less is left with ``pulse`` than without."""
+        """True if ``pulse`` lowers the residual."""
         return self.left_after(pulse) < abs(self.A * self.omega_at(pulse.t))
 
     def fire(self, pulse: Pulse) -> None:
@@ -172,7 +166,7 @@ class ImpulseBuilder:
         self.pulses.append(pulse)
 
     def schedule(self) -> Schedule:
-        """What has been chosen."""
+        """Chosen pulses."""
         cut = f"ends after {MOST_PULSES} pulses, the most that are planned; a longer max_on_time helps"
         return Schedule(tuple(self.pulses), (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else ())
 
@@ -218,7 +212,7 @@ class ImpulseBuilder:
         return None
 
     def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
-        """Moment near ``centre`` at which ω opposes the pulse where it does not turn evenly.
+        """Time near ``centre`` at which ω opposes the pulse where it does not turn evenly.
 
         Each step mends the angle still missing, by the rate at which ω turns there.
         """
@@ -250,11 +244,11 @@ class ImpulseBuilder:
 
 
 FADED = 1e-6
-"""Share of the nutation below which there is nothing left for pulses to do: dissipation has taken it out before."""
+"""Fraction of the nutation below which pulses have nothing to do: dissipation has removed it."""
 
 
 def no_channels(spacecraft: Spacecraft) -> str:
-    """No body-fixed channel can damp."""
+    """Error where no body-fixed channel can damp."""
     if any(channel.damps for channel in spacecraft.channels):
         ticks = "" if spacecraft.limits.tick is None else ", as a multiple of limits.tick"
         time = spacecraft.horizon - spacecraft.limits.earliest
@@ -270,10 +264,10 @@ def no_channels(spacecraft: Spacecraft) -> str:
 
 
 def bounded_by(spacecraft: Spacecraft) -> str:
-    """The limits that a schedule of its channels has to keep, by name: the horizon, and those that the file sets."""
+    """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
     limits, channels = spacecraft.limits, spacecraft.channels
     there = {
-        "on-times": any(one.min_on_time > 0.0 or math.isfinite(one.max_on_time) for one in channels),
+        "on-times": any(channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels),
         "gap": limits.gap > 0.0,
         "ticks": limits.tick is not None,
         "blackout windows": bool(limits.blackout),
@@ -283,14 +277,14 @@ def bounded_by(spacecraft: Spacecraft) -> str:
 
 
 def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
-    """The ``channels`` that can damp; raises Infeasible where there are none."""
+    """Damping ``channels``; raises Infeasible where there are none."""
     if not channels:
         raise Infeasible(no_channels(spacecraft))
     return channels
 
 
 def expect_aim(spacecraft: Spacecraft) -> None:
-    """Raises Infeasible without a target to which a scheme could turn the spin axis, or without what could do it."""
+    """Raise Infeasible without a target to which a scheme could turn the spin axis, or without an actuator."""
     if spacecraft.goal.axis is None:
         raise Infeasible("needs a target axis: --target, or goal in the file")
     if spacecraft.torquer is None:
@@ -298,7 +292,7 @@ def expect_aim(spacecraft: Spacecraft) -> None:
 
 
 def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
-    """That no channel can be fired against ω within the limits, with the cure."""
+    """Error where no channel can be fired against ω within the limits, with the cure."""
     omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     if spacecraft.inertia.a == 0.0:
         off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
@@ -335,7 +329,7 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
 
 
 def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left: float) -> str:
-    """That trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
+    """Error where trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
     ratio = spacecraft.inertia.C / (spacecraft.inertia.A * per_turn)
     off, least = abs(ratio - round(ratio)), math.degrees(left)
     if off * most >= 1.0:
@@ -351,7 +345,7 @@ def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left
 
 
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
-    """By how many degrees an ``impulse`` across the spin axis, N m s, turns H; of A|ω|, the nutation."""
+    """Turn of H in degrees by an ``impulse`` across the spin axis, N m s; of A|ω|, the nutation."""
     return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"
 
 
@@ -373,26 +367,26 @@ class SymmetricModel:
 
     @property
     def exact(self) -> bool:
-        """Whether the model moves as the spacecraft does, so that nothing has to be corrected."""
+        """True if the model moves as the spacecraft does, so that nothing has to be corrected."""
         return self.spacecraft.inertia.symmetric and not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
-    def translate(self, made: Schedule) -> Schedule:
-        """The schedule with the true actuators."""
+    def translate(self, schedule: Schedule) -> Schedule:
+        """Schedule with the true actuators."""
         if self.spacecraft.inertia.symmetric:
-            return made
+            return schedule
         channels = {channel.name: channel for channel in self.spacecraft.channels}
         windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
-        for pulse in made:
+        for pulse in schedule:
             channel = channels.get(pulse.channel)
             if channel is None:
                 pulses.append(self._steered(pulse, windows, ready))
             else:
                 pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
             ready = pulses[-1].end + self.spacecraft.limits.gap
-        return Schedule(tuple(pulses), made.notes, made.bounds)
+        return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
     def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
-        """A steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
+        """Steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
         torquer = self.spacecraft.torquer
         assert torquer is not None
         first, second = pulse.impulse[:2] / self.stretch
@@ -406,7 +400,7 @@ class SymmetricModel:
 
 
 def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:
-    """The model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself.
+    """Model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself.
 
     Its torques change ω as the true ones do; ``turning``: they turn H as the true ones do, and ω at t = 0 is as much
     larger or smaller on average, as the circle may be of any size.
@@ -436,7 +430,7 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel
 
 
 def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """The ``body`` with the attitude of the ``spacecraft``, and the target axis as far from its H as the true one is.
+    """Copy of the ``body`` with the attitude of the ``spacecraft``, and the target axis at its true distance from H.
 
     Both have other rates, and so another H; what a plan has to do is the turn from H to the target.
     """
@@ -446,7 +440,7 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
     given = spacecraft.attitude or Attitude(quaternion)
     in_file_axes = attitude.multiply(quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
     held = replace(body, attitude=replace(given, quaternion=in_file_axes))
-    before, after = (one / float(np.linalg.norm(one)) for one in (spacecraft.momentum, held.momentum))
+    before, after = (momentum / float(np.linalg.norm(momentum)) for momentum in (spacecraft.momentum, held.momentum))
     # The shortest turn from the one H to the other: two reflections, at the middle between both and at the second.
     middle = (before + after) / float(np.linalg.norm(before + after))
     axis = spacecraft.goal.axis - 2.0 * (middle @ spacecraft.goal.axis) * middle
@@ -454,21 +448,21 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
 
 
 def _stretched(channel: Channel, stretch: Vector) -> Channel:
-    def thruster(one: Thruster) -> Thruster:
-        return replace(one, torque=one.torque * np.array([*stretch, 1.0]))
+    def thruster(thruster: Thruster) -> Thruster:
+        return replace(thruster, torque=thruster.torque * np.array([*stretch, 1.0]))
 
     return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters), spends=channel.strength)
 
 
 def _stretched_torquer(torquer: Steerable | None, stretch: Vector) -> Steerable | None:
-    """The stretch differs by direction; its mean is near enough for a plan that is corrected."""
+    """Torquer under the mean stretch, which differs by direction: near enough for a plan that is corrected."""
     if torquer is None or torquer.torque is None:
         return torquer
     return replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
 
 
 def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """The spacecraft with ω counted from the steady response to its disturbances, which are then taken out.
+    """Spacecraft with ω counted from the steady response to its disturbances, which are removed.
 
     Axial disturbances stay, and transverse ones too slow against the nutation to be steady within the horizon.
     """
@@ -476,27 +470,32 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
     left = tuple(
-        replace(one, transverse=0.0 + 0.0j) if settles(spacecraft, one) else one for one in spacecraft.disturbances
+        replace(disturbance, transverse=0.0 + 0.0j) if settles(spacecraft, disturbance) else disturbance
+        for disturbance in spacecraft.disturbances
     )
     omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
-    return replace(spacecraft, omega0=omega0, disturbances=tuple(one for one in left if one.axial or one.transverse))
+    return replace(
+        spacecraft,
+        omega0=omega0,
+        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
+    )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
-    """Whether ω beats against the disturbance at least once within the horizon: else it is resonant for the plan."""
+    """True if ω beats against the disturbance at least once within the horizon; else it counts as resonant."""
     detuning = abs(spacecraft.inertia.a * spacecraft.spin + disturbance.rate)
     return detuning * spacecraft.horizon > 2.0 * math.pi
 
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
-    """ω of the steady response to the disturbances that settle, at ``time`` s: nothing is to be damped about it."""
+    """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
     inertia = spacecraft.inertia
     return sum(
         (
-            response.steady_response(inertia.A, inertia.C, spacecraft.spin, one.transverse, one.rate)
-            * complex(math.cos(one.rate * time), math.sin(one.rate * time))
-            for one in spacecraft.disturbances
-            if one.transverse and settles(spacecraft, one)
+            response.steady_response(inertia.A, inertia.C, spacecraft.spin, disturbance.transverse, disturbance.rate)
+            * complex(math.cos(disturbance.rate * time), math.sin(disturbance.rate * time))
+            for disturbance in spacecraft.disturbances
+            if disturbance.transverse and settles(spacecraft, disturbance)
         ),
         0.0 + 0.0j,
     )

@@ -46,7 +46,7 @@ SHORTLIST = 6
 
 
 def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """Two pulses, and a remark on what fixed channels cost or leave.
+    """Two pulses, and a note on the cost or residual of fixed channels.
 
     ``options.literal``: equal halves and the wait as printed, not corrected, and the target left alone. Raises
     Infeasible with the reason.
@@ -57,15 +57,15 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
             return pulse_pairs.schedule(spacecraft)
         except Infeasible:
-            made = _wide(spacecraft)
-            if made is None:
+            damping = _wide(spacecraft)
+            if damping is None:
                 raise
-            return made
+            return damping
     return _damping(spacecraft, options)
 
 
 def _wide(spacecraft: Spacecraft) -> Schedule | None:
-    """The pulses that damp without drift, corrected to a target nearby; None where they do not come there.
+    """Pulses that damp without drift, corrected to a target nearby; None where they do not reach it.
 
     A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
     that are all there is, this finds what an acquisition, which plans for the turn, does not.
@@ -73,14 +73,14 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
     if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
         return None
     try:
-        made = _damping(spacecraft, TwoPulseOptions())
+        schedule = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
-    return made if float(np.linalg.norm(correction.misses(spacecraft, made))) <= tolerable(spacecraft) else None
+    return schedule if float(np.linalg.norm(correction.misses(spacecraft, schedule))) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """The two pulses that leave H where it was, as far as correction goes for a target."""
+    """Two pulses that leave H where it was, but for the correction to a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
@@ -168,7 +168,7 @@ def _pair(
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
-class Candidate(NamedTuple):
+class HalfPulseCandidate(NamedTuple):
     """Two channels and moments that close to first order; ``short`` is the part of the impulse out of reach."""
 
     short: float
@@ -184,60 +184,60 @@ class Candidate(NamedTuple):
 
 
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
-    """The schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
+    """Schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
 
     None either where there is no nutation: these damp, and nothing else.
     """
     if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
-        for made, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
-            if keeps_limits(spacecraft, made.pulses):
-                yield made
+        for schedule, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
+            if keeps_limits(spacecraft, schedule.pulses):
+                yield schedule
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
-    """The smallest flown residual of the most promising candidates wins, exact ones in order.
+    """Candidate of least flown residual; exact ones in order.
 
     Where every one breaks a limit, the first of them: the judge says which.
     """
     best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
-    made = best or broken
-    if made is None:
+    schedule = best or broken
+    if schedule is None:
         raise Infeasible(_nothing_closes(spacecraft, channels))
-    return made
+    return schedule
 
 
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
-    """The most promising candidates, corrected, with the residual (rad) that each leaves when flown."""
+    """Most promising candidates, corrected, with the flown residual (rad) of each."""
     candidates = sorted(
-        (found for one in channels for two in channels for found in _candidates(spacecraft, one, two, options.literal)),
-        key=lambda found: (found.short, found.cost),
+        (candidate for a in channels for b in channels for candidate in _candidates(spacecraft, a, b, options.literal)),
+        key=lambda candidate: (candidate.short, candidate.cost),
     )
     if not candidates:
         return
     cheapest = candidates[0]
     short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
     near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
-    near.sort(key=lambda found: found.end)
+    near.sort(key=lambda candidate: candidate.end)
     others = [candidate for candidate in candidates if candidate not in near]
     for candidate in [*near, *others][:SHORTLIST]:
         yield _corrected(spacecraft, candidate, options.literal)
 
 
-def _corrected(spacecraft: Spacecraft, candidate: Candidate, literal: bool) -> tuple[Schedule, float]:
+def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: bool) -> tuple[Schedule, float]:
     """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    made = correction.fired(spacecraft, candidate.channels, candidate.timing)
+    schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
     if not literal:
-        made = correction.correct(spacecraft, made, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(correction.misses(spacecraft, made)))
-    return Schedule(made.pulses, _remark(spacecraft, candidate, made)), left
+        schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+    left = float(np.linalg.norm(correction.misses(spacecraft, schedule)))
+    return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tuple[str, ...]:
+def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[str, ...]:
     inertia = spacecraft.inertia
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
-    first, second = made.pulses
+    first, second = schedule.pulses
     turns = (second.t - first.t) / halves.wait
     text = (
         f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half turns of the nutation "
@@ -250,7 +250,7 @@ def _remark(spacecraft: Spacecraft, candidate: Candidate, made: Schedule) -> tup
     return (text,)
 
 
-def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[Candidate]:
+def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
     inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
     A, C, a, spin = inertia.A, inertia.C, inertia.a, spacecraft.spin
@@ -310,7 +310,7 @@ def _place(
     wait: float,
     miss: float,
     literal: bool,
-) -> Candidate | None:
+) -> HalfPulseCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
     windows, a, spin = Windows(spacecraft), spacecraft.inertia.a, spacecraft.spin
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
@@ -345,15 +345,17 @@ def _place(
         )
         if delay == 0.0:
             pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-            made = Schedule(pulses)
+            schedule = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return Candidate(short if short > 1e-9 else 0.0, made.cost, made.end, (one, two), timing, miss, factor)
+            return HalfPulseCandidate(
+                short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
+            )
         first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 
 
 def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
-    """What a pulse of ``on_time`` s is off the effective impulse ``needed`` N m s, over all that the nutation needs."""
+    """Deficit of a pulse of ``on_time`` s against the impulse ``needed`` N m s, over that for all nutation."""
     rate = channel.axial / spacecraft.inertia.C
     width = response.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
     return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
@@ -370,12 +372,12 @@ def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
 
 
 def _grown(spacecraft: Spacecraft, time: float) -> float:
-    """By what factor dissipation changes the transverse rate until ``time`` s."""
+    """Factor of dissipation on the transverse rate until ``time`` s."""
     if spacecraft.growth == 0.0:
         return 1.0
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
-    found = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
-    return float(found.transverse)
+    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
+    return float(effect.transverse)
 
 
 def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:

@@ -1,9 +1,9 @@
-"""Plans through valves: schemes lay rectangular pulses, and here they become the commands that give them.
+"""Valve commands: translation of rectangular pulses into commands of valves.
 
-What a command gives is known by its effective on-time and the centroid of its thrust (`thruster`). So schemes plan
+A command is known by its effective on-time and the centroid of its thrust (`thruster`). Schemes plan
 for the *plain* body, which fires rectangles of full thrust within the effective bounds of its channels, and keeps
 limits that leave room for the delays. Each of its pulses becomes the command with the same impulse and centroid, cold
-and blowdown included; what the shape of the thrust changes besides is corrected on the flown motion.
+and blowdown included; further effects of the shape of the thrust are corrected on the flown motion.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ PLANS = 6
 def plain(
     spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
 ) -> Spacecraft:
-    """The body that schemes plan for: rectangles of full thrust at any time, that the channels can really give.
+    """Body that schemes plan for: rectangles of full thrust within the capability of the channels.
 
     Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
     ``room`` s longer at either end. Its moments are those with so many kg ``used``.
@@ -73,9 +73,13 @@ def plain(
 
 
 def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
-    """How long before and after the rectangle a command and its thrust may last, s, whichever the channel."""
-    found = [one.valve.reaches(*effective_on_times(one)) for one in spacecraft.channels if one.valve is not None]
-    return max((lead for lead, _ in found), default=0.0), max((lag for _, lag in found), default=0.0)
+    """Longest extension of a command and its thrust before and after the rectangle, s, over all channels."""
+    reaches = [
+        channel.valve.reaches(*effective_on_times(channel))
+        for channel in spacecraft.channels
+        if channel.valve is not None
+    ]
+    return max((lead for lead, _ in reaches), default=0.0), max((lag for _, lag in reaches), default=0.0)
 
 
 def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: float) -> Channel:
@@ -85,117 +89,126 @@ def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: 
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
-    """The options of a scheme for the plain body: an on-time that is requested is a command.
+    """Options of a scheme for the plain body: a requested on-time is a command.
 
     Raises Infeasible where the channels make different pulses of it.
     """
     requested = getattr(chosen, "on_time", None)
     if requested is None:
         return chosen
-    found = {requested if one.valve is None else one.valve.thrust(requested).on_time for one in spacecraft.channels}
-    if len(found) > 1:
+    on_times = {
+        requested if channel.valve is None else channel.valve.thrust(requested).on_time
+        for channel in spacecraft.channels
+    }
+    if len(on_times) > 1:
         raise Infeasible(
             f"an on-time of {requested:.4g} s is for channels with the same valve; these give pulses of different "
             "length"
         )
-    return replace(chosen, on_time=found.pop()) if found else chosen  # type: ignore[call-arg]
+    return replace(chosen, on_time=on_times.pop()) if on_times else chosen  # type: ignore[call-arg]
 
 
 def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], correct: Correction) -> Schedule:
-    """The schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
+    """Schedule that ``plan`` gives for the plain body, as commands for the true one; see `as_commands`."""
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
-    made: Schedule | None = None
+    schedule: Schedule | None = None
     for _ in range(PLANS):
         body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
-            made = plan(body)
+            schedule = plan(body)
         except TooShort as short:
-            if made is None:
+            if schedule is None:
                 raise TooShort(short.why + EFFECTIVE, short.cure) from None
             break
         except Infeasible as reason:
-            if made is None:
+            if schedule is None:
                 raise Infeasible(f"{reason}{EFFECTIVE}") from None
             break
-        too_weak, too_strong, longer = _outside(spacecraft, made, body.inertia, correct)
+        too_weak, too_strong, longer = _outside(spacecraft, schedule, body.inertia, correct)
         if too_weak or too_strong:
             weakest, strongest = min([weakest, *too_weak]), max([strongest, *too_strong])
             continue
-        if used == 0.0 and shed(spacecraft) is not None and made.propellant:
-            used = made.propellant  # once more with the moments half-way
+        if used == 0.0 and shed(spacecraft) is not None and schedule.propellant:
+            used = schedule.propellant  # once more with the moments half-way
             continue
         try:
-            found = as_commands(spacecraft, made, correct, body.inertia)
+            commands = as_commands(spacecraft, schedule, correct, body.inertia)
         except Infeasible:
             if not tried:
                 raise
             break
-        kept, left = keeps_limits(spacecraft, found.pulses), _left(spacecraft, found, correct)
-        tried.append((not kept, left, found))
+        kept, left = keeps_limits(spacecraft, commands.pulses), _left(spacecraft, commands, correct)
+        tried.append((not kept, left, commands))
         rounded = spacecraft.limits.tick is not None
-        if work.exhausted() or not made.pulses:
+        if work.exhausted() or not schedule.pulses:
             break
-        if kept and (rounded or left <= NEARLY * _left(body, made, correct) + EXACT):
+        if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
-        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in made))
-    assert made is not None
-    return min(tried, key=lambda one: one[:2])[2] if tried else as_commands(spacecraft, made, correct, body.inertia)
+        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
+    assert schedule is not None
+    return (
+        min(tried, key=lambda trial: trial[:2])[2]
+        if tried
+        else as_commands(spacecraft, schedule, correct, body.inertia)
+    )
 
 
-def _left(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> float:
-    """What a schedule leaves of what counts, rad."""
-    missed = misses(spacecraft, made)
+def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
+    """Residual of the bounded parts of a schedule, rad."""
+    missed = misses(spacecraft, schedule)
     return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
 
 
 def as_commands(
-    spacecraft: Spacecraft, made: Schedule, correct: Correction, inertia: Inertia | None = None
+    spacecraft: Spacecraft, schedule: Schedule, correct: Correction, inertia: Inertia | None = None
 ) -> Schedule:
     """A schedule of the plain body as commands; ``correct`` brings them to what is left on the flown motion.
 
     ``inertia`` is that of the plain body, default that at t = 0. Commands that give no thrust are left out. Raises
     Infeasible where the propellant does not last.
     """
-    commands = _translated(spacecraft, made, inertia, correct)
-    first = _firing(replace(made.without_proof, pulses=commands))
+    commands = _translated(spacecraft, schedule, inertia, correct)
+    first = _firing(replace(schedule.without_proof, pulses=commands))
     if spacecraft.limits.tick is None or not first.pulses:
         corrected = correct(spacecraft, first, TAIL)
     else:
         corrected = _on_ticks(spacecraft, first, correct)
-    found = _firing(corrected)
-    if found.pulses:
-        supply, channels = Supply(spacecraft), {one.name: one for one in spacecraft.channels}
-        for pulse in found:  # as commanded: what an empty tank has weakened would never be more than it has
+    firing = _firing(corrected)
+    if firing.pulses:
+        supply, channels = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}
+        for pulse in firing:  # as commanded: what an empty tank has weakened would never be more than it has
             if pulse.channel in channels:
                 supply.take(channels[pulse.channel], pulse.on_time)
             else:
                 supply.count((pulse,))
         supply.expect_to_last()
-    fired = [pulse for pulse, command in zip(made, commands, strict=True) if command.magnitude > 0.0]
-    notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), found, correct)
-    return replace(found, notes=(*found.notes, *notes))
+    fired = [pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0]
+    notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), firing, correct)
+    return replace(firing, notes=(*firing.notes, *notes))
 
 
 def _weakened(
-    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], found: Schedule, correct: Correction
+    spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
 ) -> Iterator[str]:
-    """What falling pressure and cold nozzles make of a plan, in words; ``pairs`` of its pulses and their commands."""
+    """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
     if correct.equal and pairs:
         yield from _unequal(pairs)
     tank = spacecraft.tank
-    if tank is not None and found.pulses:
-        full, left = (f"{1e-5 * one:.4g}" for one in (tank.pressure, tank.pressure_after(found.propellant or 0.0)))
+    if tank is not None and firing.pulses:
+        full, left = (
+            f"{1e-5 * pressure:.4g}" for pressure in (tank.pressure, tank.pressure_after(firing.propellant or 0.0))
+        )
         if full != left:
             yield f"tank pressure falls from {full} to {left} bar"
 
 
 def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
-    """What equal pulses of a plan, the last ones, are as commands where those differ, in words."""
+    """Note on the last equal pulses of a plan whose commands differ."""
     last = pairs[-1][0].on_time
     alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
-    shortest, longest = (f"{one(alike, default=0.0):.4g}" for one in (min, max))
+    shortest, longest = (f"{extreme(alike, default=0.0):.4g}" for extreme in (min, max))
     if shortest != longest:
         yield (
             f"equal in impulse, and so commands of {shortest} s to {longest} s: cold nozzles or falling pressure make "
@@ -203,23 +216,23 @@ def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
         )
 
 
-def _firing(made: Schedule) -> Schedule:
-    """The schedule without pulses of no impulse."""
-    return replace(made, pulses=tuple(pulse for pulse in made if pulse.magnitude > 0.0))
+def _firing(schedule: Schedule) -> Schedule:
+    """Schedule without pulses of no impulse."""
+    return replace(schedule, pulses=tuple(pulse for pulse in schedule if pulse.magnitude > 0.0))
 
 
 def _translated(
-    spacecraft: Spacecraft, made: Schedule, inertia: Inertia | None, correct: Correction, *, unbounded: bool = False
+    spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia | None, correct: Correction, *, unbounded: bool = False
 ) -> tuple[Pulse, ...]:
-    """Each pulse as the command that has its impulse and its centroid; ``unbounded``: as rectangles of any length.
+    """Pulses as the commands of their impulse and centroid; ``unbounded``: as rectangles of any length.
 
     Where moments fall it changes ω, or the direction of H, as the pulse did with the ``inertia`` of the plan, and where
     H does not count it comes as the nutation has turned in the body as far. Raises Infeasible for pulses so weak that
     they would be longer than the horizon.
     """
-    supply, channels, pulses = Supply(spacecraft), {one.name: one for one in spacecraft.channels}, []
+    supply, channels, pulses = Supply(spacecraft), {channel.name: channel for channel in spacecraft.channels}, []
     planned_, before, late = inertia or spacecraft.inertia, 0.0, 0.0
-    for pulse_ in made:
+    for pulse_ in schedule:
         here, pulse = lightened(spacecraft, supply.since), pulse_
         if here.moments != planned_.moments:
             slower = 1.0 if correct.momentum or here.body_rate == 0.0 else planned_.body_rate / here.body_rate
@@ -243,15 +256,17 @@ def _translated(
 
 
 def _outside(
-    spacecraft: Spacecraft, made: Schedule, inertia: Inertia, correct: Correction
+    spacecraft: Spacecraft, schedule: Schedule, inertia: Inertia, correct: Correction
 ) -> tuple[list[float], list[float], float]:
     """Levels, over the thrust of the file, of pulses so weak, and so strong, that no command of a channel gives them.
 
     And by how much, s, a pulse becomes longer at either end. Raises as `_translated` does.
     """
-    channels = {one.name: one for one in spacecraft.channels}
+    channels = {channel.name: channel for channel in spacecraft.channels}
     weak, strong, longer = [], [], 0.0
-    for planned_, pulse in zip(made, _translated(spacecraft, made, inertia, correct, unbounded=True), strict=True):
+    for planned_, pulse in zip(
+        schedule, _translated(spacecraft, schedule, inertia, correct, unbounded=True), strict=True
+    ):
         longer = max(longer, 0.5 * (pulse.on_time - planned_.on_time))
         channel = channels.get(pulse.channel)
         if channel is None or pulse.torque is None:
@@ -268,7 +283,7 @@ def _outside(
 
 
 def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Schedule:
-    """The schedule on the ticks of its commands.
+    """Schedule on the ticks of its commands.
 
     It is rounded all at once, and one of the last pulses after the other with those behind it corrected: what leaves
     less is taken.
@@ -276,14 +291,14 @@ def _on_ticks(spacecraft: Spacecraft, made: Schedule, correct: Correction) -> Sc
     smooth = replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
     made = correct(smooth, made, TAIL)
 
-    def rounded(one: Schedule, count: int) -> Schedule:
-        """With the first ``count`` pulses on ticks."""
-        pulses = (commandable(spacecraft, pulse) if index < count else pulse for index, pulse in enumerate(one))
-        return replace(one, pulses=supplied(spacecraft, pulses))
+    def rounded(schedule: Schedule, count: int) -> Schedule:
+        """Copy with the first ``count`` pulses on ticks."""
+        pulses = (commandable(spacecraft, pulse) if index < count else pulse for index, pulse in enumerate(schedule))
+        return replace(schedule, pulses=supplied(spacecraft, pulses))
 
     in_turn = made
     for behind in range(min(TAIL, len(made)) - 1, 0, -1):
         in_turn = correct(smooth, rounded(in_turn, len(made) - behind), behind)
-    found = [rounded(one, len(made)) for one in (made, in_turn)]
-    kept = [one for one in found if keeps_limits(spacecraft, one.pulses)] or found
-    return min(kept, key=lambda one: _left(spacecraft, one, correct))
+    roundings = [rounded(schedule, len(made)) for schedule in (made, in_turn)]
+    kept = [schedule for schedule in roundings if keeps_limits(spacecraft, schedule.pulses)] or roundings
+    return min(kept, key=lambda schedule: _left(spacecraft, schedule, correct))

@@ -1,4 +1,4 @@
-"""All that a schedule must keep: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
+"""Constraints on schedules: earliest start, gap, blackout windows, horizon, on-times, ticks, number of pulses.
 
 `Windows` says when a pulse may be on; `breaches` judges whole schedules, for the schemes and for the judge alike. It
 gives data; `nutdamp.planning.decision` has the words.
@@ -27,10 +27,10 @@ OFF_TICK = 1e-6
 
 
 class Windows:
-    """The limits of one spacecraft, for one pulse at a time."""
+    """Limits of one spacecraft, for one pulse at a time."""
 
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
-        """``endless`` drops the horizon, to tell what a longer one would allow."""
+        """Windows of ``spacecraft``; ``endless`` drops the horizon, to show the effect of a longer one."""
         self.limits = spacecraft.limits
         self.horizon = math.inf if endless else spacecraft.horizon
 
@@ -46,7 +46,7 @@ class Windows:
         return float(over[following]) if touched else None
 
     def allows(self, start: float, on_time: float, ready: float) -> bool:
-        """Whether a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
+        """True if a pulse may be on from ``start`` for ``on_time`` s when the actuators are ``ready`` (s)."""
         slack = touching(start + on_time)
         return (
             start >= ready - slack
@@ -66,17 +66,17 @@ class Windows:
 
     @cached_property
     def dark(self) -> tuple[Vector, Vector]:
-        """Begins and ends of the blackout windows, s, in order, those that overlap as one."""
+        """Starts and ends of the blackout windows, s, in order; overlapping windows are merged."""
         merged: list[list[float]] = []
         for begins, ends in sorted(self.limits.blackout):
             if merged and begins < merged[-1][1]:
                 merged[-1][1] = max(merged[-1][1], ends)
             else:
                 merged.append([begins, ends])
-        return np.array([one for one, _ in merged]), np.array([other for _, other in merged])
+        return np.array([begin for begin, _ in merged]), np.array([other for _, other in merged])
 
     def blocked(self, starts: Vector, ends: Vector, slack: Vector | float = 0.0) -> NDArray[np.bool_]:
-        """Whether what lasts from ``starts`` to ``ends`` (n,) s is in a blackout window for more than ``slack`` s."""
+        """True where the time from ``starts`` to ``ends`` (n,) s is in a blackout window for more than ``slack`` s."""
         begins, over = self.dark
         # The first window that is not over at the start is the only one that can be met first.
         following = np.searchsorted(over, starts + slack, side="right")
@@ -123,7 +123,7 @@ class Windows:
 
 
 def free_windows(spacecraft: Spacecraft, horizon: float | None = None) -> list[tuple[float, float]]:
-    """When pulses may be on, (begin, end) s in order: from the earliest start to the horizon, blackout left out.
+    """Windows (begin, end) s in which pulses may be on: from the earliest start to the horizon without blackouts.
 
     ``horizon`` s, where given, replaces that of the spacecraft. Windows that only touch leave a moment free between
     them.
@@ -157,7 +157,7 @@ def rooms(spacecraft: Spacecraft, pulses: Sequence[Pulse]) -> list[tuple[float, 
 
 
 def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
-    """The channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time.
+    """Channels that schemes fire: more transverse than ``axial`` (or either), with a commandable on-time.
 
     One whose torques cancel is none of them.
     """
@@ -166,7 +166,7 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     def has_on_time(channel: Channel) -> bool:
         return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
 
-    turning = [one for one in spacecraft.channels if one.damps or (axial and one.torque.any())]
+    turning = [channel for channel in spacecraft.channels if channel.damps or (axial and channel.torque.any())]
     return [channel for channel in turning if has_on_time(channel)]
 
 
@@ -175,20 +175,22 @@ def commandable_widths(commands: Commands, channel: Channel) -> Vector:
     widths = commands.widths
     widths = widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
     return (
-        widths if channel.valve is None else widths[[effective_on_time(channel, one) > 0.0 for one in widths.tolist()]]
+        widths
+        if channel.valve is None
+        else widths[[effective_on_time(channel, width) > 0.0 for width in widths.tolist()]]
     )
 
 
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
-    """What a start and an on-time half a tick off leave of each pulse, rad, as chance adds them up; without ticks 0."""
+    """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares; without ticks 0."""
     body, half = spacecraft, 0.5 * (spacecraft.limits.tick or 0.0)
     rate, size = max(1.0, abs(body.inertia.a)) * abs(body.spin), body.inertia.C * abs(body.spin)
-    lengths = ((one.magnitude, 1.0 / one.on_time if one.on_time > 0.0 else 0.0) for one in pulses)
+    lengths = ((pulse.magnitude, 1.0 / pulse.on_time if pulse.on_time > 0.0 else 0.0) for pulse in pulses)
     return [half * magnitude * math.hypot(share, rate) / size for magnitude, share in lengths]
 
 
 def shortest_on_time(spacecraft: Spacecraft, channel: Channel) -> float:
-    """Shortest on-time that can be commanded, s: the min_on_time, on ticks rounded up to one and not less than one."""
+    """Shortest on-time that can be commanded, s: min_on_time rounded up to ticks, at least one tick."""
     tick = spacecraft.limits.tick
     return channel.min_on_time if tick is None else max(math.ceil((channel.min_on_time - TOUCHING) / tick), 1) * tick
 
@@ -231,7 +233,7 @@ def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
     if len(channels) <= PAIRED:
         return channels
     cheapest: dict[int, Channel] = {}
-    for channel in sorted(channels, key=lambda one: (one.price, -abs(one.transverse))):
+    for channel in sorted(channels, key=lambda channel: (channel.price, -abs(channel.transverse))):
         cheapest.setdefault(_about(channel), channel)
     return [channel for channel in channels if cheapest.get(_about(channel)) is channel]
 
@@ -242,12 +244,12 @@ def _about(channel: Channel) -> int:
 
 
 def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:
-    """The channel that fires the pulse; None for a steerable torquer."""
+    """Channel that fires the pulse; None for a steerable torquer."""
     return next((channel for channel in spacecraft.channels if channel.name == pulse.channel), None)
 
 
 def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
-    """The pulse with start and on-time on the ticks of the commands."""
+    """Pulse with start and on-time on the ticks of the commands."""
     if spacecraft.limits.tick is None:
         return pulse
     windows, channel = Windows(spacecraft), channel_of(spacecraft, pulse)
@@ -265,7 +267,7 @@ def commandable(spacecraft: Spacecraft, pulse: Pulse) -> Pulse:
 
 
 class Limit(Enum):
-    """What a schedule may break; ``limits.…`` are keys of the file."""
+    """Limit that a schedule may break; ``limits.…`` are keys of the file."""
 
     RESOLUTION = "resolution of times"
     EARLIEST = "limits.earliest"
@@ -280,7 +282,7 @@ class Limit(Enum):
 
 
 class Breach(NamedTuple):
-    """A ``limit`` that the pulse with the ``number``, from 1, breaks: its ``bound`` s, exceeded ``by`` so many s.
+    """Breach of a ``limit`` by the pulse ``number`` (from 1), which exceeds its ``bound`` s ``by`` so many s.
 
     For `Limit.MAX_PULSES` both count pulses, and the pulse is the last one. ``window``: the blackout window, s; the
     pulse would have to end before its begin, the ``bound``, or to start after its end, whichever is nearer.
@@ -295,7 +297,7 @@ class Breach(NamedTuple):
 
 
 def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach]:
-    """What ``pulses``, in order, break of the limits and on-times of the file, pulse by pulse.
+    """Breaches of the limits and on-times of the file by ``pulses``, in order, pulse by pulse.
 
     What is within rounding (`touching`) is no breach; but no pulse may start before t = 0 by anything. Command blocks
     have steps of their own, from a Sun pulse that comes on no tick: limits.tick is not theirs.
@@ -324,7 +326,7 @@ def breaches(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> Iterator[Breach
 def _margins(
     windows: Windows, channel: Channel | None, pulse: Pulse, previous_end: float
 ) -> Iterator[tuple[Limit, float, float, float]]:
-    """Each limit but the blackout windows with its bound, by how much a pulse exceeds it, and by how much it may; s.
+    """Limits other than blackout windows: each with its bound, the excess of a pulse, and the allowed excess, s.
 
     Starts, on-times and ticks are those of the command; horizon and gap wait until its thrust is over too.
     """
@@ -345,5 +347,5 @@ def _margins(
 
 
 def keeps_limits(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> bool:
-    """Whether ``pulses``, in order, break nothing: see `breaches`."""
+    """True if ``pulses``, in order, break nothing: see `breaches`."""
     return next(breaches(spacecraft, pulses), None) is None

@@ -1,4 +1,4 @@
-"""Thrusters, channels, Sun sensor, command blocks, loop sensor.
+"""Equipment: thrusters, channels, steerable torquer, Sun sensor, command blocks, loop; SI, principal axes.
 
 What a spacecraft can fire: thrusters, channels of them, and Magnus' steerable torquer. SI, in principal axes.
 
@@ -35,17 +35,17 @@ class SunSensor:
 
     @property
     def sees_all(self) -> bool:
-        """Whether no direction but those along the axis is out of its view, and so every passage of the Sun is seen."""
+        """True if the sensor sees every passage of the Sun unless the Sun is along the axis."""
         return self.elevation == 0.0 and self.half_width >= 0.5 * math.pi
 
     def sees(self, sun_angle: Any) -> Any:
-        """Whether it sees the Sun at this angle (rad) from the spin axis; of arrays each."""
+        """True if the Sun is in view at this angle (rad) from the spin axis; elementwise."""
         return abs(0.5 * math.pi - sun_angle - self.elevation) <= self.half_width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
-    """What a block may hold: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
+    """Possible command blocks: delays 0, ``delay_step``, … up to ``delay_max`` s, ``widths`` (n,) s, at most
     ``max_count`` pulses, one in ``every`` so many spins.
     """
 
@@ -61,17 +61,17 @@ class Commands:
         return round(delay / self.delay_step)
 
     def width_counts(self, width: float) -> int:
-        """Steps of a ``width`` s; of widths that are a list the number of the entry next to it, 1 the shortest."""
+        """Steps of a ``width`` s; with a list of widths the number of the nearest entry, 1 the shortest."""
         if self.width_step is not None:
             return round(width / self.width_step)
         return 1 + int(np.abs(self.widths - width).argmin())
 
     def delay_of(self, counts: float) -> float:
-        """The delay, s, of so many steps."""
+        """Delay of so many ``steps``, s."""
         return counts * self.delay_step
 
     def width_of(self, counts: float) -> float | None:
-        """The width, s, of so many steps, or of that number in the list; None where the list has no such number."""
+        """Width of so many ``steps``, or of that number in the list, s; None where the list has no such number."""
         if self.width_step is not None:
             return counts * self.width_step
         return float(self.widths[int(counts) - 1]) if 1 <= counts <= len(self.widths) else None
@@ -104,12 +104,12 @@ GYRO, ACCELEROMETER = "gyro", "accelerometer"
 """Kinds of sensor: rate gyros about the body axes 1 and 2, or one accelerometer."""
 
 FOUR_PULSE, ONE_PULSE, BANG = "four-pulse", "one-pulse", "bang"
-"""Laws: pulses up to a length in proportion to what is left; one pulse for all that is left; pulses all alike."""
+"""Laws: pulses in proportion to the remaining nutation; one pulse for all of it; equal pulses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """What the loop sees: ``scale`` times the truth plus ``bias``, with ``noise`` (one sigma), in steps.
+    """Sensor of the loop: ``scale`` times the truth plus ``bias``, with ``noise`` (one sigma), in steps.
 
     ``bias``, ``noise`` and the steps of ``quantisation`` are rad/s of a gyro, m/s² of an accelerometer, which is at
     ``position`` (3,) m from the centre of mass and measures along the unit vector ``axis`` (3,), both in principal
@@ -148,7 +148,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Fire by what ``sensor`` shows, from where the nutation reaches ``start`` rad until it is down to ``stop`` rad.
+    """Closed loop: fire by ``sensor`` from a nutation of ``start`` rad down to ``stop`` rad.
 
     ``law`` is one of the names above; ``on_time`` s is the longest pulse of four-pulse (None: as the scheme) and every
     pulse of bang. After a firing the sensor is not looked at for ``settle`` s, and the next one begins ``min_interval``
@@ -173,7 +173,7 @@ STANDARD_GRAVITY = 9.80665
 
 @dataclass(frozen=True, slots=True)
 class Thruster:
-    """One thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
+    """Thruster: ``torque`` (3,) N m, ``thrust`` N or None, ``isp`` s or None.
 
     ``force`` (3,) N and ``position`` (3,) m, where it acts, are None for a thruster known by its torque only.
     ``valve`` is what it makes of commands; None gives full thrust from the start of a command to its end.
@@ -203,7 +203,7 @@ CANCELLED = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """Thrusters that fire together, as one body-fixed torque.
+    """Channel: thrusters that fire together, as one body-fixed torque.
 
     ``spends`` N m s is the impulse that a second of it counts for, where the torque is not the true one.
     """
@@ -213,8 +213,8 @@ class Channel:
     spends: float | None = None
 
     def of(self, **changed: Any) -> Channel:
-        """The same of thrusters with these fields ``changed`` in each."""
-        return replace(self, thrusters=tuple(replace(one, **changed) for one in self.thrusters))
+        """Copy with these fields ``changed`` in each thruster."""
+        return replace(self, thrusters=tuple(replace(thruster, **changed) for thruster in self.thrusters))
 
     @property
     def torque(self) -> Vector:
@@ -225,7 +225,7 @@ class Channel:
 
     @property
     def valve(self) -> Valve | None:
-        """That of its thrusters, which all have the same."""
+        """Valve of its thrusters, which all have the same."""
         return self.thrusters[0].valve
 
     @property
@@ -241,12 +241,12 @@ class Channel:
 
     @property
     def strength(self) -> float:
-        """Impulse that a second of it costs, N m s: the size of the torque."""
+        """Impulse of a second of firing, N m s: the size of the torque."""
         return float(np.linalg.norm(self.torque)) if self.spends is None else self.spends
 
     @property
     def damps(self) -> bool:
-        """Whether the torque is more transverse than axial; thrusters for the spin are left alone."""
+        """True if the torque is more transverse than axial; thrusters for the spin are left alone."""
         return abs(self.transverse) > abs(self.axial)
 
     @property
@@ -261,31 +261,31 @@ class Channel:
 
     @property
     def mass_flow(self) -> float | None:
-        """Propellant flow of all thrusters in kg/s; None where one of them is not known."""
+        """Propellant flow of all thrusters in kg/s; None where one of them is unknown."""
         flows = [thruster.mass_flow for thruster in self.thrusters]
         known = [flow for flow in flows if flow is not None]
         return math.fsum(known) if len(known) == len(flows) else None
 
     @property
     def price(self) -> float:
-        """Propellant, kg (impulse, N m s, where that is not known), for one N m s of transverse impulse."""
+        """Propellant, kg (impulse, N m s, where that is unknown), per N m s of transverse impulse."""
         return self.cost_rate(by_propellant=True) / abs(self.transverse)
 
     def cost_rate(self, *, by_propellant: bool) -> float:
-        """Propellant, kg/s, of firing; impulse, N m, where that is not known or not what counts."""
+        """Propellant flow, kg/s, of firing; impulse, N m, where that is unknown or not the measure."""
         flow = self.mass_flow
         return flow if by_propellant and flow is not None else self.strength
 
     @property
     def force(self) -> Vector | None:
-        """Sum of the forces in body axes, (3,) N; None where the direction of one is not known."""
+        """Sum of the forces in body axes, (3,) N; None where the direction of one is unknown."""
         known = [thruster.force for thruster in self.thrusters if thruster.force is not None]
         return np.sum(known, axis=0) if len(known) == len(self.thrusters) else None
 
 
 @dataclass(frozen=True, slots=True)
 class Steerable:
-    """Magnus' actuator: a torque about any transverse axis, body-fixed during one pulse.
+    """Steerable torquer (Magnus): a torque about any transverse axis, body-fixed during one pulse.
 
     ``torque`` in N m; None is an ideal impulse of no width.
     """

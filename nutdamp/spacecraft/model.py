@@ -1,11 +1,7 @@
-"""Spacecraft, Inertia, Attitude, Disturbance, Goal, Limits, Dispersions.
-
-The spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement.
+"""Spacecraft as the planner sees it: inertia, initial motion, actuators, limits, requirement, dispersions.
 
 Everything here is SI, radians, and in *principal axes*: axis 3 is the spin axis of the plan. ``Inertia.axes``
 leads back to the axes of the file, which is where vectors and quaternions are shown to people.
-
-What is demanded of a plan: what it reaches, and what it keeps on the way. SI and rad, in principal axes.
 """
 
 from __future__ import annotations
@@ -26,7 +22,7 @@ from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import BadRequest
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import Cones
+from nutdamp.physics.body import ConeAngles
 from nutdamp.physics.thruster import Cold as Cold
 from nutdamp.physics.thruster import Tank as Tank
 from nutdamp.physics.triaxial import arc_cones
@@ -46,7 +42,7 @@ SLACK = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """What must be met at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
+    """Requirement at the end: nutation angle and shift of the angular momentum, rad; None requires nothing.
 
     ``probability`` (0 to 1) is how surely a dispersed flight must meet it.
     """
@@ -68,7 +64,7 @@ def required_share(requirement: Requirement | None) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Where the motion is to end, besides without nutation.
+    """Goal of the motion besides zero nutation.
 
     ``axis`` (3,) is the unit vector, inertial, along which the angular momentum and the spin axis are to lie; None is
     where the angular momentum is at t = 0. ``spin`` is ω3 in rad/s, signed; None takes it as it comes. ``sun`` (3,) is
@@ -82,7 +78,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What every schedule keeps, in seconds: ``blackout`` holds the windows in which no pulse may be on.
+    """Limits of every schedule, in seconds: ``blackout`` holds the windows in which no pulse may be on.
 
     ``horizon`` None means `Spacecraft.horizon`'s default.
     """
@@ -97,7 +93,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keep:
-    """The spin axis is to stay from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,)."""
+    """Cone of the spin axis: from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,)."""
 
     name: str
     direction: Vector
@@ -105,7 +101,7 @@ class Keep:
     most: float = math.pi
 
     def used(self, least: Any, largest: Any) -> Any:
-        """The share of a bound that is used up where the angles on the way are from ``least`` to ``largest`` rad.
+        """Used fraction of a bound where the angles on the way are from ``least`` to ``largest`` rad.
 
         1 or less is kept. Numbers, or arrays over cases.
         """
@@ -114,7 +110,7 @@ class Keep:
 
 
 VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
-"""The `Spacecraft.thrust_laws` that there are."""
+"""Values of `Spacecraft.thrust_laws`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,12 +164,12 @@ class Inertia:
 
     @property
     def symmetric(self) -> bool:
-        """Whether I1 = I2, so that the closed forms hold exactly."""
+        """True if I1 = I2, so that the closed forms hold exactly."""
         return self.moments[0] == self.moments[1]
 
     @property
     def tensor(self) -> Vector:
-        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: what an eigensolver keeps of them."""
+        """Inertia tensor in the axes of the file, (3, 3) kg m², to 14 digits: the accuracy of an eigensolver."""
         if self.aligned:
             return np.diag(self.moments)
         tensor = self.axes @ np.diag(self.moments) @ self.axes.T
@@ -182,11 +178,11 @@ class Inertia:
 
     @property
     def aligned(self) -> bool:
-        """Whether the principal axes are the axes of the file."""
+        """True if the principal axes are the axes of the file."""
         return bool(np.array_equal(self.axes, np.eye(3)))
 
     def in_file(self, vector: Vector) -> Vector:
-        """A vector (3,) of the principal axes in the axes of the file, as it is shown: without rounding."""
+        """Vector (3,) in the axes of the file from principal axes, without rounding noise."""
         return cleaned(self.axes @ vector)
 
     def in_file_axes(self, rates: Vector, quaternion: Vector) -> tuple[Vector, Vector]:
@@ -212,7 +208,7 @@ class Disturbance:
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """Attitude at t = 0 as the file gives it: unit quaternion body (file axes) -> frame, scalar first."""
+    """Attitude at t = 0 from the file: unit quaternion body (file axes) -> frame, scalar first."""
 
     quaternion: Vector
     epoch: str | None = None
@@ -221,7 +217,7 @@ class Attitude:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orbit:
-    """Where the spacecraft is at t = 0 and how it moves: (3,) m and (3,) m/s from ``center``, in the attitude's frame.
+    """Orbital state at t = 0: (3,) m and (3,) m/s from ``center``, in the attitude's frame.
 
     Nothing is computed from it: messages to flight dynamics carry it.
     """
@@ -233,7 +229,7 @@ class Orbit:
 
 @dataclass(frozen=True, slots=True)
 class SpinState:
-    """The motion at one moment, for the closed forms.
+    """State of the motion at one time, for the closed forms.
 
     ``omega`` is ω1 + iω2 in rad/s, ``spin`` is ω3 in rad/s, ``quaternion`` (4,) body -> inertial, scalar first.
     """
@@ -248,16 +244,16 @@ class SpinState:
         return np.array([self.omega.real, self.omega.imag, self.spin])
 
 
-class Source(Protocol):
-    """What a spacecraft was read from."""
+class SourceFile(Protocol):
+    """Origin of a spacecraft: its file."""
 
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
-        """The spacecraft with keys of its file changed; raises FaultyFile or BadRequest."""
+        """Spacecraft with keys of its file changed; raises FaultyFile or BadRequest."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spacecraft(results.Data, results.Shown):
-    """A spinning rigid body, how it moves at t = 0, and what can be fired.
+    """Spinning rigid body with its motion at t = 0 and its actuators.
 
     ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
     which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says which, None: by shape;
@@ -291,10 +287,10 @@ class Spacecraft(results.Data, results.Shown):
     cold: Cold | None = None
     tank: Tank | None = None
     loop: Loop | None = None
-    source: Source | None = field(default=None, init=False)
+    source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
-        """The spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
+        """Spacecraft with keys of its file changed: ``with_(limits={"horizon": "300 s"}, mass=210.0)``.
 
         Of a mapping only the keys that are in it change, so that the other limits keep their values; entries of a list
         are named by their ``name``: ``thrusters={"T1": {"force": "12 N"}}``. All is checked as the file is. Raises
@@ -305,7 +301,7 @@ class Spacecraft(results.Data, results.Shown):
         return self.source.changed(keys)
 
     def replace(self, **fields: object) -> Spacecraft:
-        """The spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
+        """Spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
 
         Only names and types are checked; `with_` checks all that a file is checked for. Raises BadRequest.
         """
@@ -313,7 +309,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def thrust_laws(self) -> tuple[str, ...]:
-        """What makes the pulse of a command other than a rectangle of the thrust of the file, in words."""
+        """Effects that make pulses other than rectangles of the thrust of the file, in words."""
         valves = any(channel.valve is not None for channel in self.channels)
         laws = (VALVES, valves), (COLD, self.cold is not None), (BLOWDOWN, self.tank is not None)
         lighter = self.tank is not None and self.tank.inertia_per_kg is not None
@@ -326,14 +322,14 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def watched(self) -> tuple[Keep, ...]:
-        """The cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
-        if self.sun is None or any(np.array_equal(one.direction, self.sun) for one in self.keep):
+        """Cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
+        if self.sun is None or any(np.array_equal(cone.direction, self.sun) for cone in self.keep):
             return self.keep
         return (*self.keep, Keep("Sun", self.sun))
 
     @property
     def growth(self) -> float:
-        """Rate κ (1/s) at which energy dissipation lets a small nutation grow; negative where it decays.
+        """Growth rate κ (1/s) of a small nutation by energy dissipation; negative where it decays.
 
         By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
         that the Sun heats. A sphere has no energy to give: zero. See `physics.energy_sink`.
@@ -350,7 +346,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def torquer(self) -> Steerable | None:
-        """The steerable torquer; an ideal one is assumed where the file names no actuator at all."""
+        """Steerable torquer; an ideal one is assumed where the file names no actuator at all."""
         if self.steerable is None and not self.channels:
             return Steerable()
         return self.steerable
@@ -368,7 +364,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @cached_property
     def initial(self) -> SpinState:
-        """The motion at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
+        """State at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
         omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
         if self.attitude is None:
             first, second, third = self.inertia.moments
@@ -417,7 +413,7 @@ class Spacecraft(results.Data, results.Shown):
         return attitude.rotate(self.initial.quaternion, in_body)
 
     def angles_of(self, direction: Vector) -> tuple[float | None, float]:
-        """The angles that name an inertial ``direction`` (3,), rad.
+        """Angles of an inertial ``direction`` (3,), rad.
 
         Right ascension in [0, 2π) and declination where the file has an attitude; else azimuth in [0, 2π) and tilt, as
         `direction_in_n` takes them. Right ascension and azimuth are None at the pole, where there is none.
@@ -438,8 +434,8 @@ class Spacecraft(results.Data, results.Shown):
             return None
 
     @cached_property
-    def widest(self) -> Cones:
-        """The cone angles of the free motion from t = 0, where its nutation is largest; with I1 = I2 it stays so."""
+    def widest(self) -> ConeAngles:
+        """Cone angles at the largest nutation of the free motion from t = 0; constant with I1 = I2."""
         return arc_cones(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin))
 
     @property
@@ -475,7 +471,7 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def nutation_period(self) -> float:
-        """Nutation period as seen in the body, s; for a sphere, where that is infinite, as seen inertially."""
+        """Nutation period seen in the body, s; for a sphere, where that is infinite, seen inertially."""
         return self.body_period if math.isfinite(self.body_period) else self.inertial_period
 
     @property

@@ -1,6 +1,6 @@
-"""What a motion must end with: the requirement of the file, the spin rate of the goal, and what counts as damped.
+"""End conditions: the requirement of the file, the spin rate of the goal, and the definition of damped.
 
-One home for what complies, for one plan or for many dispersed cases: every function works on numbers and on arrays.
+The only definition of compliance, for one plan or many dispersed cases: all functions take numbers and arrays.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from nutdamp.spacecraft.model import Spacecraft
 
 DAMPED_SHARE = 0.01
-"""Share of the initial nutation (of the turn to a target axis) that may be left where it counts as damped (reached)."""
+"""Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped (reached)."""
 
 DAMPED_ANGLE = math.radians(1e-3)
 """rad that may be left in any case."""
@@ -27,11 +27,11 @@ NEGLIGIBLE = math.radians(1e-9)
 """rad below which angles are rounding, and shown as nothing."""
 
 SPIN_TOLERANCE = 1e-3
-"""By how much, relatively, the spin at the end may miss the one of the goal."""
+"""Relative tolerance of the spin at the end against the goal."""
 
 
 class Part(Enum):
-    """What is bounded: angles in rad, the spin rate in rad/s from the one of the goal."""
+    """Bounded quantity: angles in rad, the spin rate in rad/s relative to the goal."""
 
     NUTATION = "nutation"
     SHIFT = "momentum_shift"
@@ -40,13 +40,13 @@ class Part(Enum):
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Name in texts."""
         names = {Part.SHIFT: "shift of H", Part.DISTANCE: "error of H", Part.SPIN: "spin error"}
         return names.get(self, "nutation")
 
 
 class Bound(NamedTuple):
-    """The most that may be left of a part; ``required`` by file or command line, else what counts as damped."""
+    """Upper bound of a part; ``required`` by file or command line, else the definition of damped."""
 
     part: Part
     most: float
@@ -54,19 +54,19 @@ class Bound(NamedTuple):
 
 
 class Held(NamedTuple):
-    """A bound, and what is left of its part in the same unit."""
+    """Bound, and the remaining value of its part in the same unit."""
 
     bound: Bound
     left: float
 
     @property
     def met(self) -> bool:
-        """Whether no more is left than may be."""
+        """True if the bound is met."""
         return self.left <= self.bound.most
 
 
 class Left(NamedTuple):
-    """What is left: ``nutation`` and ``aim`` rad (H from the target axis, else from where it was), ``spin`` rad/s.
+    """Residual: ``nutation`` and ``aim`` rad (H from the target axis, else from its start), ``spin`` rad/s.
 
     Each is a number or an array over cases.
     """
@@ -77,12 +77,12 @@ class Left(NamedTuple):
 
 
 def aim(spacecraft: Spacecraft) -> Part:
-    """How far H ends from where it shall: from the target axis, or without one from where it was."""
+    """Distance of H at the end from its goal: the target axis, or without one its start."""
     return Part.SHIFT if spacecraft.goal.axis is None else Part.DISTANCE
 
 
 def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """The bounds of the requirement, and of the spin where the goal names one; none where nothing is required."""
+    """Bounds of the requirement, and of the spin where the goal names one; empty without a requirement."""
     requested, goal = spacecraft.requirement, spacecraft.goal
     bounds = []
     if requested is not None and requested.nutation is not None:
@@ -95,23 +95,23 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
 
 
 def judged(spacecraft: Spacecraft) -> bool:
-    """Whether cases comply or not: something is required at the end, or the spin axis has cones to keep on the way."""
+    """True if cases comply or not: something is required at the end, or cones are to be kept."""
     return bool(spacecraft.keep or required(spacecraft))
 
 
 def bounds(spacecraft: Spacecraft) -> tuple[Bound, ...]:
-    """The bounds `required`; for nutation and target axis, where none is, those within which they count as damped."""
-    found = required(spacecraft)
-    limited = {bound.part for bound in found}
+    """Bounds `required`; for nutation and target axis without one, those that define damped."""
+    limits = required(spacecraft)
+    limited = {bound.part for bound in limits}
     if Part.NUTATION not in limited:
-        found += (Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),)
+        limits += (Bound(Part.NUTATION, max(DAMPED_SHARE * spacecraft.nutation, DAMPED_ANGLE), False),)
     if Part.DISTANCE not in limited and spacecraft.goal.axis is not None:
-        found += (Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),)
-    return found
+        limits += (Bound(Part.DISTANCE, max(DAMPED_SHARE * spacecraft.to_turn, DAMPED_ANGLE), False),)
+    return limits
 
 
 def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
-    """What is left of a part, to be held against the ``most`` of its bound."""
+    """Residual of a part, to be compared with the ``most`` of its bound."""
     if part is Part.NUTATION:
         return left.nutation
     if part is Part.SPIN:
@@ -121,12 +121,12 @@ def left_of(part: Part, left: Left, spacecraft: Spacecraft) -> Any:
 
 
 def held(spacecraft: Spacecraft, left: Left) -> tuple[Held, ...]:
-    """What is left of one motion beside each of the `bounds`."""
+    """Residual of one motion beside each of the `bounds`."""
     return tuple(Held(bound, float(left_of(bound.part, left, spacecraft))) for bound in bounds(spacecraft))
 
 
 def unaided(spacecraft: Spacecraft) -> bool:
-    """Whether the body keeps all `bounds` up to the horizon when no pulse is fired.
+    """True if the body keeps all `bounds` up to the horizon without a pulse.
 
     Dissipation leaves H where it is and lets tan θ grow or decay. With I1 ≠ I2 nutation runs to and fro, and its
     largest counts. False where it is not known: with disturbances, and with I1 ≠ I2 where there is dissipation or a
@@ -141,11 +141,11 @@ def unaided(spacecraft: Spacecraft) -> bool:
     faster = math.cos(nutation) / math.cos(spacecraft.nutation)
     most = max(nutation, spacecraft.nutation)
     ends = [Left(most, aim, spin) for spin in (spacecraft.spin, spacecraft.spin * faster)]
-    return all(one.met for left in ends for one in held(spacecraft, left))
+    return all(bound.met for left in ends for bound in held(spacecraft, left))
 
 
 def decayed(spacecraft: Spacecraft, t: float) -> float:
-    """To what nutation, rad, an oblate body damps itself by ``t`` s with nothing done; θ0 where it does not.
+    """Nutation, rad, of an oblate body at ``t`` s without control; θ0 where it does not decay.
 
     Also θ0 where it is not known: with disturbances or I1 ≠ I2.
     """
@@ -159,7 +159,7 @@ def _idle(spacecraft: Spacecraft, t: float) -> float:
 
 
 def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -> float:
-    """When a nutation (rad) is reached without firing, s: ln(tan θ/tan θ0)/κ; 0 where it is, infinite where never.
+    """Time to a nutation (rad) without firing, s: ln(tan θ/tan θ0)/κ; 0 if reached, infinite if never.
 
     Growing nutation reaches it from below, decaying nutation from above; ``now``: θ0, default that at t = 0.
     """
@@ -173,7 +173,7 @@ def reached(spacecraft: Spacecraft, nutation: float, now: float | None = None) -
 
 
 def only_nutation(spacecraft: Spacecraft) -> bool:
-    """Whether nutation is all that can keep a body on which no pulse is fired from its requirement.
+    """True if nutation alone can keep a body without pulses from its requirement.
 
     H stays where it is and there is no final spin, no cone to keep; False where no pulse is needed anyway (`unaided`).
     """
@@ -182,7 +182,7 @@ def only_nutation(spacecraft: Spacecraft) -> bool:
 
 
 def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
-    """When the ``nutation`` (rad) of a prolate body, with nothing done, exceeds the one that is required, s from then.
+    """Time, s, until the ``nutation`` (rad) of an uncontrolled prolate body exceeds the required one.
 
     None where it does not grow, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
     """
@@ -193,7 +193,7 @@ def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
 
 
 def subsides(spacecraft: Spacecraft) -> float | None:
-    """When the nutation of an oblate body has decayed to the one that is required, s, with nothing done.
+    """Time, s, until the nutation of an uncontrolled oblate body has decayed to the required one.
 
     None where it does not decay, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
     """
@@ -204,7 +204,7 @@ def subsides(spacecraft: Spacecraft) -> float | None:
 
 
 def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
-    """What is left, rad: nutation, or the distance ``aim`` from a target axis where there is one and that is more.
+    """Residual, rad: nutation, or the distance ``aim`` from a target axis if there is one and it is larger.
 
     Numbers, or arrays over cases.
     """
@@ -212,16 +212,16 @@ def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
 
 
 def severity(spacecraft: Spacecraft, left: Left, used: Sequence[Any] = ()) -> Any:
-    """The largest share of a bound that is `required` which is used up: 1 or less complies.
+    """Largest used fraction of a `required` bound: 1 or less complies.
 
     Without such bounds what is `missed`, rad. Where more than all of a cone, or of the propellant, is ``used`` (shares)
     on the way, it is no less than that.
     """
-    found = np.asarray(_severity_at_end(spacecraft, left), dtype=float)
+    shares = np.asarray(_severity_at_end(spacecraft, left), dtype=float)
     if not len(used):
-        return found
+        return shares
     worst = np.maximum.reduce(np.broadcast_arrays(*used))
-    return np.where(worst > 1.0, np.maximum(worst, found), found)
+    return np.where(worst > 1.0, np.maximum(worst, shares), shares)
 
 
 def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:

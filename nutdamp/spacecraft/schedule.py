@@ -1,4 +1,4 @@
-"""A schedule: which channel fires when, for how long, and what that costs."""
+"""Schedule: pulses by channel, time and on-time, and their cost."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Label = TypeVar("Label")
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is loaded to fire a pulse, ``start`` and ``on_time`` s, and the thrust that follows.
+    """Command of a pulse, ``start`` and ``on_time`` s, and the resulting thrust.
 
     ``ramps`` have the times of the schedule and levels in parts of the torque of the pulse. ``valve``: one makes
     another on-time of it; else the thrust is as long as commanded, and falls with the pressure of the tank. ``fall``:
@@ -47,7 +47,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Pulse:
-    """One rectangular torque pulse, or an ideal impulse (``on_time`` 0, ``torque`` None).
+    """Rectangular torque pulse, or an ideal impulse (``on_time`` 0, ``torque`` None).
 
     ``t`` is its centre in s; ``torque`` (3,) N m and ``impulse`` (3,) N m s are in principal body axes;
     ``force`` (3,) N is the net force, None where it is not known; ``propellant`` kg or None. Through a valve it is what
@@ -70,19 +70,19 @@ class Pulse:
 
     @property
     def through_valve(self) -> bool:
-        """Whether a valve makes another on-time of the command."""
+        """True if the valve turns the command into another on-time."""
         return self.command is not None and self.command.valve
 
     @property
     def thrust(self) -> tuple[float, float]:
-        """When its thrust begins and ends, s."""
+        """Start and end of the thrust, s."""
         if self.command is None or not self.command.ramps:
             return self.start, self.end
         return self.command.ramps[0].begin, self.command.ramps[-1].end
 
     @property
     def over(self) -> float:
-        """When both command and thrust are over, s."""
+        """End of both command and thrust, s."""
         return self.end if self.command is None else max(sum(self.loaded), self.thrust[1])
 
     @property
@@ -110,7 +110,7 @@ class Pulse:
         return None
 
     def share(self, times: Vector) -> Vector:
-        """Share of its impulse that it has given by each of the ``times`` (n,) s; an ideal impulse at once."""
+        """Fraction of the impulse given by each of the ``times`` (n,) s; an ideal impulse at once."""
         if self.on_time == 0.0:
             return np.where(times >= self.t, 1.0, 0.0)
         if self.command is None:
@@ -122,7 +122,7 @@ class Pulse:
         return given / self.on_time
 
     def moved(self, by: float) -> Pulse:
-        """The same ``by`` s later."""
+        """Copy ``by`` s later."""
         command = self.command
         if command is not None:
             ramps = tuple(ramp._replace(begin=ramp.begin + by, end=ramp.end + by) for ramp in command.ramps)
@@ -131,17 +131,17 @@ class Pulse:
 
     @property
     def start(self) -> float:
-        """When it comes on, s."""
+        """Start of the pulse, s."""
         return self.t - 0.5 * self.on_time
 
     @property
     def end(self) -> float:
-        """When it goes off, s."""
+        """End of the pulse, s."""
         return self.t + 0.5 * self.on_time
 
     @property
     def resolved(self) -> bool:
-        """Whether times can be distinguished finely enough to say how long it is; an ideal impulse has no length."""
+        """True if floating point resolves its length; an ideal impulse has none."""
         return self.on_time == 0.0 or math.ulp(self.end) <= RESOLUTION * self.on_time
 
     @property
@@ -153,23 +153,23 @@ class Pulse:
 def overlapping(pulses: Iterable[tuple[Label, Pulse]]) -> list[tuple[Label, Label]]:
     """Labels of pulses that begin while their channel still fires an earlier one, each with the label of that."""
     firing: dict[str, tuple[Label, float]] = {}
-    found = []
-    for label, pulse in sorted(pulses, key=lambda one: one[1].loaded[0]):
+    overlaps = []
+    for label, pulse in sorted(pulses, key=lambda entry: entry[1].loaded[0]):
         before, end = firing.get(pulse.channel, (label, -math.inf))
         if pulse.loaded[0] < end - touching(end):
-            found.append((label, before))
+            overlaps.append((label, before))
         if pulse.over > end:
             firing[pulse.channel] = label, pulse.over
-    return found
+    return overlaps
 
 
 def touching(time: float) -> float:
-    """By how much two pulses may overlap at ``time`` s that only touch, s."""
+    """Overlap, s, at ``time`` s up to which two pulses count as touching."""
     return max(TOUCHING, math.ulp(time)) if math.isfinite(time) else 0.0
 
 
 def on_command(channel: Channel, start: float, on_time: float) -> Pulse:
-    """What ``channel`` gives when it is commanded on at ``start`` s for ``on_time`` s."""
+    """Pulse of ``channel`` commanded on at ``start`` s for ``on_time`` s."""
     valve = channel.valve
     if valve is None:
         return _rectangle(channel, start + 0.5 * on_time, on_time)
@@ -182,7 +182,7 @@ def on_command(channel: Channel, start: float, on_time: float) -> Pulse:
 
 
 def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
-    """One firing of ``channel``, centred at ``t`` s and ``on_time`` s long, and the command that gives it."""
+    """Pulse of ``channel``, centred at ``t`` s and ``on_time`` s long, with its command."""
     valve = channel.valve
     if valve is None or on_time == 0.0:
         return _rectangle(channel, t, on_time)
@@ -206,7 +206,7 @@ def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
 def steerable_pulse(
     steerable: Steerable, t: float, angle: float, *, impulse: float | None = None, on_time: float = 0.0
 ) -> Pulse:
-    """One firing of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
+    """Pulse of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
 
     Either ``impulse`` N m s is given, or ``on_time`` s where the torquer has a torque; else it gives ideal impulses.
     """
@@ -229,7 +229,7 @@ def steerable_pulse(
 
 
 class Bounds(NamedTuple):
-    """Costs that other schedules of the channels cannot go below ``within`` so many s, in ``unit`` (kg or N m s).
+    """Lower bounds on the cost of other schedules of the channels ``within`` so many s, in ``unit`` (kg or N m s).
 
     ``first_order`` is that of the small-angle program; None where that was not solved. ``rigorous`` holds at any angle
     for all schedules that leave no more than this one; None where nothing is known to hold: I1 ≠ I2, dissipation,
@@ -245,7 +245,7 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Pulses in the order of their centres, remarks of the scheme that chose them, and what others must cost.
+    """Pulses in the order of their centres, notes of the scheme that chose them, and lower bounds on the cost.
 
     ``blocks`` are the commands by which the pulses are fired, where it is not one by one.
     """
@@ -266,27 +266,27 @@ class Schedule:
 
     @property
     def without_proof(self) -> Schedule:
-        """The same without its rigorous bound: for a motion that the bound was not derived for."""
+        """Copy without the rigorous bound: for a motion that the bound was not derived for."""
         return self if self.bounds is None else replace(self, bounds=self.bounds._replace(rigorous=None))
 
     @property
     def idealised(self) -> bool:
-        """Whether any of the pulses is an ideal impulse, which takes no time."""
+        """True if any of the pulses is an ideal impulse."""
         return any(pulse.on_time == 0.0 for pulse in self.pulses)
 
     @property
     def through_valves(self) -> bool:
-        """Whether any of the pulses is not as long as it is commanded."""
+        """True if any of the pulses differs in length from its command."""
         return any(pulse.through_valve for pulse in self.pulses)
 
     @property
     def shaped(self) -> bool:
-        """Whether the thrust of any of the pulses is no rectangle."""
+        """True if the thrust of any of the pulses is no rectangle."""
         return any(pulse.command is not None for pulse in self.pulses)
 
     @property
     def cost(self) -> float:
-        """Propellant in kg; where that is not known, impulse in N m s."""
+        """Propellant in kg; where that is unknown, impulse in N m s."""
         propellant = self.propellant
         return self.total_impulse if propellant is None else propellant
 
@@ -317,6 +317,6 @@ class Schedule:
 
     @property
     def propellant(self) -> float | None:
-        """kg; None where one pulse's is not known."""
+        """Propellant in kg; None where that of one pulse is unknown."""
         known = [pulse.propellant for pulse in self.pulses if pulse.propellant is not None]
         return math.fsum(known) if len(known) == len(self.pulses) else None

@@ -1,7 +1,6 @@
-"""How far the true values may differ from what a plan is made for: dispersions, as a spacecraft file gives them, in SI.
+"""Tolerances: dispersions of the true values about those of the plan, as a spacecraft file gives them, in SI.
 
-The plan knows the estimate; a dispersed truth is the nominal value plus a draw, or times one plus a draw where the
-tolerance is relative.
+A dispersed truth is the nominal value plus a draw, or times one plus a draw where the tolerance is relative.
 """
 
 from __future__ import annotations
@@ -10,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 KINDS = ("normal", "uniform", "triangular", "bias")
-"""What the size of a tolerance means: one sigma, half width, half width, a fixed offset."""
+"""Distribution, by the meaning of the size: one sigma, half width, half width, a fixed offset."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far one quantity may be off.
+    """Tolerance of one quantity.
 
     ``kind`` is one of `KINDS`; ``size`` is SI (rad for angles), or a fraction of the nominal value where ``relative``.
     Only a bias may be negative; a size of zero disperses nothing.
@@ -28,7 +27,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class Dispersions:
-    """The tolerances of a spacecraft; None, or no entry, for what is exactly known.
+    """Tolerances of a spacecraft; None, or no entry, for exactly known values.
 
     ``A`` (both transverse moments) and ``C`` in kg m²; ``omega0`` the rates at t = 0 about the axes of the file, rad/s.
     ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses; ``thrust_per_pulse`` is a

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, Budget, Held
+from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.views.plan_json import heading
 
@@ -29,7 +29,7 @@ HEADER = (
 )
 
 
-def _numbers(held: Held) -> tuple[float | None, ...]:
+def _numbers(held: HeldNutation) -> tuple[float | None, ...]:
     """The numbers of a row."""
     cycle, band = held.cycle, held.band
     numbers: tuple[float | None, ...] = (None,) * 9
@@ -42,7 +42,7 @@ def _numbers(held: Held) -> tuple[float | None, ...]:
     return (*map(math.degrees, held.thresholds), held.begins, *numbers, *bounds, lasts)
 
 
-def _other(held: Held) -> dict[str, float | None] | None:
+def _other(held: HeldNutation) -> dict[str, float | None] | None:
     """The second limit cycle, where there is one."""
     if held.other is None:
         return None
@@ -50,13 +50,13 @@ def _other(held: Held) -> dict[str, float | None] | None:
     return {name: numbers[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
 
 
-def budget_csv(budget: Budget) -> str:
+def budget_csv(budget: HoldingBudget) -> str:
     """One row for each pair of thresholds; unknown values stay empty."""
     rows = ([*(number(value) for value in _numbers(row)), truth(row.meets_requirement), row.why] for row in budget.held)
     return csv_text((*HEADER, "meets_requirement", "why"), rows)
 
 
-def budget_json(budget: Budget) -> dict[str, Any]:
+def budget_json(budget: HoldingBudget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
     body = budget.spacecraft
     return {

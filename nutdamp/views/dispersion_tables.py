@@ -14,7 +14,7 @@ from rich.text import Text
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
-from nutdamp.montecarlo.inputs import Input, Unused
+from nutdamp.montecarlo.inputs import DispersedInput, Unused
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
 from nutdamp.montecarlo.study import Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
@@ -216,7 +216,7 @@ def unused_table(unused: Iterable[Unused]) -> Table:
     return table
 
 
-def inputs_table(drawn: Iterable[Input], draws: Mapping[str, float]) -> Table:
+def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> Table:
     """Every input of one case: nominal, drawn, and the deviation."""
     inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
     for entry in drawn:

@@ -13,7 +13,7 @@ from io import StringIO
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from nutdamp.planning.decision import Comparison, Decision, Line, said
+from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
@@ -201,12 +201,12 @@ def _infeasible(compared: Comparison) -> Iterator[str]:
     """Why schemes have no plan."""
     for plan in compared.plans:
         if not plan.feasible:
-            yield from (f"{plan.scheme}: {text}" for text in said(plan))
+            yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
 
 
 def _remarks(compared: Comparison, chosen: Plan) -> Iterator[str]:
     """What the scheme to fly says of its plan."""
-    yield from (f"{chosen.scheme}: {text}" for text in (said(chosen) if chosen in compared.plans else ()))
+    yield from (f"{chosen.scheme}: {text}" for text in (notes_on(chosen) if chosen in compared.plans else ()))
 
 
 def _fitted(

@@ -8,9 +8,9 @@ from typing import IO, Any
 import numpy as np
 
 from nutdamp import __version__
-from nutdamp.control_loop.batch import Flown
+from nutdamp.control_loop.batch import FlownLoops
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
-from nutdamp.control_loop.law import Stop
+from nutdamp.control_loop.law import Ending
 from nutdamp.files.samples import column, cone_columns
 from nutdamp.files.tabular import csv_text, number
 from nutdamp.montecarlo.statistics import Array
@@ -61,7 +61,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
             "expected_deg": math.degrees(study.band.most),
             **_share(results, results.within, len(results.of("quiet"))),
         },
-        "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Stop.END},
+        "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
         "requirement": requirement_of(results),
         **cones_json(results),
         "shares": {
@@ -83,7 +83,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
     }
 
 
-def loop_case_json(study: LoopStudy, case: int, flown: Flown) -> dict[str, Any]:
+def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, Any]:
     """One case (from 0), ``flown`` alone: the true value of each input, in SI, and the outputs."""
     values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
     seen = angles_json(study.spacecraft, flown.aspects[:, :, 0])
@@ -120,7 +120,7 @@ class LoopCasesWriter:
         stream.write(csv_text(header, []).encode())
         stream.flush()
 
-    def write(self, first: int, values: Array, stops: list[Stop], angles: Array) -> None:
+    def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
         entries = self._study.model.inputs.drawn
         drawn = self._study.draws_from(first, len(stops))

@@ -10,9 +10,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.control_loop.batch import Flown
+from nutdamp.control_loop.batch import FlownLoops
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
-from nutdamp.control_loop.law import Stop
+from nutdamp.control_loop.law import Ending
 from nutdamp.montecarlo.statistics import Exact
 from nutdamp.views import verdicts
 from nutdamp.views.dispersion_tables import (
@@ -102,7 +102,7 @@ def _share(results: LoopResults, count: int, of: int) -> str:
 
 
 def _settled(results: LoopResults) -> Iterator[RenderableType]:
-    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Stop.END]
+    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
     lasting = "and is not stopped, " if stopped else ""
     yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results, results.settled, results.done)}.")
     parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
@@ -174,7 +174,7 @@ def _worst(results: LoopResults, count: int) -> Iterator[RenderableType]:
     yield Text(f"Each can be looked at alone: {options}; `nutdamp loop` flies it with {options} again", "dim")
 
 
-def loop_case_screen(study: LoopStudy, case: int, flown: Flown) -> Group:
+def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
     table = columns("", "nominal", "this case")
@@ -186,7 +186,7 @@ def loop_case_screen(study: LoopStudy, case: int, flown: Flown) -> Group:
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, study.draws_of(case)), Text()]
     parts.append(table)
-    if stop is not Stop.END:
+    if stop is not Ending.END:
         parts.append(Text.assemble(("Stopped: ", "bold red"), f"{stop.value}."))
     parts.append(Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim"))
     return Group(*parts)

@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
-from nutdamp.control_loop.law import Stop
-from nutdamp.control_loop.simulation import Run
+from nutdamp.control_loop.law import Ending
+from nutdamp.control_loop.simulation import LoopRun
 from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
 from nutdamp.planning.decision import Decision
 from nutdamp.spacecraft.equipment import GYRO, Loop
@@ -38,7 +38,9 @@ def loop_screen(plan: LoopPlan) -> RenderableType:
         parts.append(Text(f"Dispersed case {run.case} of seed {run.seed}{met and met + ' the requirement'}."))
     elif run.lost and decision.nominal and not decision.strays:
         why = (
-            "limits.max_pulses is reached" if run.stop is Stop.FULL else "the loop is never down to its stop threshold"
+            "limits.max_pulses is reached"
+            if run.stop is Ending.FULL
+            else "the loop is never down to its stop threshold"
         )
         parts.append(Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), "."))
     else:
@@ -63,7 +65,7 @@ def described(loop: Loop, *, thresholds: bool = True) -> str:
     return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
 
 
-def stopped(run: Run) -> str:
+def stopped(run: LoopRun) -> str:
     """The reason why the loop was stopped; empty where it was flown to its end."""
     if not run.stop.fault:
         return ""
@@ -72,15 +74,15 @@ def stopped(run: Run) -> str:
         after = f"after {count} firing{'s' * (count != 1)}, at {moment(run.fired[-1].pulse.end)}: "
     name, fired = run.channel, " and ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
     reasons = {
-        Stop.EMPTY: "the tank is empty, and nothing fires any more",
-        Stop.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
+        Ending.EMPTY: "the tank is empty, and nothing fires any more",
+        Ending.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
         "sensor shows against what it should",
-        Stop.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
-        Stop.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
-        Stop.IDLE: f"channel {name} does nothing, or much less than its torque should",
-        Stop.FED: "the firings feed the nutation: sensor or channels are reversed, or they come at the wrong time; "
+        Ending.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
+        Ending.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
+        Ending.IDLE: f"channel {name} does nothing, or much less than its torque should",
+        Ending.FED: "the firings feed the nutation: sensor or channels are reversed, or they come at the wrong time; "
         "bias, noise or delay hide which",
-        Stop.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
+        Ending.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
     }
     return after + reasons[run.stop]
 
@@ -134,7 +136,7 @@ def _outcome(plan: LoopPlan) -> Table:
     return table
 
 
-def _settled(run: Run) -> str:
+def _settled(run: LoopRun) -> str:
     """The time when the loop was first quiet."""
     if run.settled is not None:
         return f"at {moment(run.settled)}"
@@ -143,7 +145,7 @@ def _settled(run: Run) -> str:
     return "never down to the stop threshold" if run.loop.stop > 0.0 else "never: loop.stop is 0"
 
 
-def _firings(run: Run) -> Table:
+def _firings(run: LoopRun) -> Table:
     heads = ("firing\n", "start\ns", "on-time\ns", "channel\n", "nutation seen\ndeg", "before\ndeg", "after\ndeg")
     table = columns(*heads, text=("channel\n",))
     before, after = run.flight.around_pulses()

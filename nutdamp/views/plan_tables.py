@@ -13,7 +13,7 @@ from rich.text import Text
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import at_start
 from nutdamp.flight.propagation import REAL_WIDTHS, Residual, model_name
-from nutdamp.planning.decision import Comparison, decide, said
+from nutdamp.planning.decision import Comparison, decide, notes_on
 from nutdamp.planning.plan import NO_NUTATION, Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft
@@ -256,7 +256,7 @@ def _reasons(compared: Comparison) -> list[RenderableType]:
     """Reasons why schemes are infeasible, and the remarks of the others; those that several share stand once."""
     schemes_of: dict[str, list[str]] = {}
     for plan in compared.plans:
-        for remark in said(plan):
+        for remark in notes_on(plan):
             schemes_of.setdefault(remark, []).append(plan.scheme)
     lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in schemes_of.items()]
     return [Text(), *lines] if lines else []

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from nutdamp.planning.robust import RobustComparison
-from nutdamp.planning.screening import Candidate
+from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft.requirements import aim
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 
@@ -70,7 +70,7 @@ def robust_json(robust: RobustComparison, reason: str) -> dict[str, Any]:
     }
 
 
-def _candidate(candidate: Candidate) -> dict[str, Any]:
+def _candidate(candidate: PlanCandidate) -> dict[str, Any]:
     plan, pulses = candidate.plan, candidate.plan.pulses
     return {
         "scheme": plan.scheme,

@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from nutdamp.errors import listed
-from nutdamp.montecarlo.inputs import Input, together
+from nutdamp.montecarlo.inputs import DispersedInput, together
 from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
@@ -81,7 +81,7 @@ def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
     return float(np.linalg.norm(first.independent(output)[:, rows]))
 
 
-def _named(entries: list[Input]) -> tuple[str, str]:
+def _named(entries: list[DispersedInput]) -> tuple[str, str]:
     """Name and size of an input, or of correlated ones."""
     name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
     return (f"{name} (correlated)" if len(entries) > 1 else name), size
@@ -155,7 +155,7 @@ def in_words(name: str) -> str:
     return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
 
 
-def size_text(entry: Input) -> str:
+def size_text(entry: DispersedInput) -> str:
     """One sigma, or the bias, in the form of the file."""
     if entry.unit == "":
         return of_nominal(entry, entry.sigma or entry.size, ".3g")
@@ -163,7 +163,7 @@ def size_text(entry: Input) -> str:
     return quantity(scale * (entry.sigma or entry.size), unit, 3)
 
 
-def stated_text(entry: Input, relative: bool, *, down: bool = False) -> str:
+def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) -> str:
     """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
     share = relative and entry.nominal != 0.0
     unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
@@ -174,7 +174,7 @@ def stated_text(entry: Input, relative: bool, *, down: bool = False) -> str:
     return quantity(value, "%" if share or (unit == "" and entry.nominal) else unit, 3).strip()
 
 
-def of_nominal(entry: Input, value: float, form: str) -> str:
+def of_nominal(entry: DispersedInput, value: float, form: str) -> str:
     """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
     return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"
 

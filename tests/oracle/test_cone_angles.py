@@ -19,7 +19,7 @@ from support.process import Run
 from nutdamp import load
 from nutdamp.figures.motion import title
 from nutdamp.flight import propagation
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.physics.triaxial import arc_cones
@@ -98,7 +98,7 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
         for key in ("nutation_deg", "body_cone_deg", "space_cone_deg"):
             assert left[key] == pytest.approx(said[key], rel=1e-12)
         assert f"nutation at most {said['nutation_deg']:.4g} deg" in title(flown)
-    model = Model(body, Schedule())
+    model = DispersedModel(body, Schedule())
     out = np.empty((len(OUTPUTS), 1))
     measure(model, ClosedForm(model)(model.cases({})), out)
     assert out[:3, 0] == pytest.approx([now, 0.0, 0.0], rel=1e-12, abs=1e-12)  # nutation, shift of H, axis error

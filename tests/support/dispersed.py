@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from support.builders import spinner
 
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import BLOCK, Draws
 from nutdamp.montecarlo.study import Study
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
@@ -60,23 +60,23 @@ def everything(scale: float = 1.0, names: tuple[str, ...] = ("T1", "T2")) -> Dis
 
 def with_jets(
     *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
-) -> Model:
+) -> DispersedModel:
     """Three pulses of two thrusters, the last of both together, with every tolerance."""
     channels = (*(Channel(one.name, (one,)) for one in JETS), Channel("both", JETS))
     body = spinner(moments=moments, spin=spin, channels=channels)
     first, second, both = channels
     pulses = (channel_pulse(first, 0.9, 0.4), channel_pulse(second, 2.1, 0.7), channel_pulse(both, 3.2, 0.2))
-    return Model(replace(body, dispersions=everything(scale)), Schedule(pulses))
+    return DispersedModel(replace(body, dispersions=everything(scale)), Schedule(pulses))
 
 
-def sinking(model: Model, time_constant: float = 15.0) -> Model:
+def sinking(model: DispersedModel, time_constant: float = 15.0) -> DispersedModel:
     """The same with energy dissipation."""
-    return Model(replace(model.spacecraft, dissipation=time_constant), model.schedule)
+    return DispersedModel(replace(model.spacecraft, dissipation=time_constant), model.schedule)
 
 
 def steered(
     *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
-) -> Model:
+) -> DispersedModel:
     """Two pulses of a steerable torquer, one of them early, and an ideal impulse."""
     torquer = Steerable(20.0, 220.0, 0.8)
     body = spinner(moments=moments, spin=spin, steerable=torquer)
@@ -86,7 +86,7 @@ def steered(
         replace(steerable_pulse(Steerable(), 1.92, 1.0, impulse=3.0), channel="steerable"),
     )
     tolerances = everything(scale, ("steerable",))
-    return Model(replace(body, dispersions=tolerances), Schedule(pulses))
+    return DispersedModel(replace(body, dispersions=tolerances), Schedule(pulses))
 
 
 def exact_two_pulse(scale: float, **tolerances: object) -> Study:
@@ -96,7 +96,7 @@ def exact_two_pulse(scale: float, **tolerances: object) -> Study:
     body = spinner(limits=Limits(earliest=1.0))  # a pulse at t = 0 could only be late
     plan = planning.plan(body, "two-pulse")
     requested = replace(everything(scale, ("steerable",)), **tolerances)  # type: ignore[arg-type]
-    return Study(Model(replace(body, dispersions=requested), plan.pulses), seed=11)
+    return Study(DispersedModel(replace(body, dispersions=requested), plan.pulses), seed=11)
 
 
 def first_cases(study: Study, count: int) -> dict[str, np.ndarray]:
@@ -111,7 +111,7 @@ def one_of(draws: Draws | Mapping[str, np.ndarray], case: int) -> dict[str, floa
     return {name: float(np.asarray(draw)[case]) for name, draw in draws.items()}
 
 
-def body_of(model: Model) -> tuple[Spacecraft, tuple[Pulse, ...], Inertia]:
+def body_of(model: DispersedModel) -> tuple[Spacecraft, tuple[Pulse, ...], Inertia]:
     """What a model is made of."""
     return model.spacecraft, model.schedule.pulses, model.spacecraft.inertia
 

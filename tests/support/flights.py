@@ -14,7 +14,7 @@ from support.builders import channel, cross, events, spinner
 from support.dispersed import normal
 from support.spinners import commanded
 
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.physics import attitude
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block
@@ -56,7 +56,7 @@ def by_blocks(
     spin: float = -2.0,
     moments: tuple[float, float, float] = (110.0, 110.0, 150.0),
     **fields: Any,
-) -> Model:
+) -> DispersedModel:
     """Three blocks of two thrusters, one of them with an axial torque, of an oblate body that nutates by 2 deg."""
     body = spinner(moments=moments, spin=spin, degrees=2.0, channels=(channel("T", 8.0, 3.0, 2.0), *cross(9.0)))
     turn = 2.0 * math.pi / abs(spin)
@@ -66,4 +66,4 @@ def by_blocks(
         Block("-2", 26, 0.1 * turn, 0.03 * turn, 5, 2),
     )
     body = replace(commanded(body, np.array([1.0, 0.3, -0.4])), dispersions=dispersions, **fields)
-    return Model(body, fired(body, blocks))
+    return DispersedModel(body, fired(body, blocks))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import make_dynamics
 from nutdamp.montecarlo import propagated
-from nutdamp.montecarlo.cases import DispersedCases, Model, Thrusting, number_of, triple
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting, number_of, triple
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.physics import attitude, batch
 from nutdamp.physics.thruster import Ramp
@@ -20,7 +20,7 @@ from nutdamp.spacecraft.schedule import Command, Pulse, Schedule
 Array = NDArray[np.float64]
 
 
-def timed(model: Model, cases: DispersedCases) -> DispersedCases:
+def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
     """The ``cases`` with the starts, and the impulses, that their own Sun pulses give; else as they are."""
     if not model.schedule.blocks:
         return cases
@@ -34,7 +34,7 @@ def timed(model: Model, cases: DispersedCases) -> DispersedCases:
     return replace(cases, starts=tuple(fired.starts), impulses=impulses)
 
 
-def realised(model: Model, draws: Draws) -> tuple[Spacecraft, Schedule]:
+def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:
     """The true spacecraft, its attitude in the frame of the estimate, and the pulses that it really gets."""
     body, case = model.spacecraft, timed(model, model.cases(draws))
     pulses, spent = [], case.spent or (None,) * len(case.starts)
@@ -88,7 +88,7 @@ def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float |
     return Pulse(start + centroid, acts, planned.channel, acts * torque, torque, propellant=used, command=command)
 
 
-def flown_outputs(model: Model, draws: Draws) -> Array:
+def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
     """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by `flight.flown`."""
     true, schedule = realised(model, draws)
     made = propagation.flown(true, schedule)

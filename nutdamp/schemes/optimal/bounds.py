@@ -119,11 +119,11 @@ def lowered(curve: SmallAngles, strong: NDArray[np.bool_], goal: float) -> Lower
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
     if highest <= 0.0:
         return None
-    found = []
+    candidates = []
     for factor in map(float, highest * np.array([1.0] if strong.all() else LOWERINGS)):
         gained = _lasting(curve, ~strong, factor)
-        found.append(Lowered((goal / factor - gained) * (1.0 - ROUNDING), factor, gained))
-    best = max(found, key=lambda one: one.bound)
+        candidates.append(Lowered((goal / factor - gained) * (1.0 - ROUNDING), factor, gained))
+    best = max(candidates, key=lambda candidate: candidate.bound)
     return best if best.bound > 0.0 else None
 
 
@@ -163,7 +163,7 @@ def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> flo
     if not len(which_ones):
         return 0.0
     costs, bends = curve.costs[which_ones], curve.bends[which_ones] / factor
-    ends = [one[:, which_ones] / factor - 1.0 for one in _ends(curve, curve.begins, curve.lengths)]
+    ends = [values[:, which_ones] / factor - 1.0 for values in _ends(curve, curve.begins, curve.lengths)]
     pays = np.flatnonzero((_top(ends[0], ends[1], bends, curve.lengths[:, None]) > 0.0).any(axis=1))
     begins, lengths = curve.begins[pays], curve.lengths[pays] / PARTS
     total, before = 0.0, ends[0][pays]
@@ -221,26 +221,30 @@ def rigorous(
     ``allowed``; ``shift``: H counts, not only the nutation.
     """
     channels = usable(spacecraft, axial=True)
-    if spacecraft.disturbances or spacecraft.growth != 0.0 or any(one.name not in prices for one in channels):
+    if spacecraft.disturbances or spacecraft.growth != 0.0 or any(channel.name not in prices for channel in channels):
         return None
     if allowed.nutation >= 0.5 * math.pi:  # the spin axis points away from H
         return None
     costs = np.array([prices[channel.name] for channel in channels])
     torques = np.array([channel.torque for channel in channels])
     axial = bool(torques[:, 2].any())
-    found = [_nutation(spacecraft, channels, costs, cost, allowed)]
+    lower_bounds = [_nutation(spacecraft, channels, costs, cost, allowed)]
     if spacecraft.goal.spin is not None:
-        found.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
+        lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
     if shift and not axial:
-        found.append(_turn(spacecraft, torques, costs, allowed))
-    best = max(found)
+        lower_bounds.append(_turn(spacecraft, torques, costs, allowed))
+    best = max(lower_bounds)
     return best if math.isfinite(best) else None
 
 
 def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
     inertia, limits = spacecraft.inertia, spacecraft.limits
-    faster = cost * float(max(abs(one.axial) / price for one, price in zip(channels, costs, strict=True))) / inertia.C
+    faster = (
+        cost
+        * float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
+        / inertia.C
+    )
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
     stays = inertia.C * (abs(spacecraft.spin) + faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
@@ -344,7 +348,7 @@ def first_order(program: Program, prices: Vector) -> Proof:
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
-    found = lowered(SmallAngles(program, prices), program.strong, goal) if prices.any() else None
-    if found is None:
+    best = lowered(SmallAngles(program, prices), program.strong, goal) if prices.any() else None
+    if best is None:
         return Proof(0.0, np.zeros_like(prices))
-    return Proof(found.bound, prices / found.factor, found.gained)
+    return Proof(best.bound, prices / best.factor, best.gained)

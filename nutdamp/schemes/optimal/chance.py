@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.schemes.optimal import highs
-from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Columns, Program, alone, burns
+from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
 from nutdamp.spacecraft.model import Vector
 
 Complex = NDArray[np.complex128]
 
 KINDS = ("nutation", "shift", "spin")
-"""What may be left, see `Limit`."""
+"""What may be left, see `ChanceLimit`."""
 
 TURNS = 100_000
 """More than there are turns in a horizon: pulses are numbered by channel and turn."""
@@ -58,7 +58,7 @@ class Uncertain:
     less: Vector
 
 
-class Limit(NamedTuple):
+class ChanceLimit(NamedTuple):
     """The most that may be left, N m s, of equation ``kind``: 0 nutation, 1 shift, 2 spin."""
 
     kind: int
@@ -71,7 +71,7 @@ class Tangent(NamedTuple):
     ``own`` begins with the number of the pulse, see `ChanceModel.pulse`.
     """
 
-    limit: Limit
+    limit: ChanceLimit
     u: complex
     shared: Vector
     own: Vector
@@ -105,7 +105,7 @@ class Weights(NamedTuple):
 class ChanceModel:
     """The cones of a ``program`` of small angles; ``goal`` (5,) N m s is what firing is to add."""
 
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[Limit, ...], goal: Vector) -> None:
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.uncertain, self.limits = program, uncertain, limits
         body = program.spacecraft
         self.pace = np.array([body.inertia.a * body.spin, body.spin])
@@ -118,11 +118,11 @@ class ChanceModel:
         turn = np.floor((times - self.program.spacecraft.limits.earliest) / self.turn).astype(int)
         return np.asarray(np.maximum(turn, 0))
 
-    def pulse(self, columns: Columns) -> NDArray[np.int_]:
+    def pulse(self, columns: ProgramColumns) -> NDArray[np.int_]:
         """Number of the pulse to which each column belongs: those of one channel within one turn are one."""
         return np.asarray(columns.channel * TURNS + self.turn_of(columns.t))
 
-    def turns(self, kind: int, columns: Columns) -> Complex:
+    def turns(self, kind: int, columns: ProgramColumns) -> Complex:
         """What one unit of torque in each column (n,) does, before any dispersion: turned back, and lost to widths."""
         if kind == 2:
             return np.ones(len(columns.t), dtype=complex)
@@ -136,10 +136,12 @@ class ChanceModel:
 
     def effects(self, kind: int) -> tuple[Complex, Complex]:
         """Of the channels, N m: what they do (K,), and by what inputs change it but for the rate, (K, d)."""
-        one = self.uncertain
+        inputs = self.uncertain
         if kind == 2:
-            return one.axial.astype(complex), one.axial_torque.astype(complex)
-        return one.effect, one.torque + (1j * self.pace[kind] * one.late - one.less) * one.effect[:, None]
+            return inputs.axial.astype(complex), inputs.axial_torque.astype(complex)
+        return inputs.effect, inputs.torque + (1j * self.pace[kind] * inputs.late - inputs.less) * inputs.effect[
+            :, None
+        ]
 
     def rates(self, kind: int) -> Vector:
         """By what inputs change the rate at which effects turn, (d,) rad/s."""
@@ -147,15 +149,15 @@ class ChanceModel:
 
     def start(self, kind: int) -> Complex:
         """By what inputs change what is left without any firing, (d,) N m s."""
-        one = self.uncertain
-        return one.spin.astype(complex) if kind == 2 else one.begin[kind] + one.less * self.goal[kind]
+        inputs = self.uncertain
+        return inputs.spin.astype(complex) if kind == 2 else inputs.begin[kind] + inputs.less * self.goal[kind]
 
-    def plain(self, limit: Limit, u: complex) -> Tangent:
+    def plain(self, limit: ChanceLimit, u: complex) -> Tangent:
         """The tangent in a direction that knows of no dispersion."""
         count = len(self.uncertain.own)
         return Tangent(limit, complex(u), np.zeros(count), np.zeros((0, 1 + count)))
 
-    def row(self, tangent: Tangent, columns: Columns, margin: float) -> Vector:
+    def row(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """What a second of each column adds to a tangent, N m, (n,)."""
         kind = tangent.limit.kind
         effects, changes = self.effects(kind)
@@ -178,12 +180,12 @@ class ChanceModel:
         taken = (np.conj(tangent.u) * (margin * self.start(kind) @ tangent.shared - self.goal[kind])).real
         return float(tangent.limit.most - taken)
 
-    def left(self, columns: Columns, on_times: Vector) -> Complex:
+    def left(self, columns: ProgramColumns, on_times: Vector) -> Complex:
         """What is left of nutation, shift and spin, (3,) N m s."""
         each = [self.turns(kind, columns) * self.effects(kind)[0][columns.channel] @ on_times for kind in range(3)]
         return np.asarray(np.array(each, dtype=np.complex128) - self.goal)
 
-    def spread(self, kind: int, columns: Columns, on_times: Vector) -> Spread:
+    def spread(self, kind: int, columns: ProgramColumns, on_times: Vector) -> Spread:
         """What one sigma of each input leaves, N m s, after columns have been on for ``on_times`` (n,) s."""
         shared = ~self.uncertain.own
         effect, changed = (part[columns.channel] for part in self.effects(kind))
@@ -200,15 +202,15 @@ class ChanceModel:
         effects, changes = (part[channel] for part in self.effects(kind))
         fixed = rate = 0j
         own = np.zeros(self.count, dtype=complex)
-        for one, price in priced:
-            if one.limit.kind != kind:
+        for tangent, price in priced:
+            if tangent.limit.kind != kind:
                 continue
-            weight = price * np.conj(one.u)
-            fixed += weight * (effects + margin * changes @ one.shared)
-            rate += weight * margin * 1j * (self.rates(kind) @ one.shared) * effects
-            pulses = one.own[:, 0].astype(int)
+            weight = price * np.conj(tangent.u)
+            fixed += weight * (effects + margin * changes @ tangent.shared)
+            rate += weight * margin * 1j * (self.rates(kind) @ tangent.shared) * effects
+            pulses = tangent.own[:, 0].astype(int)
             mine = pulses // TURNS == channel
-            own[pulses[mine] % TURNS] += weight * margin * (one.own[mine, 1:] @ changes)
+            own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
         return Weights(complex(fixed), complex(rate), own)
 
 
@@ -251,10 +253,10 @@ class Sure(NamedTuple):
 class ChanceProgram:
     """The program of margins for the channels and slots of a ``program`` of small angles."""
 
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[Limit, ...], goal: Vector) -> None:
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.limits = program, limits
         self.model = ChanceModel(program, uncertain, limits, goal)
-        self.scale = max(float(np.linalg.norm(goal)), max(one.most for one in limits))
+        self.scale = max(float(np.linalg.norm(goal)), max(limit.most for limit in limits))
         self.unit = self.scale / np.hypot(np.abs(uncertain.effect), uncertain.axial)
         self.cost = program.costs * self.unit
         self.dearest = float(self.cost.max())
@@ -265,57 +267,57 @@ class ChanceProgram:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
         tangents = [self.model.plain(limit, u) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
-        rights = np.array([self.model.right(one, margin) for one in tangents]) / self.scale
+        rights = np.array([self.model.right(tangent, margin) for tangent in tangents]) / self.scale
         master = highs.GrowingProgram(np.zeros(0), rights, np.zeros(0))
-        excess = np.array([[-one.limit.most / self.scale] for one in tangents])
+        excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
-        found, taken = None, columns
+        best, taken = None, columns
         for _ in range(ROUNDS):
             work.spend(SOLVED + COLUMN * len(columns.t))
             better = master.optimum()
             if better is None or work.exhausted():
                 break
-            found, taken = better, columns
-            on_times = self._on_times(columns, found.x[1:])
-            new = self._broken(columns, on_times, margin, float(found.x[0]))
-            for one in new:
-                row = np.concatenate([[-one.limit.most / self.scale], self._coefficients(one, columns, margin)])
-                master.limit(row, self.model.right(one, margin) / self.scale)
-            priced = self._priced(tangents, found.shadows, columns, margin)
+            best, taken = better, columns
+            on_times = self._on_times(columns, best.x[1:])
+            new = self._broken(columns, on_times, margin, float(best.x[0]))
+            for tangent in new:
+                row = np.concatenate([[-tangent.limit.most / self.scale], self._coefficients(tangent, columns, margin)])
+                master.limit(row, self.model.right(tangent, margin) / self.scale)
+            priced = self._priced(tangents, best.shadows, columns, margin)
             tangents += new
             if not len(priced.t) and not new:
                 break
             if len(priced.t):
                 self._add(master, tangents, priced, margin)
                 columns = columns.joined(priced)
-        if found is None:
+        if best is None:
             return Sure((), np.inf, np.zeros(5))
-        on_times = self._on_times(taken, found.x[1:])
+        on_times = self._on_times(taken, best.x[1:])
         used, left = on_times > 0.0, self.model.left(taken, on_times)
         return Sure(
             burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
-            float(found.x[0]),
+            float(best.x[0]),
             np.array([left[0].real, left[0].imag, left[1].real, left[1].imag, left[2].real]),
         )
 
-    def _on_times(self, columns: Columns, amounts: Vector) -> Vector:
+    def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
         """On-times (n,) s of amounts in units, without rounding."""
         return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
 
-    def _coefficients(self, tangent: Tangent, columns: Columns, margin: float) -> Vector:
+    def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Of a tangent, for one unit of each column, over the scale."""
         return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
-    def _broken(self, columns: Columns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
+    def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
-        left, found = self.model.left(columns, on_times), []
+        left, tangents = self.model.left(columns, on_times), []
         for limit in self.limits:
             spread = self.model.spread(limit.kind, columns, on_times)
 
-            def passed(directions: Complex, limit: Limit = limit, spread: Spread = spread) -> Vector:
+            def passed(directions: Complex, limit: ChanceLimit = limit, spread: Spread = spread) -> Vector:
                 along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
                 return np.asarray(along - (1.0 + excess + TIGHT) * limit.most)
 
@@ -326,10 +328,10 @@ class ChanceProgram:
                 u = complex(directions[index])
                 length = max(float(spread.within(directions[[index]])[0]), 1e-300)
                 own = np.column_stack([spread.pulses, (np.conj(u) * spread.own).real / length])
-                found.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
-        return found
+                tangents.append(Tangent(limit, u, (np.conj(u) * spread.shared).real / length, own))
+        return tangents
 
-    def _begin(self) -> Columns:
+    def _begin(self) -> ProgramColumns:
         """Columns to begin with: those that pull along the goal, or back."""
         model = self.model
         toward = np.conj(model.goal[0] or model.goal[1] or 1.0)
@@ -339,23 +341,23 @@ class ChanceProgram:
         some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
         return self._slots(channel[some], slot[some])
 
-    def _all(self, channel: int = 0) -> Columns:
+    def _all(self, channel: int = 0) -> ProgramColumns:
         centres = self.program.centres
         width = 0.0 if self.strong[channel] else self.program.width
         return alone(np.full(len(centres), channel), centres, np.full(len(centres), width))
 
-    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
+    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], np.where(self.strong[channel], 0.0, self.program.width))
 
-    def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: Columns, margin: float) -> None:
+    def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
-        rows = np.array([self._coefficients(one, new, margin) for one in tangents]).reshape(len(tangents), -1)
+        rows = np.array([self._coefficients(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)
 
-    def _priced(self, tangents: list[Tangent], shadows: Vector, taken: Columns, margin: float) -> Columns:
+    def _priced(self, tangents: list[Tangent], shadows: Vector, taken: ProgramColumns, margin: float) -> ProgramColumns:
         """Slots that would lower the cost, the best; of channels that act at once the best moments too."""
         cost = self.cost / self.dearest
-        active = [(one, price) for one, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
+        active = [(tangent, price) for tangent, price in zip(tangents, shadows.tolist(), strict=True) if price < -1e-12]
         worth = np.array([self._worth(channel, active, margin) - cost[channel] for channel in range(len(cost))])
         worth[self.program.forbidden] = -np.inf
         worth[taken.channel, np.searchsorted(self.program.centres, taken.t - 0.25 * self.program.width)] = -np.inf
@@ -382,6 +384,6 @@ class ChanceProgram:
         return self._kept[kind, channel]
 
 
-def directions_of(limit: Limit, count: int) -> Complex:
+def directions_of(limit: ChanceLimit, count: int) -> Complex:
     """Unit vectors (n,), ``count`` or the two that there are, in which a limit is looked at."""
     return np.array([1.0, -1.0], dtype=complex) if limit.kind == 2 else np.exp(2j * np.pi * np.arange(count) / count)

@@ -78,9 +78,9 @@ def earliest(problem: Problem) -> Schedule | None:
         low, high = (low, middle) if _pieces(problem, _small_angles(problem), middle) else (middle, high)
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
-        made = within(problem, end)
-        if made is not None or end == horizon or work.exhausted():
-            return made
+        schedule = within(problem, end)
+        if schedule is not None or end == horizon or work.exhausted():
+            return schedule
     return None
 
 
@@ -93,14 +93,18 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None
-        made = _exact(problem, pieces)
+        schedule = _exact(problem, pieces)
         try:
-            flown = problem.flown(made)
+            flown = problem.flown(schedule)
         except Infeasible:
             return None
-        if problem.left(flown) <= LEFT and made.end <= horizon and keeps_limits(problem.spacecraft, made.pulses):
-            return made
-        first = _schedule(problem, pieces, np.array([one.time for one in pieces]))
+        if (
+            problem.left(flown) <= LEFT
+            and schedule.end <= horizon
+            and keeps_limits(problem.spacecraft, schedule.pulses)
+        ):
+            return schedule
+        first = _schedule(problem, pieces, np.array([piece.time for piece in pieces]))
         influence = refinement.along(problem.flown(first), problem.equations, _slot(problem))
     return None
 
@@ -141,10 +145,10 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     shared = np.tile(np.eye(slots), len(channels))
     cost = np.repeat(problem.costs / dearest, slots)
     program.add(cost, np.vstack([columns, shared]), np.ones(columns.shape[1]))
-    found = program.optimum()
-    if found is None or float(found.x[: 2 * equations].sum()) > UNMET:
+    optimum = program.optimum()
+    if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
-    shares = found.x[2 * equations :].reshape(len(channels), slots)
+    shares = optimum.x[2 * equations :].reshape(len(channels), slots)
     return _in_order(channels, edges, free, shares * width)
 
 
@@ -166,8 +170,8 @@ def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.int
             pieces.append(Piece(None, idle))
             before = None
     joined = list[Piece]()
-    for channel, group in itertools.groupby(pieces, key=lambda one: one.channel):
-        joined.append(Piece(channel, sum(one.time for one in group)))
+    for channel, group in itertools.groupby(pieces, key=lambda piece: piece.channel):
+        joined.append(Piece(channel, sum(piece.time for piece in group)))
     while joined and joined[-1].channel is None:
         joined.pop()
     return joined
@@ -178,9 +182,9 @@ def _schedule(problem: Problem, pieces: list[Piece], times: Vector) -> Schedule:
     starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
     return Schedule(
         tuple(
-            channel_pulse(one.channel, float(start + 0.5 * time), float(time))
-            for one, start, time in zip(pieces, starts, times, strict=True)
-            if one.channel is not None and time > 0.0
+            channel_pulse(piece.channel, float(start + 0.5 * time), float(time))
+            for piece, start, time in zip(pieces, starts, times, strict=True)
+            if piece.channel is not None and time > 0.0
         )
     )
 
@@ -188,7 +192,7 @@ def _schedule(problem: Problem, pieces: list[Piece], times: Vector) -> Schedule:
 def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
     """The schedule whose flown motion leaves nothing, by Newton's method for the lengths of its pieces."""
     body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
-    times = np.array([one.time for one in pieces])
+    times = np.array([piece.time for piece in pieces])
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
 
@@ -200,7 +204,7 @@ def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
         if np.linalg.norm(value) <= CONVERGED or work.exhausted():
             break
         step = 1e-6 * scale
-        slopes = np.column_stack([(left(times + step * one) - value) / 1e-6 for one in np.eye(len(times))])
+        slopes = np.column_stack([(left(times + step * unit) - value) / 1e-6 for unit in np.eye(len(times))])
         move = bounded_step(slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most))
         for shrink in range(6):
             trial = np.clip(times + move * 0.5**shrink, 0.0, most)

@@ -24,7 +24,7 @@ from nutdamp.common import work
 from nutdamp.flight.propagation import make_dynamics
 from nutdamp.physics import attitude, batch
 from nutdamp.schemes.optimal import refinement
-from nutdamp.schemes.optimal.refinement import Equations
+from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -59,14 +59,14 @@ class Sequences:
 
 
 class Task:
-    """What is to be done by ``channels`` at ``costs`` per second, see `Equations`; H may end ``off`` N m s off target.
+    """Task of ``channels`` at ``costs`` per second, see `EndEquations`; H may end ``off`` N m s off target.
 
     Unknowns x (b, 2n) of a sequence are the starts of its pulses, then their on-times, s; two more where H may end
     off its target: how far, over ``off``.
     """
 
     def __init__(
-        self, body: Spacecraft, equations: Equations, channels: tuple[Channel, ...], costs: Vector, off: float = 0.0
+        self, body: Spacecraft, equations: EndEquations, channels: tuple[Channel, ...], costs: Vector, off: float = 0.0
     ) -> None:
         self.body, self.channels, self.costs = body, channels, costs
         self.chosen = equations.chosen
@@ -104,12 +104,12 @@ class Task:
             begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
             for kick in range(kicks):
                 t = begin + on_time * ((kick + 0.5) / kicks)
-                batch.advance(batch.Stretch(bodies, now, rates, turn), t - now)
+                batch.advance(batch.MotionStretch(bodies, now, rates, turn), t - now)
                 rates += torque * (on_time / kicks) / moments
                 now = t
             if not kicks:
-                batch.advance(batch.Stretch(bodies, now, rates, turn), begin - now)
-                batch.advance(batch.Stretch(bodies, begin, rates, turn, torque), on_time)
+                batch.advance(batch.MotionStretch(bodies, now, rates, turn), begin - now)
+                batch.advance(batch.MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
         momentum = rates * moments
         inertial = attitude.rotate(turn.T, momentum.T)
@@ -140,14 +140,14 @@ class Task:
     def bounds(self, sequences: Sequences) -> tuple[Vector, Vector]:
         """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and ``off``."""
         count, n = sequences.which.shape
-        one, none = np.eye(n), np.zeros((n, n))
-        after = one - np.eye(n, k=-1)
+        identity, zero = np.eye(n), np.zeros((n, n))
+        after = identity - np.eye(n, k=-1)
         rows = [
             np.hstack([after, -np.eye(n, k=-1)])[1:],
-            np.hstack([one, none]),
-            np.hstack([-one, -one]),
-            np.hstack([none, one]),
-            np.hstack([none, -one]),
+            np.hstack([identity, zero]),
+            np.hstack([-identity, -identity]),
+            np.hstack([zero, identity]),
+            np.hstack([zero, -identity]),
         ]
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
@@ -180,7 +180,7 @@ PROXIMAL = 1e-9
 
 
 @dataclass(eq=False)
-class State:
+class DescentState:
     """Where the descents of b sequences are: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
 
     ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations, ``curvature`` (b, v, v) of
@@ -198,11 +198,11 @@ class State:
     penalty: Vector
     error: Vector
 
-    def of(self, rows: Any) -> State:
+    def of(self, rows: Any) -> DescentState:
         """Those of some sequences."""
-        return State(*(getattr(self, field.name)[rows] for field in fields(self)))
+        return DescentState(*(getattr(self, field.name)[rows] for field in fields(self)))
 
-    def put(self, rows: Any, other: State) -> None:
+    def put(self, rows: Any, other: DescentState) -> None:
         """Replace those of some sequences."""
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(other, field.name)
@@ -224,7 +224,7 @@ class Descent:
         count, number = x.shape
         slack = (x @ rows.T - levels) / size
         misses = task.misses(sequences.which, x, kicks)
-        self.state = State(
+        self.state = DescentState(
             x=np.array(x),
             slack=slack,
             dual=barrier / slack,
@@ -278,7 +278,7 @@ class Descent:
                 break
             state.x[better], state.slack[better], state.misses[better] = x[better], slack[better], misses[better]
 
-    def _stepped(self, at: Indices) -> State:
+    def _stepped(self, at: Indices) -> DescentState:
         old = self.state.of(at)
         rows, price, scale, which = self.rows[at], self.price[at], self.scale[at], self.sequences.which[at]
         weight = old.dual / old.slack
@@ -289,7 +289,7 @@ class Descent:
         move[lost], prices[lost] = 0.0, 0.0
         penalty = np.maximum(old.penalty, 1.5 * np.abs(prices).max(axis=1))
         ahead = np.einsum("bi,bi->b", uphill, move)
-        line = _Line(self, at, old, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
+        line = _LineSearch(self, at, old, penalty, ahead - penalty * np.abs(old.misses).sum(axis=1))
         closer = np.einsum("bri,bi->br", rows, move)
         step = _to_bound(old.slack, closer, old.barrier)[:, None] * move
         there = line.tried(step)
@@ -312,13 +312,13 @@ class Descent:
         barrier = np.where(near, np.maximum(np.minimum(0.2 * old.barrier, old.barrier**1.5), BARRIER), old.barrier)
         flat = (np.abs(ahead) < FLAT) & (old.barrier < FLAT) & (np.abs(misses).max(axis=1) < FLAT)
         error = np.where(flat | lost, 0.0, np.maximum(wrong, (dual * slack).max(axis=1)))
-        return State(x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error)
+        return DescentState(x, slack, dual, misses, slopes, prices, curvature, barrier, penalty, error)
 
 
-class _Line:
+class _LineSearch:
     """The search along a step for less of cost, barrier and misses; ``slope`` (b,) is how fast they fall at first."""
 
-    def __init__(self, descent: Descent, at: Indices, old: State, penalty: Vector, slope: Vector) -> None:
+    def __init__(self, descent: Descent, at: Indices, old: DescentState, penalty: Vector, slope: Vector) -> None:
         self.task, self.kicks, self.which = descent.task, descent.kicks, descent.sequences.which[at]
         self.price, self.scale, self.rows = descent.price[at], descent.scale[at], descent.rows[at]
         self.old, self.penalty, self.slope = old, penalty, np.minimum(slope, 0.0)
@@ -383,13 +383,13 @@ def _newton(slopes: Vector, curvature: Vector, uphill: Vector, misses: Vector, p
     system[:, v:, v:] = -PROXIMAL * np.eye(m)
     right = np.concatenate([-uphill, -misses - PROXIMAL * prices], axis=1)
     try:
-        found = np.linalg.solve(system, right[:, :, None])[:, :, 0]
+        step = np.linalg.solve(system, right[:, :, None])[:, :, 0]
     except np.linalg.LinAlgError:  # some are singular: those are lost, not all
-        found = np.full(right.shape, np.nan)
+        step = np.full(right.shape, np.nan)
         for row in range(count):
             with suppress(np.linalg.LinAlgError):
-                found[row] = np.linalg.solve(system[row], right[row])
-    return found[:, :v], found[:, v:]
+                step[row] = np.linalg.solve(system[row], right[row])
+    return step[:, :v], step[:, v:]
 
 
 def _to_bound(value: Vector, change: Vector, barrier: Vector) -> Vector:

@@ -87,13 +87,13 @@ class GrowingProgram:
 
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
-        found = self._solved(*WAYS[0])
+        optimum = self._solved(*WAYS[0])
         for way in WAYS:
-            if found is not None:
+            if optimum is not None:
                 break
             self._highs.clearSolver()
-            found = self._solved(*way)
-        return found
+            optimum = self._solved(*way)
+        return optimum
 
     def _solved(self, method: str, presolve: bool, factor: float) -> Optimum | None:
         highs = self._highs
@@ -107,14 +107,14 @@ class GrowingProgram:
             # Threads are set once in a process, by whoever solves first; zero takes what there is.
             highs.setOptionValue("threads", 0)
             highs.run()
-        found = None
+        optimum = None
         if highs.getModelStatus() == highspy.HighsModelStatus.kOptimal:
             solution = highs.getSolution()
             prices, shadows = np.split(np.array(solution.row_dual) / factor, [len(self._level)])
-            found = Optimum(np.array(solution.col_value), prices / self._level, shadows)
+            optimum = Optimum(np.array(solution.col_value), prices / self._level, shadows)
         if factor != 1.0:
             highs.changeColsCost(len(every), every, self._costs)
-        return found
+        return optimum
 
 
 class _SilentSolver(highspy.Highs):
@@ -188,13 +188,13 @@ def _nearest(corners: Vector, weights: Vector) -> tuple[Vector, Vector]:
         system[1:, 1:] = corners @ corners.T
         right = np.zeros(count + 1)
         right[0] = 1.0
-        found = np.linalg.lstsq(system, right, rcond=None)[0][1:]
-        if np.all(found > FLAT):
-            return corners, found / found.sum()
-        falling = found <= FLAT
-        steps = weights[falling] / np.maximum(weights[falling] - found[falling], 1e-300)
+        weights_of = np.linalg.lstsq(system, right, rcond=None)[0][1:]
+        if np.all(weights_of > FLAT):
+            return corners, weights_of / weights_of.sum()
+        falling = weights_of <= FLAT
+        steps = weights[falling] / np.maximum(weights[falling] - weights_of[falling], 1e-300)
         share = min(float(steps.min()), 1.0)
-        weights = (1.0 - share) * weights + share * found
+        weights = (1.0 - share) * weights + share * weights_of
         kept = weights > FLAT
         kept[np.flatnonzero(falling)[int(np.argmin(steps))]] = False
         corners, weights = corners[kept], weights[kept] / weights[kept].sum()

@@ -28,7 +28,7 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 
-class Columns(NamedTuple):
+class ProgramColumns(NamedTuple):
     """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
 
     Columns of the same ``burn``, a number from 0 on, are together on for no longer than their channel may be.
@@ -39,13 +39,13 @@ class Columns(NamedTuple):
     width: Vector
     burn: NDArray[np.int_]
 
-    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> Columns:
+    def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> ProgramColumns:
         """Some of the columns."""
-        return Columns(self.channel[which], self.t[which], self.width[which], self.burn[which])
+        return ProgramColumns(self.channel[which], self.t[which], self.width[which], self.burn[which])
 
-    def joined(self, other: Columns) -> Columns:
+    def joined(self, other: ProgramColumns) -> ProgramColumns:
         """These columns and others."""
-        return Columns(
+        return ProgramColumns(
             np.concatenate([self.channel, other.channel]),
             np.concatenate([self.t, other.t]),
             np.concatenate([self.width, other.width]),
@@ -53,9 +53,9 @@ class Columns(NamedTuple):
         )
 
 
-def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> Columns:
+def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> ProgramColumns:
     """Columns that belong to no burn."""
-    return Columns(channel, t, width, np.full(len(t), -1))
+    return ProgramColumns(channel, t, width, np.full(len(t), -1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +72,17 @@ class Burn:
         return self.on_time * float(np.linalg.norm(self.channel.torque))
 
 
-def burns(channels: Sequence[Channel], columns: Columns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
+def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector, apart: float) -> tuple[Burn, ...]:
     """Columns of a channel that are less than ``apart`` s from one another as one burn about their common centre."""
-    found: list[Burn] = []
+    result: list[Burn] = []
     for index in np.flatnonzero(np.bincount(columns.channel)).tolist():
         mine = np.flatnonzero(columns.channel == index)
         mine = mine[np.argsort(columns.t[mine], kind="stable")]
         cut = (np.diff(columns.t[mine]) > apart) | (np.diff(columns.burn[mine]) != 0)
         for group in np.split(mine, np.flatnonzero(cut) + 1):
             total = float(on_times[group].sum())
-            found.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
-    return tuple(sorted(found, key=lambda burn: burn.t))
+            result.append(Burn(channels[index], float(on_times[group] @ columns.t[group]) / total, total))
+    return tuple(sorted(result, key=lambda burn: burn.t))
 
 
 def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
@@ -190,7 +190,7 @@ class Program:
         self.width = float(edges[1] - edges[0])
         self.centres = 0.5 * (edges[1:] + edges[:-1])
         self.forbidden = np.tile(Windows(body).blocked(edges[:-1], edges[1:]), (len(self.channels), 1))
-        self._pool: Columns | None = None
+        self._pool: ProgramColumns | None = None
         self._torques = np.array([channel.torque for channel in self.channels])
         self.aim(self.influence)
 
@@ -208,7 +208,7 @@ class Program:
         self._grid: Vector | None = None
         self._looked = 0
 
-    def solve(self, columns: Columns | None = None, *, enough: bool = False) -> Solution:
+    def solve(self, columns: ProgramColumns | None = None, *, enough: bool = False) -> Solution:
         """Least cost over the ``columns`` given, or over all that is not forbidden, by column generation.
 
         ``enough``: only to see whether there is a solution, at whatever cost; it ends once that is known.
@@ -220,39 +220,39 @@ class Program:
         generate = columns is None
         chosen = self._first() if columns is None else columns
         master = self._master(chosen, self._reach() if columns is None else None)
-        found = master.optimum()
-        if found is None:
+        optimum = master.optimum()
+        if optimum is None:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            unmet = self._unmet(found)
-            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(found.prices))):
+            unmet = self._unmet(optimum)
+            if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
                 break
-            new = self._priced(found.prices, chosen, unmet)
+            new = self._priced(optimum.prices, chosen, unmet)
             if not len(new.t):
                 break
             self._add(master, new)
             better = master.optimum()
             if better is None:  # what would lower the cost is lost on the solver
                 break
-            chosen, found = chosen.joined(new), better
+            chosen, optimum = chosen.joined(new), better
         if generate:
             self._pool = chosen
-        free, amounts = np.split(found.x, [len(found.x) - len(chosen.t)])
+        free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             burns(self.channels, chosen.of(used), on_times, 1.01 * self.width),
             float(self.costs[chosen.channel[used]] @ on_times),
-            self._unmet(found),
+            self._unmet(optimum),
             self._off_by(free[2 * len(nothing) :]),
-            found.prices * self._dearest / self._scale,
+            optimum.prices * self._dearest / self._scale,
         )
 
-    def _unmet(self, found: highs.Optimum) -> float:
+    def _unmet(self, optimum: highs.Optimum) -> float:
         """What slacks have to supply, over all there is to do."""
-        return float(found.x[: 2 * len(self.influence.goal)].sum())
+        return float(optimum.x[: 2 * len(self.influence.goal)].sum())
 
-    def _master(self, columns: Columns, reach: Vector | None) -> highs.GrowingProgram:
+    def _master(self, columns: ProgramColumns, reach: Vector | None) -> highs.GrowingProgram:
         """The program of these columns, in units of all there is to do, after slacks and the ring.
 
         ``reach`` (equations,): the largest coefficients that there can be, where more columns are to come.
@@ -274,7 +274,7 @@ class Program:
         self._add(master, columns)
         return master
 
-    def _add(self, master: highs.GrowingProgram, columns: Columns) -> None:
+    def _add(self, master: highs.GrowingProgram, columns: ProgramColumns) -> None:
         """Let the program have these columns."""
         cost = self._price[columns.channel] / self._dearest * self._dearness(columns.t)
         most = np.full(len(cost), np.inf)
@@ -283,7 +283,7 @@ class Program:
         shares = np.zeros((int(self.off > 0.0), len(cost)))
         master.add(cost, np.vstack([self._coefficients(columns), shares, self._longest(columns)]), most)
 
-    def _longest(self, columns: Columns) -> Vector:
+    def _longest(self, columns: ProgramColumns) -> Vector:
         """Rows (burns, n) that hold each burn's on-time, over the longest that its channel may be on."""
         longest = np.array([channel.max_on_time for channel in self.channels])[columns.channel]
         bounded = np.flatnonzero((columns.burn >= 0) & np.isfinite(longest))
@@ -308,11 +308,11 @@ class Program:
     def _dearness(self, times: Vector) -> Vector:
         return 1.0 + self.haste * times / float(self.centres[-1])
 
-    def _coefficients(self, columns: Columns) -> Vector:
+    def _coefficients(self, columns: ProgramColumns) -> Vector:
         """What one unit of each column does in the equations, (equations, n)."""
         return np.asarray(np.einsum("nek,nk->en", self._rows(columns), self._direction[columns.channel]))
 
-    def _rows(self, columns: Columns) -> Vector:
+    def _rows(self, columns: ProgramColumns) -> Vector:
         """What one N m s of each column about each body axis adds to the equations, (n, equations, 3).
 
         Once slots were looked at as often as there are any, all of them are, and kept.
@@ -372,7 +372,7 @@ class Program:
         loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
         return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
 
-    def _first(self) -> Columns:
+    def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
         if self._pool is not None:
             pool = self._pool
@@ -383,10 +383,10 @@ class Program:
         chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
         return self._slots(channel[chosen], slot[chosen])
 
-    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> Columns:
+    def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.centres[slot], np.where(self.strong[channel], 0.0, self.width))
 
-    def _priced(self, duals: Vector, taken: Columns, unmet: float) -> Columns:
+    def _priced(self, duals: Vector, taken: ProgramColumns, unmet: float) -> ProgramColumns:
         """Columns worth more than they cost: whole slots of a weak channel, the best moments of a strong one.
 
         More of them at a time as long as something is ``unmet``: then most of what there is may be needed.
@@ -400,10 +400,10 @@ class Program:
         if len(slot) > most:
             best = np.argpartition(weak[channel, slot], -most)[-most:]
             channel, slot = channel[best], slot[best]
-        found = self._slots(channel, slot)
-        return found.joined(self._peaks(gains, duals)) if self.strong.any() else found
+        columns = self._slots(channel, slot)
+        return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 
-    def _peaks(self, gains: Vector, duals: Vector) -> Columns:
+    def _peaks(self, gains: Vector, duals: Vector) -> ProgramColumns:
         """Moments within slots at which a strong channel is worth most."""
         padded = np.pad(np.where(self.strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
         middle = padded[:, 1:-1]
@@ -425,7 +425,7 @@ class Program:
         rows = slice(None) if channel is None else self.channels.index(channel)
         self.forbidden[rows, inside] = True
 
-    def about(self, burns: Sequence[Burn], zoom: float = 1.0) -> Columns:
+    def about(self, burns: Sequence[Burn], zoom: float = 1.0) -> ProgramColumns:
         """Columns from which ``burns`` may be made anew: their slots, and an eighth of the faster turn on each side.
 
         Strong channels fire within that divided by ``zoom``.
@@ -443,7 +443,9 @@ class Program:
                 times = times[np.diff(times, prepend=-np.inf) > 0.0]
                 times = times[~self.forbidden[index, self._slot(times)]]
                 same = np.full(len(times), index)
-                impulses = impulses.joined(Columns(same, times, np.zeros(len(times)), np.full(len(times), number)))
+                impulses = impulses.joined(
+                    ProgramColumns(same, times, np.zeros(len(times)), np.full(len(times), number))
+                )
             else:
                 first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
                 near = np.arange(first, last + 1)

@@ -111,18 +111,18 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
     return _flown(task, best, known)
 
 
-def cheapened(task: Task, made: Schedule) -> Schedule | None:
+def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
     """A schedule after a few steps down on the true motion, fewer where it has many pulses; None where there is none.
 
     Its sequence of channels stays, and what it leaves too.
     """
-    which, t, on = _moments_of(task, made)
+    which, t, on = _moments_of(task, schedule)
     every = Moments(which[None], t[None], on[None])
     starts = laid_out(task, every, np.array([channel.min_on_time for channel in task.channels])[every.which])
     if not len(starts.x):
         return None
     descent = Descent(task, *starts, kicks=0, barrier=CLOSE)
-    descent.run(max(MOVES // len(made), FEWEST_MOVES))
+    descent.run(max(MOVES // len(schedule), FEWEST_MOVES))
     descent.close()
     there = bool(descent.left[0] < EXACT)
     return _schedule(task, _moments(descent.sequences.which[0], descent.state.x[0])) if there else None
@@ -280,28 +280,31 @@ def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Ve
 
 def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]:
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
-    given = [_moments_of(task, made) for made in known if 0 < len(made) <= _pulses(task, 2 * SPARE)]
+    given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
-    near = [one for one, cost in zip(ideal, best.cost, strict=True) if cost <= NEAR * best.cost[0]]
-    found = _on_the_true_motion(task, [*near, *given]) or _on_the_true_motion(task, ideal)
-    spare = [len(_needed(task, one).which) < len(one.which) for one in found]
-    lean = [one for one, more in zip(found, spare, strict=True) if not more]
-    lean += _on_the_true_motion(task, [one for one, more in zip(found, spare, strict=True) if more])
-    most = min((_price(task, one) for one in lean), default=math.inf) * (1.0 - GAIN)
-    kept = [*lean, *(one for one, more in zip(found, spare, strict=True) if more and _price(task, one) < most)]
-    return [_schedule(task, one) for one in sorted(kept, key=lambda one: _price(task, one))]
+    near = [moments for moments, cost in zip(ideal, best.cost, strict=True) if cost <= NEAR * best.cost[0]]
+    flown = _on_the_true_motion(task, [*near, *given]) or _on_the_true_motion(task, ideal)
+    spare = [len(_needed(task, moments).which) < len(moments.which) for moments in flown]
+    lean = [moments for moments, more in zip(flown, spare, strict=True) if not more]
+    lean += _on_the_true_motion(task, [moments for moments, more in zip(flown, spare, strict=True) if more])
+    most = min((_price(task, moments) for moments in lean), default=math.inf) * (1.0 - GAIN)
+    kept = [
+        *lean,
+        *(moments for moments, more in zip(flown, spare, strict=True) if more and _price(task, moments) < most),
+    ]
+    return [_schedule(task, moments) for moments in sorted(kept, key=lambda moments: _price(task, moments))]
 
 
-def _price(task: Task, one: Moments) -> float:
-    return float(task.price(one.which, one.on))
+def _price(task: Task, moments: Moments) -> float:
+    return float(task.price(moments.which, moments.on))
 
 
 def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
     """Sequences (n,) each, descended on the true motion without their needless pulses."""
-    found: list[Moments] = []
-    fewer = [_needed(task, one) for one in every]
-    for count in sorted({len(one.which) for one in fewer} - {0}):
-        alike = [one for one in fewer if len(one.which) == count]
+    lowered: list[Moments] = []
+    fewer = [_needed(task, moments) for moments in every]
+    for count in sorted({len(moments.which) for moments in fewer} - {0}):
+        alike = [moments for moments in fewer if len(moments.which) == count]
         together = Moments(*(np.array(part) for part in zip(*alike, strict=True)))
         least = np.array([channel.min_on_time for channel in task.channels])[together.which]
         starts = laid_out(task, together, least)
@@ -315,15 +318,15 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
             descent.run(20)
             descent.close()
             rows = np.flatnonzero(descent.left < EXACT)
-            found += [_moments(descent.sequences.which[row], descent.state.x[row]) for row in rows]
-    return found
+            lowered += [_moments(descent.sequences.which[row], descent.state.x[row]) for row in rows]
+    return lowered
 
 
-def _moments_of(task: Task, made: Schedule) -> Moments:
+def _moments_of(task: Task, schedule: Schedule) -> Moments:
     """The pulses of a schedule."""
     numbers = {channel.name: number for number, channel in enumerate(task.channels)}
-    which = np.array([numbers[pulse.channel] for pulse in made], dtype=int)
-    return Moments(which, np.array([pulse.t for pulse in made]), np.array([pulse.on_time for pulse in made]))
+    which = np.array([numbers[pulse.channel] for pulse in schedule], dtype=int)
+    return Moments(which, np.array([pulse.t for pulse in schedule]), np.array([pulse.on_time for pulse in schedule]))
 
 
 def _moments(which: NDArray[np.int_], x: Vector) -> Moments:
@@ -332,19 +335,19 @@ def _moments(which: NDArray[np.int_], x: Vector) -> Moments:
     return Moments(which, start + 0.5 * on, on)
 
 
-def _schedule(task: Task, one: Moments) -> Schedule:
+def _schedule(task: Task, moments: Moments) -> Schedule:
     """One sequence (n,) as a schedule."""
-    felt = one.on > NOTHING * task.unit[one.which]
-    every = zip(*(part[felt].tolist() for part in one), strict=True)
+    felt = moments.on > NOTHING * task.unit[moments.which]
+    every = zip(*(part[felt].tolist() for part in moments), strict=True)
     return Schedule(tuple(channel_pulse(task.channels[number], t, on) for number, t, on in every))
 
 
-def _needed(task: Task, one: Moments) -> Moments:
+def _needed(task: Task, moments: Moments) -> Moments:
     """One sequence (n,) without needless pulses, and with pulses of a channel that touch as one."""
     least = np.array([channel.min_on_time for channel in task.channels])
-    kept = one.on > np.maximum(NEEDLESS * task.unit[one.which], HALF * least[one.which])
-    one = Moments(*(part[kept] for part in one))
-    which, start, on = one.which.tolist(), (one.t - 0.5 * one.on).tolist(), one.on.tolist()
+    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], HALF * least[moments.which])
+    moments = Moments(*(part[kept] for part in moments))
+    which, start, on = moments.which.tolist(), (moments.t - 0.5 * moments.on).tolist(), moments.on.tolist()
     for number in reversed(range(1, len(which))):
         before = number - 1
         together = start[number] + on[number] - start[before]

@@ -22,7 +22,7 @@ from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds, refinement
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.refinement import Equations
+from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, rounded_off, usable
 from nutdamp.spacecraft.equipment import Channel
@@ -60,9 +60,9 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
         most = math.inf
     while low < high:
         middle = (low + high) // 2
-        found = program.solve(program.about(order[:middle]))
-        if found.unmet <= UNMET and found.cost <= most:
-            best, high = found, middle
+        trial = program.solve(program.about(order[:middle]))
+        if trial.unmet <= UNMET and trial.cost <= most:
+            best, high = trial, middle
         else:
             low = middle + 1
     return best
@@ -110,15 +110,15 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     every = np.arange(len(program.centres))
     divided = False
     for row, channel in enumerate(program.channels):
-        long = sorted((one for one in burns if one.channel is channel and _too_long(one)), key=lambda one: one.t)
+        long = sorted((burn for burn in burns if burn.channel is channel and _too_long(burn)), key=lambda burn: burn.t)
         window = math.floor(channel.max_on_time / program.width + TOUCHING) if long else 0
         if window == 0:
             continue
         divided = True
         pause = max(math.ceil(max(program.spacecraft.limits.gap, channel.min_on_time) / program.width - TOUCHING), 1)
-        middles = np.searchsorted(program.centres, [one.t for one in long])
+        middles = np.searchsorted(program.centres, [burn.t for burn in long])
         nearest = np.searchsorted(0.5 * (middles[1:] + middles[:-1]), every)
-        pieces = np.array([math.ceil(one.on_time / (window * program.width)) for one in long])
+        pieces = np.array([math.ceil(burn.on_time / (window * program.width)) for burn in long])
         # The first of the pieces begins so that all of them are centred on the burn.
         first = middles - (pieces * (window + pause) - pause) // 2
         within = (every - first[nearest]) % (window + pause)
@@ -144,9 +144,9 @@ def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Chann
             yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
         if burn.on_time < 0.5 * shortest:
             yield burn.channel, burn.t - 2.0 * width, burn.t + 2.0 * width
-    for one, two in itertools.pairwise(burns):
-        if two.t - 0.5 * two.on_time < one.t + 0.5 * one.on_time + limits.gap - TOUCHING:
-            less = min(one, two, key=lambda burn: burn.on_time)
+    for earlier, later in itertools.pairwise(burns):
+        if later.t - 0.5 * later.on_time < earlier.t + 0.5 * earlier.on_time + limits.gap - TOUCHING:
+            less = min(earlier, later, key=lambda burn: burn.on_time)
             reach = 0.5 * less.on_time + width
             yield less.channel, less.t - reach, less.t + reach
     if limits.max_pulses is not None and len(burns) > limits.max_pulses:
@@ -194,7 +194,7 @@ class Problem:
         self.channels = tuple(at_hand(spacecraft, usable(spacecraft, axial=requested)))
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
-        self.equations = Equations(shift=not options.free_axis, spin=requested)
+        self.equations = EndEquations(shift=not options.free_axis, spin=requested)
         flows = [channel.mass_flow for channel in self.channels]
         known = [flow for flow in flows if flow is not None]
         if options.least != "impulse" and len(known) == len(flows):
@@ -204,16 +204,16 @@ class Problem:
             self.unit = "N m s"
         self._dynamics = make_dynamics(spacecraft).remembering()
 
-    def flown(self, made: Schedule) -> Flight:
+    def flown(self, schedule: Schedule) -> Flight:
         """The schedule through its real pulse widths; what was flown before is remembered."""
-        return propagation.flown(self.spacecraft, made, dynamics=self._dynamics)
+        return propagation.flown(self.spacecraft, schedule, dynamics=self._dynamics)
 
     @property
     def closed(self) -> bool:
         """Whether the motion between pulses is that of a symmetric body left alone."""
         return self._dynamics.free and self.spacecraft.growth == 0.0
 
-    def program(self, spacecraft: Spacecraft | None = None, equations: Equations | None = None) -> Program:
+    def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
         """The linear program of small angles, with another horizon or other equations if given."""
         body, equations = spacecraft or self.spacecraft, equations or self.equations
         aim = refinement.small_angles(body, equations)
@@ -251,25 +251,27 @@ class Problem:
             needed[name] = needed.get(name, 0.0) + burn.on_time / burn.channel.max_on_time
         return {name: count for name, count in needed.items() if count > self.program().forbidden.shape[1]}
 
-    def with_bounds(self, made: Schedule, first: Solution | None = None) -> Schedule:
+    def with_bounds(self, schedule: Schedule, first: Solution | None = None) -> Schedule:
         """The schedule with what any other must cost."""
         program = self.program()
         first = first or program.solve()
         least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
         keeping = self._keeping() if self.options.free_axis and not work.exhausted() else None
-        return Schedule(made.pulses, made.notes, Bounds(least, self.rigorous(made), self.unit, program.end, keeping))
+        return Schedule(
+            schedule.pulses, schedule.notes, Bounds(least, self.rigorous(schedule), self.unit, program.end, keeping)
+        )
 
     def _keeping(self) -> float | None:
         """The first-order least cost of a schedule that keeps H; None where there is none."""
-        program = self.program(equations=Equations(shift=True, spin=self.equations.spin))
-        found = program.solve()
-        return None if found.unmet > UNMET else bounds.first_order(program, found.prices).bound
+        program = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
+        solution = program.solve()
+        return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
 
-    def rigorous(self, made: Schedule) -> float | None:
+    def rigorous(self, schedule: Schedule) -> float | None:
         """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""
         body = self.spacecraft
-        left = self.leaves(self.flown(made))
-        return bounds.rigorous(body, self.prices(), self.price(made), left, shift=self.equations.shift)
+        left = self.leaves(self.flown(schedule))
+        return bounds.rigorous(body, self.prices(), self.price(schedule), left, shift=self.equations.shift)
 
     def prices(self) -> dict[str, float]:
         """Cost per second, in the unit of the bounds, of every channel of which it is known."""
@@ -278,23 +280,23 @@ class Problem:
             return {name: flow for name, flow in flows.items() if flow is not None}
         return {channel.name: channel.strength for channel in self.spacecraft.channels}
 
-    def price(self, made: Schedule) -> float:
+    def price(self, schedule: Schedule) -> float:
         """What a schedule costs by the program's own prices."""
         price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
-        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in made)
+        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in schedule)
 
-    def worth(self, made: Schedule) -> float:
+    def worth(self, schedule: Schedule) -> float:
         """What is to be least: the cost, or the number of pulses."""
-        return float(len(made)) if self.options.least == "pulses" else self.price(made)
+        return float(len(schedule)) if self.options.least == "pulses" else self.price(schedule)
 
-    def dear(self, made: Schedule | None, least: float, share: float = DEARER) -> bool:
+    def dear(self, schedule: Schedule | None, least: float, share: float = DEARER) -> bool:
         """Whether there is no schedule, or one so dear that it is worth looking for another."""
-        return made is None or self.price(made) > least * (1.0 + share)
+        return schedule is None or self.price(schedule) > least * (1.0 + share)
 
-    def cheaper(self, one: Schedule | None, other: Schedule | None) -> Schedule | None:
-        """The cheaper of two schedules, of which there may be none; the one with fewer pulses where that counts."""
-        there = [made for made in (one, other) if made is not None]
-        return min(there, key=lambda made: (self.worth(made), self.price(made)), default=None)
+    def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
+        """The cheaper of two schedules, of which there may be none; the known with fewer pulses where that counts."""
+        there = [schedule for schedule in (known, other) if schedule is not None]
+        return min(there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None)
 
     def left(self, flown: Flight) -> float:
         """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
@@ -307,9 +309,9 @@ class Problem:
         off = residual.axis_error if self.equations.shift else 0.0
         return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
-    def rounded(self, made: Schedule) -> float:
+    def rounded(self, schedule: Schedule) -> float:
         """What starts and on-times on ticks can leave, rad, added up as chance does; without ticks zero."""
-        return math.hypot(*rounded_off(self.spacecraft, made))
+        return math.hypot(*rounded_off(self.spacecraft, schedule))
 
     def not_found(self) -> str:
         """Why no schedule was found although the program has solutions: the limits that it does not know of."""
@@ -349,11 +351,14 @@ class Problem:
         """Why the program has no solution, and which limit to relax; ``long_enough``: see `relaxed`."""
         body = self.spacecraft
         names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
-        nutation = Equations(shift=False)
+        nutation = EndEquations(shift=False)
         left = self.program(body, nutation).solve().unmet
         if left <= UNMET:
             failing = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
-            if self.equations.spin and self.program(body, Equations(shift=self.equations.shift)).solve().unmet <= UNMET:
+            if (
+                self.equations.spin
+                and self.program(body, EndEquations(shift=self.equations.shift)).solve().unmet <= UNMET
+            ):
                 failing = "the spin cannot be brought to the rate of the goal"
             out = "the nutation can be taken out, but " if body.transverse_rate > 0.0 else ""
             what = f"within {horizon:.4g} s {out}{failing}"

@@ -49,7 +49,7 @@ KNOTS = 400
 
 
 @dataclass(frozen=True, slots=True)
-class Equations:
+class EndEquations:
     """Which of the five are requested; the nutation always is."""
 
     shift: bool = True
@@ -99,7 +99,7 @@ def growth_from(spacecraft: Spacecraft) -> float:
     return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
 
 
-def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
+def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     """Σ J d e^{iaω3t} = -A ω0 and Σ J d e^{iω3t} = Δh: exact for the nutation, of first order for H.
 
     What dissipation damps counts from the end of the horizon, what it lets grow from t = 0: no row exceeds one.
@@ -123,7 +123,7 @@ def small_angles(spacecraft: Spacecraft, equations: Equations) -> Influence:
     return Influence(rows, every[equations.chosen], _turning(spacecraft)[equations.chosen])
 
 
-def along(flight: Flight, equations: Equations, step: float) -> Influence:
+def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
     """The equations about a flight, at its true angles: what its pulses add, less what it leaves, is the goal.
 
     That a firing also turns the body under the pulses that follow is neglected; ``step`` s is for `Influence.of`.
@@ -140,7 +140,7 @@ def along(flight: Flight, equations: Equations, step: float) -> Influence:
     return Influence(rows, here.of(flight.schedule, step) - misses(flight, equations), here.turning)
 
 
-def misses(flight: Flight, equations: Equations) -> Vector:
+def misses(flight: Flight, equations: EndEquations) -> Vector:
     """What a flight leaves of the equations, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
@@ -216,17 +216,17 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
 class PulseParameters:
     """Centre and on-time of each pulse, as one vector: (c1, τ1, c2, τ2 …) s, its scale, and how far each may go."""
 
-    def __init__(self, spacecraft: Spacecraft, made: Schedule) -> None:
+    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
         names = {channel.name: channel for channel in spacecraft.channels}
-        self.channels = [names[pulse.channel] for pulse in made]
-        self.made = made
+        self.channels = [names[pulse.channel] for pulse in schedule]
+        self.made = schedule
         pace = 1.0 / abs(spacecraft.spin)
-        self.room = rooms(spacecraft, made.pulses)
+        self.room = rooms(spacecraft, schedule.pulses)
         start: list[float] = []
         scale: list[float] = []
         lower: list[float] = []
         upper: list[float] = []
-        for pulse, channel, (begun, latest) in zip(made, self.channels, self.room, strict=True):
+        for pulse, channel, (begun, latest) in zip(schedule, self.channels, self.room, strict=True):
             before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
             start += [pulse.t, pulse.on_time]
             scale += [pace, min(pulse.on_time, pace)]
@@ -243,11 +243,11 @@ class PulseParameters:
         )
         return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
 
-    def slopes(self, made: Schedule, flown: propagation.Flight, equations: Equations, step: float) -> Vector:
+    def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: EndEquations, step: float) -> Vector:
         """What the scaled parameters change in the equations, (equations, 2k) N m s."""
         rows = along(flown, equations, step).rows
         columns = []
-        begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in made), strict=True))
+        begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in schedule), strict=True))
         for index, channel in enumerate(self.channels):
             on, off = begins[index] @ channel.torque, ends[index] @ channel.torque
             columns += [off - on, 0.5 * (on + off)]
@@ -283,13 +283,13 @@ def on_ticks(
     ticks = lattice.rounded
     best, least = parameters.schedule(lattice.settings(ticks)), np.inf
     for _ in range(MODELS):
-        made = parameters.schedule(lattice.settings(ticks))
-        missing, flown = left(made)
+        schedule = parameters.schedule(lattice.settings(ticks))
+        missing, flown = left(schedule)
         size = float(np.linalg.norm(missing))
         if size >= least:
             break
-        best, least = made, size
-        ticks = lattice.stepped(ticks, missing, slopes(made, flown) / parameters.scale)
+        best, least = schedule, size
+        ticks = lattice.stepped(ticks, missing, slopes(schedule, flown) / parameters.scale)
     return best
 
 
@@ -334,10 +334,10 @@ class _Lattice:
             # Two steps of one pulse might leave its room; on the diagonal is the single step.
             pairs[pulse[:, None] == pulse[None, :]] = np.inf
             np.fill_diagonal(pairs, np.linalg.norm(alone, axis=0))
-            one, two = divmod(int(np.argmin(pairs)), len(pulse))
-            if pairs[one, two] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
+            row, column = divmod(int(np.argmin(pairs)), len(pulse))
+            if pairs[row, column] >= float(np.linalg.norm(missing)) * (1.0 - 1e-9):
                 break
-            for index in {one, two}:
+            for index in {row, column}:
                 ticks[pulse[index]] += start[index], on_time[index]
                 missing = missing + changes[:, index]
         return ticks
@@ -351,18 +351,18 @@ NEWTON_STEPS = 25
 
 def refine(
     spacecraft: Spacecraft,
-    made: Schedule,
-    equations: Equations,
+    schedule: Schedule,
+    equations: EndEquations,
     aside: Vector,
     step: float,
     fly: Callable[[Schedule], Flight],
 ) -> Schedule:
-    """``made`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
+    """``schedule`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
 
     ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
     leaves is for the caller to judge.
     """
-    parameters = PulseParameters(spacecraft, made)
+    parameters = PulseParameters(spacecraft, schedule)
     size = float(np.linalg.norm(spacecraft.momentum))
 
     def left(schedule: Schedule) -> tuple[Vector, Flight]:
@@ -373,8 +373,8 @@ def refine(
         return parameters.slopes(schedule, flown, equations, step) / size
 
     x = parameters.start
-    value, flown = left(made)
-    slopes = slopes_of(made, flown)
+    value, flown = left(schedule)
+    slopes = slopes_of(schedule, flown)
     for _ in range(NEWTON_STEPS):
         norm = float(np.linalg.norm(value))
         if norm <= CONVERGED:

@@ -67,9 +67,9 @@ def schedules(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iter
         for number in range(starts):
             start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
             for turns in (0.0, 2.0 * math.pi / abs(spacecraft.spin)):
-                made = _schedule(spacecraft, channel, start, turns, fly)
-                if made is not None:
-                    yield made
+                schedule = _schedule(spacecraft, channel, start, turns, fly)
+                if schedule is not None:
+                    yield schedule
 
 
 def _schedule(
@@ -92,16 +92,18 @@ def _schedule(
         apart = max(turn, on_time + spacecraft.limits.gap)
         if tick is not None:
             start, apart = math.ceil(start / tick - 1e-9) * tick, math.ceil(apart / tick - 1e-9) * tick
-        made = Schedule(tuple(channel_pulse(channel, start + k * apart + 0.5 * on_time, on_time) for k in range(count)))
-        if made.end > spacecraft.horizon:
+        schedule = Schedule(
+            tuple(channel_pulse(channel, start + k * apart + 0.5 * on_time, on_time) for k in range(count))
+        )
+        if schedule.end > spacecraft.horizon:
             return None
-        flight = fly(made)
+        flight = fly(schedule)
         missed = goal - flight.settled.spin
         if tick is not None or abs(missed) < 1e-12 * abs(goal):
             break
         whole += missed / rate
     held = requirements.held(spacecraft, left_by(flight))
-    return made if all(one.met for one in held) and keeps_limits(spacecraft, made) else None
+    return schedule if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule) else None
 
 
 CLEARLY = 0.8
@@ -164,9 +166,9 @@ def hastened(
     small_angles = max(problem.price(best), first.cost) * (1.0 + ABOUT)
     left = problem.left(problem.flown(best)) + DAMPED_ANGLE
 
-    def better(made: Schedule) -> bool:
-        less = made.end < best.end and len(made) <= len(best)
-        return less and problem.price(made) <= dearest and problem.left(problem.flown(made)) <= left
+    def better(schedule: Schedule) -> bool:
+        less = schedule.end < best.end and len(schedule) <= len(best)
+        return less and problem.price(schedule) <= dearest and problem.left(problem.flown(schedule)) <= left
 
     with work.budget("an earlier end", MOST_ENDS) as spent:
 
@@ -177,8 +179,8 @@ def hastened(
             span = best.end - begin
             share = None if over() else _least_share(problem, span, small_angles)
             later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
-            found = (cheapest(begin + part * span) for part in later if not over())
-            made = next((one for one in found if one is not None and better(one)), None)
+            schedules = (cheapest(begin + part * span) for part in later if not over())
+            made = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
             if made is None:
                 break
             best = made
@@ -232,11 +234,11 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         if work.exhausted():
             return
         try:
-            made = plan()
-            every = [made] if isinstance(made, Schedule) else list(made)
+            planned = plan()
+            every = [planned] if isinstance(planned, Schedule) else list(planned)
         except Infeasible:
             continue
-        yield from (one for one in every if keeps_limits(spacecraft, one))
+        yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
 
 CHOICES = 3
@@ -300,21 +302,21 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
-    search = _Search(_before_it_fades(spacecraft), options)
+    search = _LeastCostSearch(_before_it_fades(spacecraft), options)
     simple = list(schedules(search.spacecraft, search.flown))
     if simple and options.least == "pulses":
         return search.with_bounds(search.preferred(simple))
     try:
         if options.least == "time":
-            made = search.soonest()
+            schedule = search.soonest()
         else:
-            made = _fewest(search) if options.least == "pulses" else search.schedule()
+            schedule = _fewest(search) if options.least == "pulses" else search.schedule()
     except Infeasible:
         if not simple:
             raise
         return search.with_bounds(search.preferred(simple))
-    best = search.preferred([made, *simple])
-    return made if best is made else search.with_bounds(best)
+    best = search.preferred([schedule, *simple])
+    return schedule if best is schedule else search.with_bounds(best)
 
 
 def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
@@ -325,7 +327,7 @@ def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
     return replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
 
 
-def _fewest(search: _Search) -> Schedule:
+def _fewest(search: _LeastCostSearch) -> Schedule:
     """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
     from nutdamp.schemes import one_pulse, two_pulse
 
@@ -333,17 +335,17 @@ def _fewest(search: _Search) -> Schedule:
     if body.torquer is None and body.goal.spin is None:
         try:
             if search.options.free_axis:
-                made = one_pulse.schedule(body, SchemeOptions())
+                schedule = one_pulse.schedule(body, SchemeOptions())
             else:
-                made = two_pulse.schedule(body, TwoPulseOptions())
+                schedule = two_pulse.schedule(body, TwoPulseOptions())
         except Infeasible:
-            made = Schedule()
-        if made.pulses and keeps_limits(body, made) and search.left(search.flown(made)) <= LEFT:
-            return search.with_bounds(made)
+            schedule = Schedule()
+        if schedule.pulses and keeps_limits(body, schedule) and search.left(search.flown(schedule)) <= LEFT:
+            return search.with_bounds(schedule)
     return search.schedule()
 
 
-class _Found(NamedTuple):
+class _FlownSchedule(NamedTuple):
     """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
 
     left: float
@@ -351,7 +353,7 @@ class _Found(NamedTuple):
     made: Schedule
 
 
-class _Search(Problem):
+class _LeastCostSearch(Problem):
     """The search for the cheapest schedule."""
 
     def soonest(self) -> Schedule:
@@ -363,11 +365,11 @@ class _Search(Problem):
         if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
             return self.with_bounds(early)
         try:
-            return self.preferred([early, _Search(body, self.options).sooner().schedule()])
+            return self.preferred([early, _LeastCostSearch(body, self.options).sooner().schedule()])
         except Infeasible:
             return self.with_bounds(early)
 
-    def sooner(self) -> _Search:
+    def sooner(self) -> _LeastCostSearch:
         """The same search with the shortest horizon in which a schedule is found."""
         begin, horizon = self.spacecraft.limits.earliest, self.spacecraft.horizon
         if not self.feasible(horizon):
@@ -378,27 +380,27 @@ class _Search(Problem):
             end = begin + span * (1.0 + margin)
             if end >= horizon:
                 break
-            if _Search(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).found():
                 high = end
                 break
             low = end
-        if high == horizon and not _Search(self.within(horizon), self.options).found():
+        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).found():
             return self  # shorter ones are looked at on the way to a schedule
         while high - low > SHARP * high:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if _Search(self.within(middle), self.options).found() else (middle, high)
-        return _Search(self.within(high), self.options)
+            low, high = (low, middle) if _LeastCostSearch(self.within(middle), self.options).found() else (middle, high)
+        return _LeastCostSearch(self.within(high), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
         """Of schedules that all do what is required that with least of what is to be saved.
 
         Of those that take as much within `SAME_COST` the fewest pulses, then the earlier end.
         """
-        saved: dict[str, Callable[[Schedule], float]] = {"time": lambda one: one.end, "pulses": len}
+        saved: dict[str, Callable[[Schedule], float]] = {"time": lambda schedule: schedule.end, "pulses": len}
         spent = saved.get(self.options.least, self.price)
         least = min(map(spent, schedules))
-        equal = [one for one in schedules if spent(one) <= least * (1.0 + SAME_COST)]
-        return min(equal, key=lambda one: (len(one), one.end))
+        equal = [schedule for schedule in schedules if spent(schedule) <= least * (1.0 + SAME_COST)]
+        return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
     def found(self) -> bool:
         """Whether a schedule is found with this very horizon."""
@@ -409,7 +411,7 @@ class _Search(Problem):
         """Why the program has no solution, and what would do: each cure that is named was tried, or says that not."""
         goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
-        freed = bound and not work.exhausted() and _Search(self.spacecraft, free).found()
+        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).found()
         return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
 
     def long_enough(self, needed: float) -> float | None:
@@ -421,7 +423,7 @@ class _Search(Problem):
             if work.exhausted():
                 return None
             end = float(f"{needed * (1.0 + margin):.4g}")
-            if _Search(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).found():
                 return end
         return None
 
@@ -429,40 +431,40 @@ class _Search(Problem):
         """The cheapest schedule found: over the whole horizon, or over less where there the search does not settle."""
         first = self.program().solve()
         if overtaxed := self.overtaxed(first):
-            made = self.without(overtaxed).schedule()
-            return self.with_bounds(Schedule(made.pulses, made.notes), first)
+            schedule = self.without(overtaxed).schedule()
+            return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
         with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
-            kept = _Search(self.spacecraft, replace(self.options, free_axis=False, shift=None))
+            kept = _LeastCostSearch(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             still = kept.whole_or_shorter(kept.program().solve())
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
 
-    def without(self, overtaxed: dict[str, float]) -> _Search:
+    def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
         """The search without channels whose pulses are too short to do what is asked of them.
 
         Raises Infeasible, naming the limit, where there are no others.
         """
-        others = tuple(one for one in self.spacecraft.channels if one.name not in overtaxed)
+        others = tuple(channel for channel in self.spacecraft.channels if channel.name not in overtaxed)
         try:
-            return _Search(replace(self.spacecraft, channels=others), self.options)
+            return _LeastCostSearch(replace(self.spacecraft, channels=others), self.options)
         except Infeasible:
             # Of opposite channels one program asks this one and another one that one for the same: their sum is told.
-            longest = max(one.max_on_time for one in self.channels if one.name in overtaxed)
+            longest = max(channel.max_on_time for channel in self.channels if channel.name in overtaxed)
             count = sum(overtaxed.values())
             raise Infeasible(
                 f"the channels would have to fire {count:.1g} pulses, none longer than {longest:.3g} s (max_on_time)"
             ) from None
 
-    def astray(self, made: Schedule | None) -> bool:
+    def astray(self, schedule: Schedule | None) -> bool:
         """Whether there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
         most = math.inf if self.options.shift is None else self.options.shift
-        return made is None or self.flown(made).residual.axis_error > most
+        return schedule is None or self.flown(schedule).residual.axis_error > most
 
     def whole_or_shorter(self, first: Solution) -> Schedule | None:
         """The cheapest found over the whole horizon; where there is none, or a dear one, over less of it too."""
@@ -470,7 +472,7 @@ class _Search(Problem):
 
     def within_shorter(self, horizon: float) -> Schedule | None:
         """The cheapest schedule found within ``horizon`` s."""
-        shorter = _Search(self.within(horizon), self.options)
+        shorter = _LeastCostSearch(self.within(horizon), self.options)
         return shorter.cheapest(shorter.program().solve())
 
     @property
@@ -487,40 +489,40 @@ class _Search(Problem):
         best = self.cheapened(best)
         return best if best is None else self.fuller(best, first)
 
-    def fuller(self, made: Schedule, first: Solution) -> Schedule:
-        """``made``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
+    def fuller(self, schedule: Schedule, first: Solution) -> Schedule:
+        """``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
 
         Burns are left out by what the linear program thinks that it costs.
         """
         few = FEW * len(self.equations.chosen)
-        if len(made) >= few or self.options.least == "pulses" or not self.dear(made, first.cost, SAVED):
-            return made
+        if len(schedule) >= few or self.options.least == "pulses" or not self.dear(schedule, first.cost, SAVED):
+            return schedule
         program = self.program()
         program.haste = HASTE
         longest = sorted(program.solve().burns, key=lambda burn: -burn.impulse)[:few]
-        if len(longest) <= len(made) or work.exhausted():
-            return made
-        found = self.corrected(program, program.solve(program.about(longest)), first.cost)
-        more = self.cheapened(self.best(found))
-        return made if more is None or not self.dear(made, self.price(more), SAVED) else more
+        if len(longest) <= len(schedule) or work.exhausted():
+            return schedule
+        candidates = self.corrected(program, program.solve(program.about(longest)), first.cost)
+        more = self.cheapened(self.best(candidates))
+        return schedule if more is None or not self.dear(schedule, self.price(more), SAVED) else more
 
-    def cheapened(self, made: Schedule | None) -> Schedule | None:
+    def cheapened(self, schedule: Schedule | None) -> Schedule | None:
         """The schedule after some steps down on the true motion, where that is known in closed form between pulses."""
-        if made is None or not len(made) or not self.closed or self.spacecraft.limits.tick is not None:
-            return made
+        if schedule is None or not len(schedule) or not self.closed or self.spacecraft.limits.tick is not None:
+            return schedule
         if work.exhausted():
-            return made
-        other = multistart.cheapened(self.task(), made)
+            return schedule
+        other = multistart.cheapened(self.task(), schedule)
         if other is None or not keeps_limits(self.spacecraft, other.pulses) or self.left(self.flown(other)) > LEFT:
-            return made
-        return made if self.hurried(other) and not self.hurried(made) else self.cheaper(made, other)
+            return schedule
+        return schedule if self.hurried(other) and not self.hurried(schedule) else self.cheaper(schedule, other)
 
-    def hurried(self, made: Schedule) -> bool:
+    def hurried(self, schedule: Schedule) -> bool:
         """Whether a channel is on again before it was off for its shortest on-time: valves take their time."""
-        each = ((one, [pulse for pulse in made if pulse.channel == one.name]) for one in self.channels)
+        each = ((channel, [pulse for pulse in schedule if pulse.channel == channel.name]) for channel in self.channels)
         return any(
-            after.start - before.end < one.min_on_time - TOUCHING
-            for one, pulses in each
+            after.start - before.end < channel.min_on_time - TOUCHING
+            for channel, pulses in each
             for before, after in itertools.pairwise(pulses)
         )
 
@@ -534,7 +536,7 @@ class _Search(Problem):
             halvings += 1
             if best is not None and halvings > HALVINGS:
                 break
-            shorter = _Search(self.within(horizon), self.options)
+            shorter = _LeastCostSearch(self.within(horizon), self.options)
             if not shorter.feasible(horizon):
                 break
             best = self.cheaper(best, shorter.settled(first.cost))
@@ -542,7 +544,7 @@ class _Search(Problem):
             best = self.cheaper(best, self.others(first.cost))
         return best
 
-    def doubtful(self, made: Schedule | None, first: Solution) -> bool:
+    def doubtful(self, schedule: Schedule | None, first: Solution) -> bool:
         """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
 
         So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
@@ -553,16 +555,16 @@ class _Search(Problem):
         strong = float(np.min(self.task().unit)) <= STRONG * body.inertial_period
         if UNMET < first.unmet < math.inf:  # at large angles H may be brought there all the same
             return short
-        if made is None:
+        if schedule is None:
             return True
-        if not strong or not (short or self.dear(made, first.cost)):
+        if not strong or not (short or self.dear(schedule, first.cost)):
             return False
-        return not self.proved(made, PROVED)
+        return not self.proved(schedule, PROVED)
 
-    def proved(self, made: Schedule | None, share: float) -> bool:
+    def proved(self, schedule: Schedule | None, share: float) -> bool:
         """Whether the rigorous bound proves that nothing is cheaper than a schedule by more than that share of it."""
-        proof = None if made is None else self.rigorous(made)
-        return made is not None and proof is not None and self.price(made) <= proof * (1.0 + share)
+        proof = None if schedule is None else self.rigorous(schedule)
+        return schedule is not None and proof is not None and self.price(schedule) <= proof * (1.0 + share)
 
     def task(self) -> Task:
         """What is to be done, for the descents."""
@@ -570,28 +572,28 @@ class _Search(Problem):
 
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
-        found: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         every = multistart.schedules(self.task(), () if known is None else (known,))
         if self.spacecraft.limits.tick is not None:
-            every = [self.on_ticks(made) for made in every[:WAYS]]
-        for made in every:
-            left = self.left(self.flown(made))
-            if keeps_limits(self.spacecraft, made.pulses):
-                found.append(_Found(0.0 if left <= LEFT else left, self.worth(made), made))
-        return self.best(found)
+            every = [self.on_ticks(schedule) for schedule in every[:WAYS]]
+        for schedule in every:
+            left = self.left(self.flown(schedule))
+            if keeps_limits(self.spacecraft, schedule.pulses):
+                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.worth(schedule), schedule))
+        return self.best(candidates)
 
-    def on_ticks(self, made: Schedule) -> Schedule:
+    def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
-        missed = refinement.misses(self.flown(made), self.equations)
+        missed = refinement.misses(self.flown(schedule), self.equations)
         off = missed[2:4] if self.options.shift is not None else np.zeros(2)
         aside = self.equations.beside(off)
-        return refine(self.spacecraft, made, self.equations, aside, self.program().width, self.flown)
+        return refine(self.spacecraft, schedule, self.equations, aside, self.program().width, self.flown)
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
         program = self.program()
         program.haste = HASTE
-        found: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         for _ in range(CHOICES):
             if work.exhausted():
                 break
@@ -599,34 +601,36 @@ class _Search(Problem):
             if solution.unmet > UNMET:
                 break
             fewest = self.options.least == "pulses"
-            found += self.corrected(program, thinned(program, solution, least, fewest=fewest), least)
-            if not found or any(one.left == 0.0 and one.price <= least * (1.0 + DEAR) for one in found):
+            candidates += self.corrected(program, thinned(program, solution, least, fewest=fewest), least)
+            if not candidates or any(
+                candidate.left == 0.0 and candidate.price <= least * (1.0 + DEAR) for candidate in candidates
+            ):
                 break
-        return self.best(found)
+        return self.best(candidates)
 
     def others(self, least: float) -> Schedule | None:
         """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
         names = {channel.name: channel for channel in self.channels}
-        found: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         flights: list[Flight] = []
-        for made in by_other_schemes(self.spacecraft, shift=self.equations.shift):
-            flights.append(self.flown(Schedule(made.pulses)))
-            if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(made) <= least * (1.0 + DEAR)):
+        for schedule in by_other_schemes(self.spacecraft, shift=self.equations.shift):
+            flights.append(self.flown(Schedule(schedule.pulses)))
+            if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(schedule) <= least * (1.0 + DEAR)):
                 break
-        for way in sorted(flights, key=lambda one: (self.left(one) > LEFT, self.price(one.schedule)))[:WAYS]:
+        for way in sorted(flights, key=lambda flight: (self.left(flight) > LEFT, self.price(flight.schedule)))[:WAYS]:
             left = self.left(way)
-            found.append(_Found(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
             if work.exhausted():
                 continue
             program = self.program()
             program.aim(refinement.along(way, self.equations, program.width))
             burns = [Burn(names[pulse.channel], pulse.t, pulse.on_time) for pulse in way.schedule]
-            found += self.corrected(program, program.solve(program.about(burns)), least)
-        return self.best(found)
+            candidates += self.corrected(program, program.solve(program.about(burns)), least)
+        return self.best(candidates)
 
-    def corrected(self, program: Program, solution: Solution, least: float) -> list[_Found]:
+    def corrected(self, program: Program, solution: Solution, least: float) -> list[_FlownSchedule]:
         """Schedules from the burns of a solution, corrected along one flight after the other, unless they get lost."""
-        found: list[_Found] = []
+        candidates: list[_FlownSchedule] = []
         last = math.inf
         for turn in range(AIMS):
             if solution.unmet > LOST or not solution.burns or work.exhausted():
@@ -635,25 +639,25 @@ class _Search(Problem):
                 solution = repaired(program, solution)
             except Unrepairable:
                 break
-            made = as_pulses(self.spacecraft, solution.burns)
-            flown = self.flown(made)
+            schedule = as_pulses(self.spacecraft, solution.burns)
+            flown = self.flown(schedule)
             program.aim(refinement.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
                 aside = self.equations.beside(solution.off)
-                made = refine(self.spacecraft, made, self.equations, aside, program.width, self.flown)
-                left, price = self.left(self.flown(made)), self.price(made)
-                found.append(_Found(0.0 if left <= LEFT else left, price, made))
+                schedule = refine(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
+                left, price = self.left(self.flown(schedule)), self.price(schedule)
+                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, price, schedule))
                 if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
                     break
                 last = price if left <= LEFT else math.inf
             solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
-        return found
+        return candidates
 
-    def best(self, found: list[_Found]) -> Schedule | None:
+    def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
         """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
 
         All that leave up to `DAMPED_ANGLE` leave as little.
         """
-        there = [one for one in found if one.left <= self.rounded(one.made)]
-        best = min(there, key=lambda one: (max(one.left, DAMPED_ANGLE), one.price), default=None)
+        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.made)]
+        best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
         return None if best is None else best.made

@@ -15,13 +15,13 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.limit_cycle import (
     DAY,
     YEAR,
-    Budget,
     Cycle,
-    Held,
+    HeldNutation,
+    HoldingBudget,
     Map,
     Odds,
     Thresholds,
@@ -241,7 +241,7 @@ def test_when_damping_must_begin_is_that_of_the_course_example() -> None:
     assert reached(replace(stage, omega0=np.array([0.0, 0.0, 1.0])), 0.1) == math.inf
 
 
-def held_by(body: Spacecraft) -> tuple[Held, Cycle]:
+def held_by(body: Spacecraft) -> tuple[HeldNutation, Cycle]:
     (held,) = budget(body).held
     assert held.cycle is not None, held.why
     return held, held.cycle
@@ -274,7 +274,7 @@ def test_a_tank_whose_pressure_falls_lasts_as_long_as_a_loop_that_is_flown_until
     lasts = held_by(body)[0].lasts
     assert lasts is not None
     run = fly(body, loop(gyro()), 1.2 * lasts, seed=3)
-    assert (run.stop, len(run.fired) > 400) == (Stop.EMPTY, True)
+    assert (run.stop, len(run.fired) > 400) == (Ending.EMPTY, True)
     assert run.fired[-1].pulse.t - run.fired[0].pulse.t == pytest.approx(lasts, rel=0.02)
 
 
@@ -284,7 +284,7 @@ def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.M
     for share, noisy in ((0.05, False), (0.2, True)):
         held, cycle = held_by(craft(loop=loop(gyro(noise=share * start))))
         assert (held.noisy, cycle.doubt >= 0.2) == (noisy, noisy)
-        warnings = list(_warnings(Budget(held.spacecraft, None, (held,))))
+        warnings = list(_warnings(HoldingBudget(held.spacecraft, None, (held,))))
         assert any("above 10 % of loop.start" in warning for warning in warnings) is noisy
     check_text("budget.noisy", "\n".join(warnings))
 
@@ -355,11 +355,11 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
     body = craft(requirement=Requirement(nutation=rad(2.0)), loop=loop(gyro()))
     cycles = [Cycle(each, 1e-3, 0.01, propellant, 0.0, 0.01, rad(0.5), rad(0.05), rad(0.6)) for each in (1e-4, pulses)]
     held = tuple(
-        Held(body, Thresholds(rad(start), rad(0.1)), 100.0 * start, cycle=cycle)
+        HeldNutation(body, Thresholds(rad(start), rad(0.1)), 100.0 * start, cycle=cycle)
         for start, cycle in zip((0.5, 1.0), cycles, strict=True)
     )
-    lost = Held(body, Thresholds(rad(3.0), rad(0.1)), math.inf, why="a reason")
-    axes: list[Any] = budget_figure(Budget(body, rad(2.0), (*held, lost))).axes
+    lost = HeldNutation(body, Thresholds(rad(3.0), rad(0.1)), math.inf, why="a reason")
+    axes: list[Any] = budget_figure(HoldingBudget(body, rad(2.0), (*held, lost))).axes
     courses, bars, mass = axes
     names = ["no firing", "0.5 to 0.1 deg", "1 to 0.1 deg", "largest"]
     assert [str(line.get_label()) for line in courses.lines] == names
@@ -377,5 +377,5 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
     assert (bars.get_xscale(), mass.get_xlabel()) == (scale, label)
     assert bars.xaxis.get_major_formatter()(100.0, 0) == ("100" if scale == "log" else "")
     assert [patch.get_width() for patch in mass.patches] == pytest.approx([each * YEAR] * 2)
-    (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
+    (alone,) = budget_figure(HoldingBudget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1

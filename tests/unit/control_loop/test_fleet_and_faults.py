@@ -14,9 +14,9 @@ from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
 from nutdamp.control_loop.batch import Case, expects_alone, fly_together
-from nutdamp.control_loop.law import Law, Stop
+from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, gain
-from nutdamp.control_loop.simulation import Run, fly
+from nutdamp.control_loop.simulation import LoopRun, fly
 from nutdamp.control_loop.stability import Cause, Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
@@ -35,14 +35,14 @@ def wrong(loop: Loop) -> tuple[Loop, Loop]:
     return replace(loop, reversed=("T0",)), replace(loop, sensor=replace(loop.sensor, scale=-loop.sensor.scale))
 
 
-def check_named(loop: Loop, until: float) -> Run:
+def check_named(loop: Loop, until: float) -> LoopRun:
     """T0 fires once where it is wired backwards; gives the run with the sensor reversed."""
     channel, reverse = wrong(loop)
     run = fly(CRAFT, channel, until)
-    assert (run.stop, run.channel) == (Stop.CHANNEL, "T0")
+    assert (run.stop, run.channel) == (Ending.CHANNEL, "T0")
     assert [pulse.channel for pulse in run.schedule].count("T0") == 1
     run = fly(CRAFT, reverse, until)
-    assert run.stop is Stop.SENSOR
+    assert run.stop is Ending.SENSOR
     return run
 
 
@@ -71,7 +71,7 @@ def test_a_bias_as_large_as_half_of_start_hides_no_channel(sensor: Sensor) -> No
     bias = Law(CRAFT, fires(sensor, 0.5)).size(rad(0.25), 3.0) / math.sqrt(2.0)
     loop = fires(replace(sensor, bias=bias), 0.5, 0.2, law=BANG, on_time=0.05)
     run = fly(CRAFT, loop, 200.0)
-    assert run.stop is Stop.END
+    assert run.stop is Ending.END
     assert {pulse.on_time for pulse in run.schedule} == {0.05}
     check_named(loop, 200.0)
 
@@ -85,7 +85,7 @@ def test_a_healthy_loop_in_more_noise_than_start_is_not_accused(law: str, share:
         sensor = Sensor(rate=rate, noise=noise, bias=0.2 * noise, low_pass=0.3 * settle)
         loop = fires(sensor, 0.3, stop, law=law, settle=settle, on_time=0.02 if law == BANG else None)
         run = fly(CRAFT, loop, 150.0, seed=7)
-        assert (run.stop, run.channel) == (Stop.END, None)
+        assert (run.stop, run.channel) == (Ending.END, None)
         assert len(run.fired) > 20
 
 
@@ -97,9 +97,9 @@ def test_a_body_that_is_not_as_known_makes_no_fault_of_a_healthy_loop() -> None:
     truth = replace(known, inertia=inertia, omega0=CRAFT.omega0 * [1.5, 1.5, 1.0])
     loop = fires(Sensor(delay=0.5 * PERIOD), 0.5, 0.2, law=BANG, settle=PERIOD, on_time=0.02)
     run = fly(truth, loop, 300.0, law=Law(known, loop))
-    assert run.stop is Stop.END
+    assert run.stop is Ending.END
     assert len(run.fired) > 25
-    assert fly(truth, wrong(loop)[1], 3000.0, law=Law(known, loop)).stop in (Stop.SENSOR, Stop.FED)
+    assert fly(truth, wrong(loop)[1], 3000.0, law=Law(known, loop)).stop in (Ending.SENSOR, Ending.FED)
 
 
 def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
@@ -133,7 +133,7 @@ def some(rng: np.random.Generator) -> tuple[Spacecraft, Loop]:
     return craft, Loop(sensor, law, start, stop, settle, pause, predict, 0.05 * period if law == BANG else None)
 
 
-def fed_for(craft: Spacecraft, run: Run, names: set[str]) -> float:
+def fed_for(craft: Spacecraft, run: LoopRun, names: set[str]) -> float:
     """Periods from the first firing of ``names`` to the last, beyond what it takes to see what a firing did."""
     loop, sensor = run.loop, run.loop.sensor
     latency = sensor.delay + loop.settle + 5.0 * sensor.low_pass + loop.min_interval
@@ -154,14 +154,14 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
             continue
         span = (30.0 * (3.0 + 2.0 * loop.settle / craft.body_period)) * craft.body_period + 30.0 * loop.sensor.delay
         try:
-            assert fly(craft, loop, span).stop is Stop.END
+            assert fly(craft, loop, span).stop is Ending.END
             if abs(act.acts) < 12.0 * math.hypot(doubts.noise, doubts.steps):
                 continue
             runs = [fly(craft, faulty, span) for faulty in wrong(loop)]
         except Infeasible:
             continue
         every = {each.name for each in craft.channels}
-        for run, stop, names in zip(runs, (Stop.CHANNEL, Stop.SENSOR), ({"T0"}, every), strict=True):
+        for run, stop, names in zip(runs, (Ending.CHANNEL, Ending.SENSOR), ({"T0"}, every), strict=True):
             if any(pulse.channel in names for pulse in run.schedule):
                 assert run.stop is stop, loop
                 # A bias larger than what a firing changes is first to be told from it, by another coast.
@@ -308,4 +308,4 @@ def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.Mon
     still = replace(craft, omega0=np.array([0.021, 0.0, 3.0]))
     fleet = fly_together(Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0)
     assert [len(pilot.fired) for pilot in fleet.pilots] == [3, 2]
-    assert [pilot.ending[0] for pilot in fleet.pilots] == [Stop.FULL, Stop.END]
+    assert [pilot.ending[0] for pilot in fleet.pilots] == [Ending.FULL, Ending.END]

@@ -17,7 +17,7 @@ from support.loops import fired_by, fires, rad
 
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy, loop_study, run
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.control_loop.law import Stop
+from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import BadRequest, Infeasible
@@ -207,7 +207,7 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
     needs = fly(body, body.loop, 30.0).schedule.propellant
     assert needs is not None
     results = results_of(replace(body, tank=Tank(needs, 22e5, 22e5, 0.0)), 40, 30.0)
-    empty = results.stops[Stop.EMPTY]
+    empty = results.stops[Ending.EMPTY]
     assert 12 < empty < 28
     assert results.met == results.settled == 40 - empty
     used = output(results, "propellant")
@@ -218,8 +218,8 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
 
 def test_faults_stop_each_case_on_its_own() -> None:
     results = results_of(craft(reversed=("+M1",)), 20)
-    assert results.stops[Stop.CHANNEL] >= 18
-    assert results.settled == 20 - sum(count for stop, count in results.stops.items() if stop is not Stop.END)
+    assert results.stops[Ending.CHANNEL] >= 18
+    assert results.settled == 20 - sum(count for stop, count in results.stops.items() if stop is not Ending.END)
 
 
 def test_what_a_study_needs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -264,7 +264,7 @@ def check_dead_band(name: str, count: int) -> None:
     body = replace(fired_by(1.0, C=C, spin=spin, loop=loop), dispersions=STARTS)
     results = results_of(body, count, 200.0)
     assert results.settled >= 0.999 * count
-    assert set(results.stops) == {Stop.END}
+    assert set(results.stops) == {Ending.END}
     quiet = results.of("quiet")
     assert 0.9 * count < len(quiet) == results.settled - results.idle  # some begin below the start threshold
     assert results.within >= 0.99 * len(quiet)

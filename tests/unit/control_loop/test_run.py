@@ -20,12 +20,12 @@ from support.process import Run as Process
 
 import nutdamp
 from nutdamp.control_loop.evaluation import loop_of, verify_loop
-from nutdamp.control_loop.law import Stop
-from nutdamp.control_loop.simulation import Run, fly
+from nutdamp.control_loop.law import Ending
+from nutdamp.control_loop.simulation import LoopRun, fly
 from nutdamp.control_loop.stability import margins
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.verification import Equations
+from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Loop, Sensor
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
@@ -156,14 +156,14 @@ SETTLING = fires(Sensor(rate=20.0, noise=1e-4, scale=-1.0), stop=0.0, settle=2.2
 @pytest.mark.parametrize(
     ("loop", "stop", "channel"),
     [
-        (fires(reversed=("-M2",)), Stop.CHANNEL, "-M2"),
-        (fires(NOISY, reversed=("+M1",)), Stop.CHANNEL, "+M1"),
-        (fires(Sensor(scale=-1.0)), Stop.SENSOR, None),
-        (fires(replace(NOISY, scale=-0.5)), Stop.SENSOR, None),
-        (fires(replace(FELT, rate=50.0, scale=-1.0)), Stop.SENSOR, None),
+        (fires(reversed=("-M2",)), Ending.CHANNEL, "-M2"),
+        (fires(NOISY, reversed=("+M1",)), Ending.CHANNEL, "+M1"),
+        (fires(Sensor(scale=-1.0)), Ending.SENSOR, None),
+        (fires(replace(NOISY, scale=-0.5)), Ending.SENSOR, None),
+        (fires(replace(FELT, rate=50.0, scale=-1.0)), Ending.SENSOR, None),
     ],
 )
-def test_what_is_wired_backwards_is_named_within_a_period(loop: Loop, stop: Stop, channel: str | None) -> None:
+def test_what_is_wired_backwards_is_named_within_a_period(loop: Loop, stop: Ending, channel: str | None) -> None:
     craft = fired_by()
     run = fly(craft, loop)
     assert run.stop is stop
@@ -177,14 +177,14 @@ def test_what_is_wired_backwards_is_named_within_a_period(loop: Loop, stop: Stop
 def test_faults_that_hide_are_stopped_as_what_they_show_themselves() -> None:
     """After long settling; steps hide which one it is; a single channel cannot tell itself from the sensor."""
     craft, single = fired_by(), fired_by(channels=FOUR[:1])
-    assert fly(craft, SETTLING, 200.0).stop is Stop.SENSOR
+    assert fly(craft, SETTLING, 200.0).stop is Ending.SENSOR
     run = fly(craft, STEPS, 400.0)
-    assert run.stop is Stop.FED
+    assert run.stop is Ending.FED
     assert max(each.true_nutation for each in run.fired) < 3.0 * craft.nutation
-    assert fly(single, SETTLING, 200.0).stop is Stop.UNCLEAR
+    assert fly(single, SETTLING, 200.0).stop is Ending.UNCLEAR
     for wrong in (fires(reversed=("+M1",)), fires(Sensor(scale=-1.0))):
         run = fly(single, wrong)
-        assert (run.stop, run.channel, len(run.fired)) == (Stop.UNCLEAR, "+M1", 1)
+        assert (run.stop, run.channel, len(run.fired)) == (Ending.UNCLEAR, "+M1", 1)
 
 
 def test_faults_are_named_by_the_static_check() -> None:
@@ -206,11 +206,11 @@ def test_firings_that_come_too_late_are_refused_before_the_flight_and_stopped_in
     def late(delay: float) -> Spacecraft:
         return replace(craft, loop=replace(loop, sensor=Sensor(delay=delay)))
 
-    assert loop_of(late(allowed - 0.01), 30.0).flown_run.stop is Stop.END
+    assert loop_of(late(allowed - 0.01), 30.0).flown_run.stop is Ending.END
     with refused(Infeasible, "loop.too-late"):
         loop_of(late(allowed + 0.01), 30.0)
     run = fly(craft, replace(loop, sensor=Sensor(delay=0.5 * craft.body_period)))
-    assert (run.stop, len(run.fired)) == (Stop.FEEDS, 1)
+    assert (run.stop, len(run.fired)) == (Ending.FEEDS, 1)
 
 
 GROWING = fired_by(0.1, dissipation=100.0, loop=fires(Sensor(rate=40.0, noise=rad(0.004)), 0.3, 0.03))
@@ -219,7 +219,7 @@ GROWING = fired_by(0.1, dissipation=100.0, loop=fires(Sensor(rate=40.0, noise=ra
 def test_growing_nutation_is_kept_between_the_thresholds() -> None:
     plan = loop_of(GROWING, 3000.0, seed=4)
     run = plan.flown_run
-    assert run.stop is Stop.END
+    assert run.stop is Ending.END
     assert len(run.quiet) >= 5
     assert plan.largest[0] < rad(0.32)
     assert np.diff(run.quiet).min() > 100.0 * math.log(0.3 / 0.06)
@@ -237,7 +237,7 @@ def test_samples_are_few_while_the_nutation_cannot_show_and_never_too_many(monke
         fly(GROWING, fires(Sensor(rate=1e6, noise=rad(0.25)), 80.0), 1e4)
 
 
-def check_flown_again(craft: Spacecraft, run: Run) -> None:
+def check_flown_again(craft: Spacecraft, run: LoopRun) -> None:
     """The schedule flown open-loop is the flight of the loop."""
     again, times = propagation.flown(craft, run.schedule, 60.0), np.linspace(0.0, 60.0, 150)
     for mine, other in zip(run.flight.motion(times), again.motion(times), strict=True):
@@ -306,7 +306,7 @@ def test_dop853_fires_alike(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert until == 40.0 or max(np.diff([each.pulse.start for each in verdict.run.fired])) > 20.0
 
 
-class Heavier(Equations):
+class Heavier(EulerEquations):
     """The body of the file with other moments."""
 
     def __init__(self, spacecraft: Spacecraft, most: int) -> None:
@@ -314,7 +314,7 @@ class Heavier(Equations):
 
 
 def test_a_loop_is_not_confirmed_by_another_body_or_where_it_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("nutdamp.control_loop.evaluation.Equations", Heavier)
+    monkeypatch.setattr("nutdamp.control_loop.evaluation.EulerEquations", Heavier)
     verdict = verify_loop(CONTINUOUS, 5.0)
     assert (verdict.same, verdict.agree) == (True, False)
     assert verdict.worst > 1e-6

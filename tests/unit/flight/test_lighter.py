@@ -22,7 +22,7 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.propagation import by_impulses, flown, lightened
 from nutdamp.flight.propellant import supplied
 from nutdamp.flight.verification import verify
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Tank, Trapezoid
@@ -128,7 +128,7 @@ def missed_by_impulses(body: Spacecraft, made: Schedule) -> float:
 
 def missed_by_cases(body: Spacecraft, made: Schedule) -> float:
     """They take half off as a pulse begins and half as it ends."""
-    model, here = Model(body, made), flown(body, made)
+    model, here = DispersedModel(body, made), flown(body, made)
     x, y, _ = RealWidths(model)(model.cases({"timing pulse 1": np.zeros(1)})).momentum
     return abs(float(np.hypot(x, y)[0]) - math.hypot(*(here.settled.rates * np.asarray(here.last_moments))[:2]))
 

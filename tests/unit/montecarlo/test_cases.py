@@ -17,11 +17,11 @@ from support.cases import deep
 from support.golden import check_text, refused
 
 from nutdamp.errors import BadRequest
-from nutdamp.montecarlo.cases import Model, rotated, tilt_axes
+from nutdamp.montecarlo.cases import DispersedModel, rotated, tilt_axes
 from nutdamp.montecarlo.inputs import (
     BLOCK,
-    Input,
-    Source,
+    DispersedInput,
+    DrawSource,
     grouped,
     groups_of,
     list_inputs,
@@ -76,7 +76,7 @@ def test_rotations_of_forces_and_of_the_attitude() -> None:
 def test_a_steerable_pulse_is_turned_in_the_1_2_plane() -> None:
     torquer = Steerable(20.0, 220.0, 0.8)
     made = Schedule((steerable_pulse(torquer, 1.0, 0.4, on_time=0.5),))
-    cases = Model(spinner(steerable=torquer), made).cases(
+    cases = DispersedModel(spinner(steerable=torquer), made).cases(
         {"thrust steerable": 0.1, "thrust pulse 1": 0.01, "direction steerable": 0.3}
     )
     size = 10.0 * 1.1 * 1.01
@@ -91,7 +91,7 @@ def test_a_pulse_that_the_file_does_not_explain_keeps_its_impulse() -> None:
     pulse = replace(channel_pulse(body.channels[0], 1.0, 0.5), impulse=np.array([3.0, 1.0, 0.0]))
     unknown = replace(pulse, channel="elsewhere", propellant=None)
     for fired, name in ((pulse, "thrust T1"), (unknown, "thrust pulse 1")):
-        cases = Model(body, Schedule((fired,))).cases({name: 0.1})
+        cases = DispersedModel(body, Schedule((fired,))).cases({name: 0.1})
         assert np.array(cases.impulses[0]) == pytest.approx([3.3, 1.1, 0.0])
         assert (cases.propellant is None) == (fired is unknown)
 
@@ -100,7 +100,7 @@ def test_rates_and_positions_are_in_the_axes_of_the_file() -> None:
     moments, axes = principal_axes(np.array([[120.0, 3.0, 0.0], [3.0, 110.0, 2.0], [0.0, 2.0, 80.0]]))
     jet = dispersed.jet("T1", (0.1, 0.3, 0.8), (0.0, -10.0, 1.0))  # in principal axes
     body = replace(spinner(moments=moments, channels=(Channel("T1", (jet,)),)), inertia=Inertia(moments, axes))
-    model = Model(body, Schedule((channel_pulse(body.channels[0], 1.0, 0.5),)))
+    model = DispersedModel(body, Schedule((channel_pulse(body.channels[0], 1.0, 0.5),)))
     cases = model.cases({"omega0_1": 0.01, "omega0_3": 0.02, "position T1 y": 0.05, "A": 0.01 * body.inertia.A})
     assert np.array(cases.omega0) == pytest.approx(body.omega0 + axes.T @ [0.01, 0.0, 0.02])
     more = 0.5 * np.cross(axes.T @ [0.0, 0.05, 0.0], [0.0, -10.0, 1.0])
@@ -173,12 +173,14 @@ LAWS = {"normal": norm(scale=2.0), "uniform": uniform(-2.0, 4.0), "triangular": 
 Pair = tuple[str, str, float]
 
 
-def an_input(name: str = "A", kind: str = "normal", size: float = 1.0) -> Input:
-    return Input(name, name, kind, size, 100.0, "kg m²")
+def an_input(name: str = "A", kind: str = "normal", size: float = 1.0) -> DispersedInput:
+    return DispersedInput(name, name, kind, size, 100.0, "kg m²")
 
 
-def drawn(*inputs: Input, pairs: tuple[Pair, ...] = (), seed: int = 1, block: int = 0) -> dict[str, np.ndarray]:
-    draws, _ = Source(inputs, seed, lambda _: True, groups_of(pairs)).block(block)
+def drawn(
+    *inputs: DispersedInput, pairs: tuple[Pair, ...] = (), seed: int = 1, block: int = 0
+) -> dict[str, np.ndarray]:
+    draws, _ = DrawSource(inputs, seed, lambda _: True, groups_of(pairs)).block(block)
     return {name: np.asarray(draw) for name, draw in draws.items()}
 
 
@@ -191,7 +193,7 @@ def test_draws_have_the_moments_of_their_kind(kind: str, excess: float) -> None:
     assert ((values / entry.sigma) ** 3).mean() == pytest.approx(0.0, abs=0.03)
     assert ((values / entry.sigma) ** 4).mean() - 3.0 == pytest.approx(excess, abs=0.06)
     assert kind == "normal" or 1.9 < np.abs(values).max() <= 2.0
-    assert Source((an_input(kind="bias", size=-0.3),), 1, lambda _: True).block(0)[0] == {"A": -0.3}
+    assert DrawSource((an_input(kind="bias", size=-0.3),), 1, lambda _: True).block(0)[0] == {"A": -0.3}
 
 
 def test_neighbours_are_independent() -> None:
@@ -209,7 +211,7 @@ def test_other_tolerances_do_not_change_the_draws_of_one() -> None:
 
 def test_what_cannot_be_is_drawn_again_and_reported() -> None:
     """Values above one sigma are refused: 15.87 % are drawn again, of those again 15.87 % and so on."""
-    draws, redrawn = Source([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0).block(0)
+    draws, redrawn = DrawSource([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0).block(0)
     values, free = np.array(draws["A"]), drawn(an_input())["A"]
     kept = free <= 1.0
     assert values.max() <= 1.0
@@ -218,10 +220,10 @@ def test_what_cannot_be_is_drawn_again_and_reported() -> None:
     assert set(np.flatnonzero(~kept)) == set(redrawn.tolist())
     # A normal cut at one sigma has the mean -φ(1)/Φ(1).
     assert values.mean() == pytest.approx(-0.24197 / 0.84134, abs=0.02)
-    again = Source([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
+    again = DrawSource([an_input()], 1, lambda draws: np.asarray(draws["A"]) <= 1.0)
     again.block(5)
     assert np.array_equal(values, again.block(0)[0]["A"])
-    nothing = Source([an_input()], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool))
+    nothing = DrawSource([an_input()], 1, lambda draws: np.zeros(len(np.asarray(draws["A"])), dtype=bool))
     with refused(BadRequest, "montecarlo.nothing-possible"):
         nothing.block(0)
 
@@ -281,7 +283,7 @@ def test_which_others_are_drawn_makes_no_difference() -> None:
 
 def test_a_case_drawn_again_is_correlated_too() -> None:
     groups = groups_of([("A", "B", 0.95)])
-    source = Source([an_input("A"), an_input("B")], 1, lambda draws: np.asarray(draws["A"]) > 0.0, groups)
+    source = DrawSource([an_input("A"), an_input("B")], 1, lambda draws: np.asarray(draws["A"]) > 0.0, groups)
     draws, redrawn = source.block(0)
     assert len(redrawn) > BLOCK // 2
     residual = np.asarray(draws["B"]) - 0.95 * np.asarray(draws["A"])
@@ -301,7 +303,7 @@ def test_the_budget_of_a_pair_is_the_variance_of_what_both_do_together(rho: floa
     model = dispersed.exact_two_pulse(0.02).model
     assert model.spacecraft.dispersions is not None
     tolerances = replace(model.spacecraft.dispersions, correlation=(("C", "A", rho),))
-    study = Study(Model(replace(model.spacecraft, dispersions=tolerances), model.schedule), seed=3)
+    study = Study(DispersedModel(replace(model.spacecraft, dispersions=tolerances), model.schedule), seed=3)
     results, first = run(Results(study, BLOCK)), study.first_order
     names = [entry.name for entry in first.inputs]
     pair = [names.index(name) for name in "AC"]

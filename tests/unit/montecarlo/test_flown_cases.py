@@ -19,7 +19,7 @@ from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
 from nutdamp.flight import propagation
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm, nodes_for
 from nutdamp.montecarlo.propagated import RealWidths, largest_nutation
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
@@ -50,10 +50,10 @@ THREE = {
     "three moments, oblate, spin reversed": dispersed.with_jets(moments=(80.0, 95.0, 120.0), spin=-2.0),
 }
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
-LEAKING = Model(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
+LEAKING = DispersedModel(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
 
 
-def outputs(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, Any]) -> NDArray[np.float64]:
+def outputs(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, Any]) -> NDArray[np.float64]:
     """Of all cases, (5, n)."""
     out = np.empty((len(OUTPUTS), max(map(np.size, draws.values()), default=1)))
     measure(model, fly(model)(model.cases(draws)), out)
@@ -120,23 +120,23 @@ def test_pulses_that_change_places_act_in_their_own_order() -> None:
     """Impulses 20 ms apart, of which a fixed error of 50 ms makes the second the first."""
     pulses = [steerable_pulse(Steerable(), t, angle, impulse=4.0) for t, angle in ((1.0, 0.3), (1.02, 2.0))]
     body = replace(spinner(), dispersions=Dispersions(timing=Tolerance("uniform", 0.05)))
-    model, draws = Model(body, Schedule(tuple(pulses))), {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
+    model, draws = DispersedModel(body, Schedule(tuple(pulses))), {"timing pulse 1": 0.05, "timing pulse 2": 0.0}
     left = propagation.by_impulses(*realised(model, draws)).residual
     by_sum = outputs(ClosedForm, model, draws)[:2, 0]
     assert by_sum == pytest.approx([left.nutation, left.momentum_shift], abs=1e-12)
     body = replace(spinner(steerable=Steerable(20.0)), dispersions=Dispersions(timing_offset=Tolerance("bias", -5.0)))
-    model = Model(body, Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),)))
+    model = DispersedModel(body, Schedule((steerable_pulse(Steerable(20.0), 0.4, 0.3, on_time=0.4),)))
     assert model.cases({"timing offset": -5.0}).starts == (0.0,)  # one shifted before t = 0 fires at 0
 
 
 def test_a_schedule_without_pulses_leaves_what_is_there() -> None:
     body = replace(spinner(), dispersions=Dispersions(A=Tolerance("normal", 0.01, True)))
-    nutation, shift, *_ = Study(Model(body, Schedule())).outputs_of({"A": 1.2})
+    nutation, shift, *_ = Study(DispersedModel(body, Schedule())).outputs_of({"A": 1.2})
     assert nutation == pytest.approx(math.atan(1.01 * math.tan(math.radians(5.0))))
     assert shift == 0.0
     body = THREE["three moments"].spacecraft
     left = propagation.flown(body, Schedule()).residual
-    assert Study(Model(body, Schedule())).outputs_of({})[0] == pytest.approx(left.nutation)
+    assert Study(DispersedModel(body, Schedule())).outputs_of({})[0] == pytest.approx(left.nutation)
 
 
 def test_the_quadrature_of_wide_pulses_is_exact_to_rounding() -> None:
@@ -209,7 +209,7 @@ def test_blocks_fire_what_their_valves_give(number: int) -> None:
     valve = Trapezoid(open_delay=0.06, close_delay=0.09, rise_time=0.03, fall_time=0.08)
     channels = tuple(one.of(valve=valve) for one in BLOCKS["spin reversed"].spacecraft.channels)
     whole = by_blocks(cold=Cold(0.7, 3.0), tank=Tank(1.0, 2e6, 1e6, 1.0), channels=channels)
-    model = Model(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:2]))
+    model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:2]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     own, flown = timed(model, model.cases(draws)), outputs(RealWidths, model, draws)
     one = dispersed.one_of(draws, number)
@@ -230,7 +230,7 @@ def test_blocks_of_many_cases_are_flown_some_at_once(monkeypatch: pytest.MonkeyP
     late = {"T": dispersed.normal(0.01), "+1": dispersed.normal(0.01)}
     given = replace(BODY_ERRORS, open_delay=late, close_delay=late)
     whole = by_blocks(given, channels=channels)
-    model = Model(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
+    model = DispersedModel(whole.spacecraft, fired(whole.spacecraft, whole.schedule.blocks[:1]))
     draws = dispersed.first_cases(study_of(model.spacecraft, model.schedule), 12)
     at_once = outputs(RealWidths, model, draws)
     monkeypatch.setattr("nutdamp.physics.batch.BLOCK", 5)
@@ -276,7 +276,7 @@ def test_an_error_of_the_spin_turns_no_heading() -> None:
 def test_a_sensor_that_loses_the_sun_fires_nothing() -> None:
     model = BLOCKS["spin reversed"]
     blind = replace(model.spacecraft, sun_sensor=SunSensor(0.4, elevation=1.4, half_width=0.1))
-    blinded = Model(blind, model.schedule)
+    blinded = DispersedModel(blind, model.schedule)
     assert not np.array(timed(blinded, model.cases({})).impulses).any()
     seeing, gone = (RealWidths(one)(model.cases({})) for one in (model, blinded))
     assert gone.propellant is None or float(np.max(gone.propellant)) == 0.0

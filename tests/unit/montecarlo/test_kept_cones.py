@@ -21,7 +21,7 @@ from nutdamp import load
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import Results, Study, study_of
 from nutdamp.montecarlo.study import run as fly_all
@@ -31,12 +31,12 @@ from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Disturbance, Keep, Requirement, Spacecraft
 
 
-def with_directions(model: Model, **fields: object) -> Model:
+def with_directions(model: DispersedModel, **fields: object) -> DispersedModel:
     """The model with directions all over the sky, and one on the spin axis, where angles are near zero."""
     body = replace(model.spacecraft, **fields)  # type: ignore[arg-type]
     sky = np.random.default_rng(1).normal(size=(3, 3))
     ways = (*(way / np.linalg.norm(way) for way in sky), body.axis)
-    return Model(replace(body, keep=tuple(Keep(str(k), way) for k, way in enumerate(ways))), model.schedule)
+    return DispersedModel(replace(body, keep=tuple(Keep(str(k), way) for k, way in enumerate(ways))), model.schedule)
 
 
 JETS = dispersed.with_jets()
@@ -57,7 +57,7 @@ def end_of(made: Flight) -> float:
     return made.schedule.end + math.pi * (made.moments[0] + made.moments[1]) / size
 
 
-def seen_in(model: Model, draws: dict[str, np.ndarray]) -> np.ndarray:
+def seen_in(model: DispersedModel, draws: dict[str, np.ndarray]) -> np.ndarray:
     """Least and largest angles (m, 2, n) of the cases."""
     angles = RealWidths(model)(model.cases(draws)).aspects
     assert angles is not None

@@ -16,7 +16,7 @@ from support.golden import refused
 
 from nutdamp.errors import BadRequest
 from nutdamp.montecarlo import study as dispersion
-from nutdamp.montecarlo.cases import DispersedCases, Model
+from nutdamp.montecarlo.cases import DispersedCases, DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm, Ends
 from nutdamp.montecarlo.inputs import BLOCK
 from nutdamp.montecarlo.statistics import (
@@ -167,7 +167,7 @@ def test_biases_alone_no_dispersions_and_unknown_propellant() -> None:
     with refused(BadRequest, "montecarlo.no-dispersions"):
         study_of(replace(body, dispersions=None), JETS.schedule)
     pulses = Schedule(tuple(replace(pulse, propellant=None) for pulse in JETS.schedule))
-    assert run(Results(Study(Model(JETS.spacecraft, pulses)), 10)).distribution("propellant") is None
+    assert run(Results(Study(DispersedModel(JETS.spacecraft, pulses)), 10)).distribution("propellant") is None
 
 
 PROBABILITIES = np.array([0.0, 0.003, 0.5, 0.9, 0.95, 0.99, 0.997, 1.0])
@@ -239,7 +239,7 @@ def test_the_worst_cases_are_found_whatever_the_portions() -> None:
 
 
 def outcomes(
-    model: Model, draws: dict[str, np.ndarray], fly: Callable[[DispersedCases], Ends] | None = None
+    model: DispersedModel, draws: dict[str, np.ndarray], fly: Callable[[DispersedCases], Ends] | None = None
 ) -> np.ndarray:
     """What the closed form leaves, or what ``fly`` flies."""
     out = np.empty((ROWS, len(next(iter(draws.values())))))
@@ -252,7 +252,7 @@ def outcomes(
     [JETS, dispersed.steered(spin=-3.0), dispersed.sinking(JETS), dispersed.with_jets(moments=(120.0, 105.0, 80.0))],
     ids=["jets", "steered", "jets, dissipation", "three moments"],
 )
-def test_derivatives_agree_with_central_differences(model: Model) -> None:
+def test_derivatives_agree_with_central_differences(model: DispersedModel) -> None:
     first = first_order(model)
     for column, entry in enumerate(first.inputs):
         step = 1e-4 * entry.size
@@ -291,7 +291,7 @@ def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the
     requested = JETS.spacecraft.dispersions
     assert requested is not None
     biased = replace(requested, C=Tolerance("bias", 0.8))
-    first = first_order(Model(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
+    first = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=biased), JETS.schedule))
     names = [entry.name for entry in first.inputs]
     for output in OUTPUTS:
         assert first.shares(output).sum() == pytest.approx(1.0)
@@ -299,7 +299,7 @@ def test_shares_sum_to_one_a_bias_has_none_and_the_attitude_moves_only_where_the
         effect = first.effects(output)[names.index("attitude x")]
         assert effect > 1e-3 if output == "axis_error" else effect == pytest.approx(0.0, abs=1e-15)
     assert first.effects("nutation")[names.index("C")] > 0.0
-    nothing = first_order(Model(replace(JETS.spacecraft, dispersions=None), JETS.schedule))
+    nothing = first_order(DispersedModel(replace(JETS.spacecraft, dispersions=None), JETS.schedule))
     assert nothing.jacobian.shape == (ROWS, 0)
     assert nothing.sigma("nutation") == 0.0
 

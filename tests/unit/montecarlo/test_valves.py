@@ -16,9 +16,9 @@ from nutdamp.errors import FaultyFile
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.propagation import flown
 from nutdamp.flight.propellant import supplied
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm, Ends
-from nutdamp.montecarlo.inputs import Source, list_inputs
+from nutdamp.montecarlo.inputs import DrawSource, list_inputs
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
@@ -58,11 +58,11 @@ def fires(body: Spacecraft, pulses: Iterable[Pulse]) -> Schedule:
     return Schedule(supplied(body, [on_command(channels[pulse.channel], *pulse.loaded) for pulse in pulses]))
 
 
-def ends_of(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, float]) -> Ends:
+def ends_of(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]) -> Ends:
     return fly(model)(model.cases({name: np.full(2, draw) for name, draw in draws.items()}))
 
 
-def nutation(fly: type[ClosedForm | RealWidths], model: Model, draws: Mapping[str, float]) -> float:
+def nutation(fly: type[ClosedForm | RealWidths], model: DispersedModel, draws: Mapping[str, float]) -> float:
     """Of the case of these draws."""
     x, y, z = ends_of(fly, model, draws).momentum
     return float(np.arctan2(np.hypot(x, y), z)[0])
@@ -97,7 +97,7 @@ CHANGES: dict[str, tuple[dict[str, float], Valve, Valve, Cold]] = {
 def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
     draws, valve, other, cold = CHANGES[change]
     body = through(valve, cold=COLD)
-    model = Model(body, fires(body, commands(body)))
+    model = DispersedModel(body, fires(body, commands(body)))
     true = through(valve, other, cold)
     expected = flown(true, fires(true, model.schedule)).residual.nutation
     assert abs(nutation(RealWidths, model, {"cold": 0.0}) - expected) > math.radians(1e-4)
@@ -110,7 +110,7 @@ def test_a_case_is_the_flight_of_such_a_body(change: str) -> None:
 def test_a_valve_that_opens_so_late_that_the_thrust_does_not_rise_or_there_is_none(late: float) -> None:
     slow = Trapezoid(0.02, 0.012, 0.05, 0.08)
     body = through(slow)
-    model = Model(body, fires(body, commands(body)[:1]))
+    model = DispersedModel(body, fires(body, commands(body)[:1]))
     true = through(slow, replace(slow, open_delay=0.02 + late))
     given = fires(true, model.schedule)
     assert (given.total_impulse == 0.0) == (late == 0.2)
@@ -134,7 +134,7 @@ def test_a_case_of_another_tank_is_the_flight_of_such_a_body(change: str) -> Non
     """The file gives the thrust at its own pressure: at another one all pulses are stronger or weaker."""
     draws, other = TANKS[change]
     body = through(SLOW, tank=TANK)
-    model = Model(body, fires(body, commands(body)))
+    model = DispersedModel(body, fires(body, commands(body)))
     higher = (other.pressure / TANK.pressure) ** other.exponent
     stronger = (one.of(torque=higher * one.torque, thrust=higher * 10.0) for one in body.channels)
     true = replace(body, channels=tuple(stronger), tank=other)
@@ -161,7 +161,7 @@ def test_with_an_empty_tank_nothing_fires_any_more(short: float) -> None:
     body = through(SLOW)
     pulses = commands(body)
     each = pulses[0].propellant or math.nan
-    model = Model(replace(body, tank=replace(STEADY, propellant=3.0 * each)), Schedule(tuple(pulses)))
+    model = DispersedModel(replace(body, tank=replace(STEADY, propellant=3.0 * each)), Schedule(tuple(pulses)))
     draws, (whole, part) = {"tank propellant": -short * each}, divmod(3.0 - short, 1.0)
     weak = pulses[int(whole)]
     assert weak.torque is not None
@@ -209,7 +209,7 @@ def test_no_case_is_left_without_a_body_when_the_tank_is_empty() -> None:
         dispersions=Dispersions(inertia_per_kg=Tolerance("normal", 0.15, relative=True)),
     )
     model = study_of(body, fires(body, commands(body)[:1])).model
-    draws, redrawn = Source(model.inputs.drawn, 3, model.physical).block(0)
+    draws, redrawn = DrawSource(model.inputs.drawn, 3, model.physical).block(0)
     left = np.array([[120.0], [120.0], [80.0]]) - 0.01 * np.outer(shed, 1.0 + np.asarray(draws["inertia_per_kg"]))
     assert len(redrawn) > 100
     assert np.all(left > 0.0)
@@ -257,8 +257,8 @@ def test_draws_that_make_a_number_negative_are_refused_where_they_are_written() 
 
 def test_the_few_draws_below_zero_are_drawn_again() -> None:
     body = craft("open_delay: {a: {normal: 2.6 ms}}")
-    model = Model(body, fires(body, commands(body)[:1]))
-    draws, redrawn = Source(model.inputs.drawn, 3, model.physical).block(0)
+    model = DispersedModel(body, fires(body, commands(body)[:1]))
+    draws, redrawn = DrawSource(model.inputs.drawn, 3, model.physical).block(0)
     assert len(redrawn) > 0
     assert float(np.min(draws["open_delay a"])) >= -0.008
 
@@ -278,7 +278,7 @@ def test_a_study_spreads_as_its_valves_do() -> None:
     body = craft("close_delay: {a: {normal: 1 ms}}")
     made = fires(body, commands(body, 0.05)[:1])
     spread = run(Results(study_of(body, made, seed=3), 4000)).distribution("nutation")
-    early, late = (nutation(RealWidths, Model(body, made), {"close_delay a": one}) for one in (-0.001, 0.001))
+    early, late = (nutation(RealWidths, DispersedModel(body, made), {"close_delay a": one}) for one in (-0.001, 0.001))
     assert spread is not None
     low, high = spread.quantiles(np.array([0.1587, 0.8413]))
     assert high - low == pytest.approx(abs(late - early), rel=0.05)
@@ -294,7 +294,7 @@ def test_bare_numbers_are_dispersed_and_shown_in_parts_of_their_own_values() -> 
         ("tank_final_pressure: {normal: 0.5 bar}", 16e5, "0.5 bar"),
     ):
         body = craft(line, more)
-        model = Model(body, fires(body, commands(body)[:1]))
+        model = DispersedModel(body, fires(body, commands(body)[:1]))
         (entry,) = model.inputs.drawn
         assert entry.nominal == pytest.approx(nominal)
         assert size_text(entry) == shown

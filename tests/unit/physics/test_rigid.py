@@ -129,7 +129,7 @@ def test_few_cases_fly_as_each_alone_does(forcing: Forcing, alike: tuple[int, in
     now, duration = 2.0 * rng.random(count), 40.0 * rng.random(count)
     omega, quaternion = rates.copy(), np.repeat(START[:, None], count, axis=1)
     bodies = batch.Bodies(moments, np.zeros(3), forcing)
-    batch.advance(batch.Stretch(bodies, now, omega, quaternion, torque), duration)
+    batch.advance(batch.MotionStretch(bodies, now, omega, quaternion, torque), duration)
     for case, (first, second, third) in enumerate(moments.T.tolist()):
         begin, end = float(now[case]), float(now[case] + duration[case])
         body = first, second, third

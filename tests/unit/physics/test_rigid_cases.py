@@ -18,7 +18,7 @@ from support.spinning import Triple, driven, turning
 
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, batch
-from nutdamp.physics.batch import Bodies, Pulses, Stretch
+from nutdamp.physics.batch import Bodies, MotionStretch, Pulses
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.taylor import NOTHING, Forcing
 
@@ -238,13 +238,13 @@ def test_few_turns_show_what_all_show(sense: float, growth: float, monkeypatch: 
     round_ = rng.uniform(0.0, 2.0 * math.pi, (2, count))
     directions = np.stack([np.sin(away) * np.cos(round_), np.sin(away) * np.sin(round_), np.cos(away)], axis=1)
     lasts = rng.uniform(20.0, 40.0, count) * 2.0 * math.pi * first / np.linalg.norm(moments * rates, axis=0)
-    here = Stretch(Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright)
+    here = MotionStretch(Bodies(moments, np.zeros(3), Forcing(growth=growth)), np.zeros(count), rates, upright)
     few, every = AxisWatch.of(directions, sense), AxisWatch.of(directions, sense)
     every._steps(here, lasts)
     steps: list[int] = []
     stepped = AxisWatch._steps
 
-    def counted(self: AxisWatch, begin: Stretch, duration: Array) -> None:
+    def counted(self: AxisWatch, begin: MotionStretch, duration: Array) -> None:
         steps.append(len(duration))
         stepped(self, begin, duration)
 

@@ -27,7 +27,7 @@ from nutdamp.montecarlo.study import Results, study_of
 from nutdamp.montecarlo.study import run as fly
 from nutdamp.planning.decision import Comparison, Decision, compare, decide
 from nutdamp.planning.plan import Plan, plan
-from nutdamp.planning.screening import Candidate, Cases, cases_of
+from nutdamp.planning.screening import Cases, PlanCandidate, cases_of
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Goal, Inertia, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
@@ -108,10 +108,10 @@ def test_the_levels_are_those_of_the_cases() -> None:
 
 def with_cases(scheme: str, cases: Cases | None) -> Comparison:
     """The comparison of one scheme, where cases decide; None: they cannot be flown."""
-    one, flown = example()[scheme], dict[Plan, Candidate]()
+    one, flown = example()[scheme], dict[Plan, PlanCandidate]()
     if cases is not None:
         known = cases.decided and cases.complying is not None
-        flown[one] = Candidate(one, "", cases)
+        flown[one] = PlanCandidate(one, "", cases)
         flown[one].low, flown[one].high = (cases.complying,) * 2 if known else (0.9, 1.0)
     return Comparison(example().spacecraft, (one,), flown)
 

@@ -19,7 +19,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare, decide, usual
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Gain, Ground, Standing, cheapest, recommend
-from nutdamp.planning.screening import Candidate, Cases
+from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Goal, Requirement, Vector
@@ -180,10 +180,10 @@ or else enough comply            | keep | idle ONLY MEETS 1       | idle 4.9 0; 
 
 def with_shares(plans: list[Plan], text: str) -> Comparison:
     """The comparison of plans that flew so many of 20,000 cases that the share that complies is known so closely."""
-    flown: dict[Plan, Candidate] = {}
+    flown: dict[Plan, PlanCandidate] = {}
     for plan, bounds in zip(plans, text.split(";"), strict=True):
         low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
-        one = Candidate(plan, "", Cases(20_000 if low == high else 2_048, 20_000, 1, low, 0.997, {}))
+        one = PlanCandidate(plan, "", Cases(20_000 if low == high else 2_048, 20_000, 1, low, 0.997, {}))
         one.low, one.high = low, high
         flown[plan] = one
     return Comparison(plans[0].spacecraft, tuple(plans), flown)

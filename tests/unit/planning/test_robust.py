@@ -23,7 +23,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.montecarlo.cases import DispersedCases
 from nutdamp.montecarlo.closed_form import Ends
-from nutdamp.montecarlo.inputs import Input
+from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.study import SEED, Results, run, study_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning import robust, screening
@@ -31,7 +31,7 @@ from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground
-from nutdamp.planning.screening import Candidate, Cases
+from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options
 from nutdamp.spacecraft.equipment import Block, Steerable
@@ -80,7 +80,7 @@ def untrimmed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robust, "trimmed", lambda plan, _: plan)
 
 
-def best(found: robust.RobustComparison) -> Candidate:
+def best(found: robust.RobustComparison) -> PlanCandidate:
     assert found.chosen is not None
     return found.chosen
 
@@ -352,14 +352,14 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(m
     assert robust.attempts(compare(dispersed(), ("four-pulse",))) == []
 
 
-def candidate(impulse: float, left: float = 0.0, met: float | None = None, end: float = 1.0) -> Candidate:
+def candidate(impulse: float, left: float = 0.0, met: float | None = None, end: float = 1.0) -> PlanCandidate:
     """A plan of so many N m s, whose angle left (rad) and share of 1,000 cases met are given."""
     levels = {Part.NUTATION: left, Part.SHIFT: 0.0}
     cases = Cases(1_000, 1_000, 1, met, 0.997, levels)
-    return Candidate(judged("plan", 0.0, impulse=impulse, end=end), "as planned", cases)
+    return PlanCandidate(judged("plan", 0.0, impulse=impulse, end=end), "as planned", cases)
 
 
-def ranked(usual: Candidate, *given: Candidate) -> robust.RobustComparison:
+def ranked(usual: PlanCandidate, *given: PlanCandidate) -> robust.RobustComparison:
     body = usual.plan.spacecraft
     for one in given:
         one.plan = replace(one.plan, spacecraft=body)
@@ -387,7 +387,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
     dear, usual = candidate(2.0, 0.01, 0.9, end=3.0), candidate(1.0, 0.02, 0.8)
     usual.plan = replace(usual.plan, spacecraft=replace(usual.plan.spacecraft, requirement=HALF_A_DEGREE))
     bare = ranked(usual, usual, dear)
-    of_A = Input("A", "A", "normal", 0.6, 120.0, "kg m²")
+    of_A = DispersedInput("A", "A", "normal", 0.6, 120.0, "kg m²")
     needed = Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971)
     fresh = robust.Fresh(Cases(1_000, 1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
     written = robust_json(replace(bare, fresh=fresh, tightening=needed), "because")

@@ -21,7 +21,7 @@ from nutdamp.planning import screening
 from nutdamp.planning.decision import Comparison, compare, decide
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Share, recommend
-from nutdamp.planning.screening import Candidate, Cases
+from nutdamp.planning.screening import Cases, PlanCandidate
 
 SHORT, LONG, ALL = 2_048, 8_192, 20_000
 NEVER = "cannot be flown"
@@ -63,19 +63,19 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, floa
     """What cases tell of plans, by stage, instead of flying them; each takes a unit of work."""
     known: dict[Plan, list[tuple[float, float]]] = {}
 
-    def told(one: Candidate, stage: int) -> None:
+    def told(one: PlanCandidate, stage: int) -> None:
         work.spend(1.0)
         if stage >= len(known[one.plan]):
             raise Infeasible(NEVER)
         one.low, one.high = known[one.plan][stage]
         one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.low)
 
-    def entered(plan: Plan, variant: str, study: object, samples: int) -> Candidate:
-        made = Candidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))
+    def entered(plan: Plan, variant: str, study: object, samples: int) -> PlanCandidate:
+        made = PlanCandidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))
         told(made, 0)
         return made
 
-    def further(one: Candidate, samples: int) -> None:
+    def further(one: PlanCandidate, samples: int) -> None:
         assert samples == ALL
         told(one, 1 + screening.STAGES.index(one.cases.samples))
 
@@ -90,7 +90,7 @@ def chosen_of(plans: list[Plan], shares: Mapping[Plan, Share]) -> Plan | None:
     return recommend(plans, shares).plan
 
 
-def flown_of(plans: list[Plan], flown: dict[Plan, Candidate]) -> list[int]:
+def flown_of(plans: list[Plan], flown: dict[Plan, PlanCandidate]) -> list[int]:
     return [flown[one].cases.samples if one in flown else 0 for one in plans]
 
 

@@ -16,8 +16,8 @@ from support.commands import WIDER
 from support.dispersed import normal
 
 import nutdamp
-from nutdamp.montecarlo.cases import Model
-from nutdamp.montecarlo.inputs import Input
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import by_differences
 from nutdamp.montecarlo.study import Results, run, study_of
@@ -25,7 +25,7 @@ from nutdamp.planning import chance_plan, robust
 from nutdamp.planning.chance_plan import scaled
 from nutdamp.planning.decision import compare
 from nutdamp.planning.plan import plan
-from nutdamp.schemes.optimal.linear_program import Columns
+from nutdamp.schemes.optimal.linear_program import ProgramColumns
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -55,10 +55,10 @@ def a_body(A: float = 120.0, C: float = 80.0, spin: float = 3.0, **changes: obje
     return replace(body, dispersions=replace(tolerances, **changes))  # type: ignore[arg-type]
 
 
-def columns_of(pulses: list[tuple[int, float, float]]) -> Columns:
+def columns_of(pulses: list[tuple[int, float, float]]) -> ProgramColumns:
     """Given pulses (channel, centre, on-time) as columns of the program."""
     channels, times, widths = (np.array(one) for one in zip(*pulses, strict=True))
-    return Columns(channels, times, widths, np.full(len(times), -1))
+    return ProgramColumns(channels, times, widths, np.full(len(times), -1))
 
 
 def robustly(body: Spacecraft, *schemes: str, most: int | None = None) -> robust.RobustComparison:
@@ -84,12 +84,12 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     channels = [one.name for one in body.channels]
     pulses = [(channels.index(one.channel), one.t, one.on_time) for one in plan(body, "optimal").pulses]
     assert len(pulses) >= 2
-    search, columns = chance_plan._Search(body, body), columns_of(pulses)
+    search, columns = chance_plan._MarginSearch(body, body), columns_of(pulses)
     made = Schedule(tuple(channel_pulse(body.channels[k], t, on) for k, t, on in pulses))
-    model = Model(body, made)
+    model = DispersedModel(body, made)
     names = [one.name for one in model.inputs.drawn]
     one_each = Schedule(tuple(channel_pulse(one, 100.0 * at, 0.02) for at, one in enumerate(body.channels, start=1)))
-    known = [one.name for one in Model(body, one_each).inputs.drawn]
+    known = [one.name for one in DispersedModel(body, one_each).inputs.drawn]
     kernel = study_of(body, made).first_order
     expected = kernel.jacobian * kernel.sigmas
     expected = expected if kernel.mixing is None else expected @ kernel.mixing
@@ -108,7 +108,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
 
 def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
     body = replace(a_body(), requirement=Requirement(math.radians(0.05), None, 0.95))
-    search = chance_plan._Search(body, body)
+    search = chance_plan._MarginSearch(body, body)
     chance, costs, turns = search.chance, [], np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 721))
     channels = [one.name for one in search.program.channels]
     for margin in (0.0, 1.0, 2.0):
@@ -206,7 +206,7 @@ def test_sizes_are_those_of_the_file_and_never_rounded_up() -> None:
         ("normal", "kg m²", False, 0.6, 120.0, "0.6 kg m²"),
         ("normal", "rad/s", False, 0.0, 0.0, "0 deg/s"),
     ):
-        assert stated_text(Input("x", "x", kind, size, nominal, unit), relative, down=True) == text
+        assert stated_text(DispersedInput("x", "x", kind, size, nominal, unit), relative, down=True) == text
 
 
 @pytest.mark.weekly

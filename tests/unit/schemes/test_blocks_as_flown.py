@@ -26,7 +26,7 @@ from nutdamp.flight.propellant import Supply
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
-from nutdamp.schemes.block_model import BlockModel, State, Trial, fired, sun_clock, sun_pulses
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, fired, sun_clock, sun_pulses
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.constraints import commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, SunSensor
@@ -55,7 +55,7 @@ def named(body: Spacecraft, name: str) -> Channel:
     return next(one for one in body.channels if one.name == name)
 
 
-def in_form(body: Spacecraft, *blocks: Block) -> tuple[BlockModel, State]:
+def in_form(body: Spacecraft, *blocks: Block) -> tuple[BlockModel, BlockState]:
     model = BlockModel(body)
     state, number = model.start, 1
     for block in blocks:

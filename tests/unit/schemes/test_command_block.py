@@ -27,7 +27,7 @@ from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
-from nutdamp.schemes.block_search import FLOWN, BlockSearch, Flown, Found
+from nutdamp.schemes.block_search import FLOWN, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
@@ -138,7 +138,7 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     search = BlockSearch(body, usable(body), body.commands)
 
     def shares() -> Iterator[float]:
-        single = search._single(Found((), search.model.start, (math.inf,) * 3))
+        single = search._single(BlockSequence((), search.model.start, (math.inf,) * 3))
         for found in sorted(single, key=lambda one: one.share)[:200]:
             with suppress(Infeasible):
                 yield search.flown(found).rank[1]
@@ -159,7 +159,7 @@ def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(mo
     assert plan.severity <= single.severity
     severities, flown = list[float](), BlockSearch.flown
 
-    def counted(self: BlockSearch, found: Found) -> Flown:
+    def counted(self: BlockSearch, found: BlockSequence) -> FlownSequence:
         severities.append(flown(self, found).rank[1])
         return flown(self, found)
 
@@ -227,7 +227,7 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(6))
 def test_in_random_cases_blocks_never_bring_the_axis_into_a_cone(seed: int) -> None:
-    """Flown by the reference, nutation included, with a cone near the way."""
+    """FlownSequence by the reference, nutation included, with a cone near the way."""
     body, rng = some_body(seed), np.random.default_rng(seed)
     start, end = body.momentum / np.linalg.norm(body.momentum), body.target_axis
     centre = start + end + rng.uniform(-0.5, 0.5) * np.cross(start, end)

@@ -19,7 +19,7 @@ from support.golden import refused
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.flight.verification import verify
-from nutdamp.montecarlo.cases import Model
+from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
@@ -118,7 +118,7 @@ def test_the_flight_the_impulse_sum_and_the_cases_agree(scheme: str, valve: Valv
     made = made_by(scheme, body)
     assert by_impulses(body, made).residual.nutation < MICRODEGREE
     some = Schedule(made.pulses[:-1])  # so that much is left to compare
-    nominal, model = flown(body, some).residual.nutation, Model(body, some)
+    nominal, model = flown(body, some).residual.nutation, DispersedModel(body, some)
     assert nominal > 100.0 * MICRODEGREE
     assert by_impulses(body, some).residual.nutation == pytest.approx(nominal, abs=1e-13)
     for fly, allowed in ((RealWidths(model), 1e-13), (ClosedForm(model), 1e-8)):
@@ -180,7 +180,7 @@ def test_cold_pulses_are_planned_for(scheme: str, valve: Valve | None) -> None:
         assert pulse.torque == pytest.approx(cold.factor(fired[pulse.channel]) * full, rel=1e-12)
         fired[pulse.channel] += 1
     assert valve is None or left(made, body) < MICRODEGREE
-    model = Model(body, made)
+    model = DispersedModel(body, made)
     ends = RealWidths(model)(model.cases({"timing pulse 1": np.zeros(2)})).momentum
     assert np.hypot(ends[0], ends[1]) / ends[2] == pytest.approx(0.0, abs=MICRODEGREE)
 

@@ -21,7 +21,7 @@ from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Program, Solution
-from nutdamp.schemes.optimal.search import _Search
+from nutdamp.schemes.optimal.search import _LeastCostSearch
 from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Bounds, Schedule, channel_pulse
@@ -269,7 +269,7 @@ def test_the_first_order_bound_is_not_above_the_program_on_a_dense_grid(first: i
 
 
 def solved_program(body: Spacecraft) -> tuple[Program, Solution]:
-    program = _Search(body, OptimalOptions(least="impulse")).program()
+    program = _LeastCostSearch(body, OptimalOptions(least="impulse")).program()
     return program, program.solve()
 
 

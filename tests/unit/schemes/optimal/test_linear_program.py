@@ -27,7 +27,7 @@ from nutdamp.schemes.optimal import highs, refinement
 from nutdamp.schemes.optimal.highs import GrowingProgram, Optimum
 from nutdamp.schemes.optimal.linear_program import Program
 from nutdamp.schemes.optimal.problem import Problem
-from nutdamp.schemes.optimal.refinement import Equations
+from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.model import Goal, Limits, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
@@ -292,11 +292,11 @@ def test_the_equations_along_a_flight_say_what_a_short_firing_adds(spin: float, 
     body = spinner(100.0, 150.0, spin, 25.0, channels=(channel("T", 3.0, 1.0, 0.4), *cross(4.0)))
     body = replace(body, dissipation=dissipation)
     last = channel_pulse(body.channels[1], 9.0, 0.5)
-    influence = refinement.along(propagation.flown(body, Schedule((last,))), Equations(), 0.05)
+    influence = refinement.along(propagation.flown(body, Schedule((last,))), EndEquations(), 0.05)
     for at in (2.0, 6.0):
         added = channel_pulse(body.channels[0], at, 1e-3)
         without, more = (
-            refinement.misses(propagation.flown(body, Schedule(made)), Equations(shift=False))
+            refinement.misses(propagation.flown(body, Schedule(made)), EndEquations(shift=False))
             for made in ((last,), (added, last))
         )
         expected = np.hypot(*(influence.rows(np.array([at]))[0] @ added.impulse)[:2])

@@ -19,7 +19,7 @@ from nutdamp.planning.decision import infeasibility, remarks
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions, Options
 from nutdamp.schemes.optimal.linear_program import Program
-from nutdamp.schemes.optimal.refinement import Equations, small_angles
+from nutdamp.schemes.optimal.refinement import EndEquations, small_angles
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST
@@ -61,7 +61,7 @@ def within(horizon: float, channels: tuple[Channel, ...] = REAL, **parts: Any) -
 def small_angle_optimum(spacecraft: Spacecraft, per_impulse: np.ndarray | float = 1.0) -> tuple[float, float, int]:
     """What the program leaves, what it costs at these costs of one N m s in each channel, and its burns."""
     costs = np.array([np.linalg.norm(one.torque) for one in spacecraft.channels]) * per_impulse
-    found = Program(spacecraft, spacecraft.channels, costs, small_angles(spacecraft, Equations())).solve()
+    found = Program(spacecraft, spacecraft.channels, costs, small_angles(spacecraft, EndEquations())).solve()
     return found.unmet, found.cost, len(found.burns)
 
 

@@ -29,8 +29,8 @@ from nutdamp.schemes.optimal import multistart, problem, search
 from nutdamp.schemes.optimal.descent import Descent, Task
 from nutdamp.schemes.optimal.linear_program import Burn
 from nutdamp.schemes.optimal.problem import DEARER, Problem
-from nutdamp.schemes.optimal.refinement import Equations
-from nutdamp.schemes.optimal.search import HALVINGS, _Search
+from nutdamp.schemes.optimal.refinement import EndEquations
+from nutdamp.schemes.optimal.search import HALVINGS, _LeastCostSearch
 from nutdamp.schemes.sequential import bounded_by, no_channels
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
@@ -47,11 +47,11 @@ def settle(monkeypatch: pytest.MonkeyPatch, schedules: dict[float, Schedule]) ->
     """Let the program lead to ``schedules`` within each horizon, else to nothing; the horizons that were looked at."""
     tried: list[float] = []
 
-    def settled(self: _Search, _: float) -> Schedule | None:
+    def settled(self: _LeastCostSearch, _: float) -> Schedule | None:
         tried.append(self.spacecraft.horizon)
         return schedules.get(self.spacecraft.horizon)
 
-    monkeypatch.setattr(_Search, "settled", settled)
+    monkeypatch.setattr(_LeastCostSearch, "settled", settled)
     return tried
 
 
@@ -64,7 +64,7 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Halved down to a period; where what is found is dear, three times or until one is not."""
-    search, pair = _Search(BODY, PLAIN), two_pulse.schedule(BODY, TwoPulseOptions())
+    search, pair = _LeastCostSearch(BODY, PLAIN), two_pulse.schedule(BODY, TwoPulseOptions())
     first = search.program().solve()
     for known in ({400.0: dearer(pair, 2.0)}, {}):
         tried = settle(monkeypatch, known)
@@ -74,7 +74,7 @@ def test_other_horizons_and_schemes_are_tried_where_the_program_leads_nowhere_or
     halves = int(math.log2(400.0 / BODY.inertial_period))
     assert tried == [400.0 * 0.5**turn for turn in range(halves + 1)]
     assert halves > HALVINGS
-    monkeypatch.setattr(_Search, "others", lambda *_: None)
+    monkeypatch.setattr(_LeastCostSearch, "others", lambda *_: None)
     dear = {400.0 * 0.5**turn: dearer(pair, 3.0 - 0.1 * turn) for turn in range(7)}
     tried = settle(monkeypatch, dear)
     assert search.programmed(first) is dear[50.0]
@@ -168,7 +168,7 @@ def test_no_slots_are_left_that_join_to_more_than_a_pulse_may_last(longest: floa
 @pytest.mark.deep
 def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> None:
     body = random_layout(153)
-    search = _Search(body, PLAIN)
+    search = _LeastCostSearch(body, PLAIN)
     before = search.programmed(search.program().solve())
     assert before is not None
     after = search.cheapened(before)
@@ -176,7 +176,7 @@ def test_a_schedule_is_taken_down_on_the_true_motion_and_leaves_nothing() -> Non
     assert search.price(after) < search.price(before) * (1.0 - 1e-4)
     assert [one.channel for one in after] == [one.channel for one in before]
     assert math.degrees(search.left(search.flown(after))) < 1e-9
-    ticked = _Search(replace(body, limits=replace(body.limits, tick=1e-3)), PLAIN)
+    ticked = _LeastCostSearch(replace(body, limits=replace(body.limits, tick=1e-3)), PLAIN)
     assert ticked.cheapened(before) is before  # ticks decide what a schedule leaves
 
 
@@ -230,9 +230,9 @@ def strong(degrees: float = 20.0, horizon: float = 2.0, **limits: Any) -> Spacec
     return spinner(degrees=degrees, channels=fan(5, 2e4), limits=Limits(horizon=horizon, **limits))
 
 
-def task_of(spacecraft: Spacecraft, equations: Equations | None = None) -> Task:
+def task_of(spacecraft: Spacecraft, equations: EndEquations | None = None) -> Task:
     costs = np.array([np.linalg.norm(one.torque) for one in spacecraft.channels])
-    return Task(spacecraft, equations or Equations(), spacecraft.channels, costs)
+    return Task(spacecraft, equations or EndEquations(), spacecraft.channels, costs)
 
 
 @pytest.mark.deep
@@ -363,5 +363,5 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
 )
 def test_it_costs_no_more_than_a_omega_where_that_can_be_had(body: Spacecraft, shift: bool, near: float) -> None:
     """By one pulse against ω where H is free, by the two exact ones once channels stand in every direction."""
-    made = multistart.schedules(task_of(body, Equations(shift=shift)))[0]
+    made = multistart.schedules(task_of(body, EndEquations(shift=shift)))[0]
     assert made.total_impulse == pytest.approx(body.least_impulse, rel=near)
