@@ -20,7 +20,7 @@ from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, limit, notes, size, verdict
-from nutdamp.views.end_tables import add_aspects, angle_names, angle_texts, cone_margins
+from nutdamp.views.end_tables import add_aspects, angle_names, angle_texts, cone_margins, lasting
 from nutdamp.views.layout import FittedColumns, columns, facts
 from nutdamp.views.plan_tables import SHORT_NAMES, channel_text
 from nutdamp.views.text import MISSING, RPM, degrees, mass, quantity
@@ -137,6 +137,8 @@ def _ends(decision: Decision) -> RenderableType:
     spun = abs(decision.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
     spin = f"; spin {decision.final.spin * RPM:.5g} rpm" * spun
     table.add_row("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}")
+    if lasting(decision.flight):
+        table.add_row("", lasting(decision.flight))
     add_aspects(table, [aspect for aspect in decision.aspects if not aspect.kept])
     return table
 

@@ -205,7 +205,7 @@ keep: [{name: pole star, direction: [10 deg, 86 deg], min: 2 deg}]
 @pytest.mark.weekly
 def test_screens_and_json_show_how_near_the_axis_comes(run: Run, tmp_path: Path) -> None:
     options = ("--target", "10deg,80deg", "--scheme", "rhumb-line", "--json", "plan.json")
-    shown = run("plan", "-", *options, stdin=WATCHING)
+    shown = run("plan", "-v", "-", *options, stdin=WATCHING)
     assert shown.returncode == 0, shown.stderr
     for text in ("axis from pole star", "(at least 2 deg)", "axis from Sun"):
         assert text in " ".join(shown.stdout.split())
@@ -232,7 +232,7 @@ dispersions: {thrust: {normal: 5 %}}
 
 def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) -> None:
     for scheme in ("one-pulse", "four-pulse"):
-        shown = run("plan", "-", "--nominal", "--scheme", scheme, stdin=BROKEN)
+        shown = run("plan", "-v", "-", "--nominal", "--scheme", scheme, stdin=BROKEN)
         assert shown.returncode == 4
         said = " ".join(shown.stdout.split())
         assert "it meets the requirement at the end." in said

@@ -253,11 +253,14 @@ sun: epoch
 keep: [{name: star, direction: [10 deg, 86 deg], min: 3.5 deg, max: 30 deg}]
 """
 TWO = ("-q", "-", "--scheme", "two-pulse")
-BOTH = ("plan", "-q", "--scheme", "two-pulse", "--scheme", "four-pulse")
+BOTH = ("plan", "-v", "-q", "--scheme", "two-pulse", "--scheme", "four-pulse")
 
 
 def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: Path) -> None:
-    shown = {name: run(name, *TWO, "--json", f"{name}.json", stdin=FILE, columns=200) for name in ("plan", "simulate")}
+    shown = {
+        name: run(name, *TWO, *["-v"] * (name == "plan"), "--json", f"{name}.json", stdin=FILE, columns=200)
+        for name in ("plan", "simulate")
+    }
     for name, done in shown.items():
         decision = json.loads((tmp_path / f"{name}.json").read_text("utf-8"))["decision"]
         assert [decision["met"], *(one["kept"] for one in decision["aspects"])] == [False, False, True]

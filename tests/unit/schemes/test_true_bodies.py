@@ -287,7 +287,7 @@ def test_coasts_take_no_steps(scheme: str, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.deep
 def test_no_bound_is_claimed_under_dissipation(run: Run, plans_shared: None) -> None:
     """An oblate body damps itself: there are schedules below A|ω0|, and they are found."""
-    command = "plan", str(case("oblate-dissipation.yaml")), "--scheme", "optimal"
+    command = "plan", "-v", str(case("oblate-dissipation.yaml")), "--scheme", "optimal"
     shown = run(*command).stdout
     check_text("dissipation.no-bound", "\n".join(line for line in shown.splitlines() if "least impulse" in line))
     (planned,) = json.loads(run(*command, "--json", "-").stdout)["plans"]
@@ -335,7 +335,7 @@ def test_what_dissipation_takes_out_alone_leaves_pulses_that_can_be_commanded() 
 )
 def test_files_that_went_wrong(run: Run, name: str, options: tuple[str, ...], status: int, said: str) -> None:
     """Near a sphere ω takes days to turn in the body, and dissipation minutes to take it out."""
-    done = run("plan", str(case(f"{name}.yaml")), *options)
+    done = run("plan", "-v", str(case(f"{name}.yaml")), *options)
     assert done.returncode == status, done.stderr
     assert "Traceback" not in done.stderr
     assert "nan" not in done.stdout.split()
