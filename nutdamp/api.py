@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nutdamp import units
 from nutdamp.common.numerics import finite
-from nutdamp.control_loop import limit_cycle
+from nutdamp.control_loop import budget as holding
 from nutdamp.errors import BadRequest, Fault, nearest
 from nutdamp.estimation import fit as estimation
 from nutdamp.estimation import forecast, results
@@ -225,7 +225,7 @@ class Verified:
 class Budget:
     """Cost of holding the nutation against energy dissipation; ``core`` holds a row for each pair of thresholds."""
 
-    core: limit_cycle.HoldingBudget
+    core: holding.HoldingBudget
 
     def to_dict(self) -> dict[str, Any]:
         """The object of ``budget --json``."""
@@ -281,8 +281,8 @@ def budget(
     if pairs and body.loop is None:
         raise BadRequest("thresholds: expected a spacecraft with a loop")
     seed = units.instance("seed", seed, int, "a whole number")
-    rows = [limit_cycle.Thresholds(*pair) for pair in pairs]
-    return Budget(limit_cycle.budget(body, rows, largest, seed=seed, progress=progress))
+    rows = [holding.Thresholds(*pair) for pair in pairs]
+    return Budget(holding.budget(body, rows, largest, seed=seed, progress=progress))
 
 
 def disperse(plan: Plan, samples: int = dispersion.SAMPLES, *, seed: int = dispersion.SEED) -> Dispersion:

@@ -24,8 +24,8 @@ from nutdamp.cli.screen import say
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from nutdamp.control_loop.budget import HoldingBudget
     from nutdamp.control_loop.evaluation import LoopPlan
-    from nutdamp.control_loop.limit_cycle import HoldingBudget
 
 
 @click.command("loop")

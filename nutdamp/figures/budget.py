@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.figures import style
 from nutdamp.figures.legends import heading, legend
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from nutdamp.control_loop.limit_cycle import DAY, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.views.plan_json import heading
 

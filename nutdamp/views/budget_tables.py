@@ -10,7 +10,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.control_loop.limit_cycle import DAY, NOISY, WIDENED, YEAR, Cycle, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.limit_cycle import Cycle
 from nutdamp.views.layout import columns, facts
 from nutdamp.views.loop_tables import described, warnings
 from nutdamp.views.plan_tables import header

@@ -15,20 +15,10 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
+from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget, Thresholds, budget
+from nutdamp.control_loop.first_passage import Odds, Transfer, transfer
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.limit_cycle import (
-    DAY,
-    YEAR,
-    Cycle,
-    HeldNutation,
-    HoldingBudget,
-    Map,
-    Odds,
-    Thresholds,
-    Transfer,
-    budget,
-    transfer,
-)
+from nutdamp.control_loop.limit_cycle import Cycle, Map
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
 from nutdamp.errors import BadRequest, Infeasible

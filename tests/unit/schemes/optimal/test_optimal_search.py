@@ -25,7 +25,7 @@ from nutdamp.planning.decision import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes import correction, two_pulse
 from nutdamp.schemes.catalogue import SCHEMES, OptimalOptions, Options, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.optimal import multistart, problem, search
+from nutdamp.schemes.optimal import alternatives, multistart, problem
 from nutdamp.schemes.optimal.descent import Descent, Task
 from nutdamp.schemes.optimal.linear_program import Burn
 from nutdamp.schemes.optimal.problem import DEARER, Problem
@@ -125,7 +125,7 @@ def test_a_far_target_costs_no_more_than_a_train_that_the_user_finds() -> None:
 def test_trains_are_tried_without_the_sun_and_within_on_times() -> None:
     body = aimed(spinner(channels=cross(20.0, min_on_time=0.05, max_on_time=0.4), limits=Limits(horizon=150.0)), 60, 10)
     sunny = replace(body, goal=replace(body.goal, sun=np.array([1.0, 0.0, 0.0])))
-    for one, other in zip(*(search.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
+    for one, other in zip(*(alternatives.by_other_schemes(each, shift=True) for each in (body, sunny)), strict=True):
         assert [pulse.t for pulse in one] == [pulse.t for pulse in other]
         assert violations(body, one) == []
 
