@@ -1,4 +1,4 @@
-"""Gauss-Legendre quadrature, and removal of rounding noise from numbers that are shown."""
+"""Numerics: Gauss-Legendre quadrature, rounding of bounds, and removal of rounding noise from shown numbers."""
 
 from __future__ import annotations
 
@@ -48,3 +48,11 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def down(value: float) -> float:
+    """Value rounded down to four digits: a bound must not be rounded up."""
+    if value <= 0.0 or not math.isfinite(value):
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return math.floor(value / step * (1.0 + 1e-12)) * step

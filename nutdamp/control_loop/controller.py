@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
-from nutdamp.flight.propagation import Dynamics, Path, shed
+from nutdamp.flight.dynamics import Dynamics, Path, shed
 from nutdamp.flight.propellant import Supply, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable

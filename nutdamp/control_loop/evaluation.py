@@ -14,8 +14,9 @@ import numpy as np
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
 from nutdamp.errors import Infeasible
+from nutdamp.flight.dynamics import Dynamics, Path, Push
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
-from nutdamp.flight.propagation import Dynamics, Flight, Path, Push
+from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan

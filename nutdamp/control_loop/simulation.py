@@ -12,7 +12,8 @@ from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Pilot, S
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.control_loop.stability import dead_band
-from nutdamp.flight.propagation import Dynamics, Flight, Leg, Path, make_dynamics
+from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
+from nutdamp.flight.propagation import Flight, Leg
 from nutdamp.flight.track import widest
 from nutdamp.physics import taylor
 from nutdamp.physics.triaxial import arc_cones

@@ -32,7 +32,8 @@ from nutdamp.estimation.parameters import (
     parameters,
     prior,
 )
-from nutdamp.flight.propagation import Arc, Dynamics, Flight, Path, Push, flown, make_dynamics
+from nutdamp.flight.dynamics import Arc, Dynamics, Path, Push, make_dynamics
+from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, sky, triaxial
 from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER

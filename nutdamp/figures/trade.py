@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nutdamp.common.numerics import down
 from nutdamp.figures import labels, style
 from nutdamp.figures.legends import heading, legend
 from nutdamp.figures.style import INK, MOMENTUM, MOTION, PAPER, PULSE
 from nutdamp.flight.propagation import model_name
-from nutdamp.planning.decision import down
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front, numbered
 from nutdamp.spacecraft.model import Spacecraft

@@ -18,7 +18,8 @@ from nutdamp.common.numerics import cleaned
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Unsuitable
 from nutdamp.flight.basilisk import default_step, stretches
-from nutdamp.flight.propagation import Flight, Leg, shed
+from nutdamp.flight.dynamics import shed
+from nutdamp.flight.propagation import Flight, Leg
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 

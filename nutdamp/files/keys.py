@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 class OrbitSection(Section):
-    """Where the spacecraft is at t = 0, at attitude.epoch and in attitude.frame; for messages to flight dynamics."""
+    """Position of the spacecraft at t = 0, at attitude.epoch and in attitude.frame; for messages to flight dynamics."""
 
     position: Position = Field("Position from the center, m.", ["7000 km", 0, 0])
     velocity: Velocity = Field("Velocity, m/s.", [0, "7.5 km/s", 0])
@@ -85,7 +85,7 @@ Widths = Annotated[list[PositiveTime], Length(1)] | WidthSection
 
 
 class CommandsSection(Section):
-    """What a command block may hold: so many pulses of one channel, fired by the Sun pulse."""
+    """Contents of a command block: so many pulses of one channel, fired by the Sun pulse."""
 
     delay_step: PositiveTime = Field("Resolution of the delay after the Sun pulse, s.", "2 ms")
     delay_max: PositiveTime = Field("Longest delay, s; up to a spin turn is used.", "1.9 s")
@@ -138,7 +138,7 @@ class ValveSection(Section):
 
 
 class ShedSection(Section):
-    """What the propellant in the tank gives to the moments of inertia."""
+    """Share of the propellant in the tank in the moments of inertia."""
 
     A: Shed = Field("Off the transverse moment for each kg used, kg m²/kg.", "0.4 kg m^2/kg")
     C: Shed = Field("Off the moment about axis 3 for each kg used, kg m²/kg.", "0.6 kg m^2/kg")
@@ -255,7 +255,7 @@ class SteerableSection(Section):
 
 
 class RequirementSection(Section):
-    """What a plan must reach at its end."""
+    """Requirement on the end of a plan."""
 
     nutation: AcuteAngle | None = Field("Largest nutation angle, rad, above 0 and below 90 deg.", "0.5 deg")
     momentum_shift: AcuteAngle | None = Field(
@@ -267,7 +267,7 @@ class RequirementSection(Section):
 
 
 class GoalSection(Section):
-    """Where the motion is to end; without it the angular momentum stays where it is, and the spin may change."""
+    """End of the motion; without it the angular momentum stays where it is, and the spin may change."""
 
     tilt: Tilt | None = Field(
         "Angle of the target axis from the angular momentum at t = 0, rad, below 180 deg.", "10 deg"
@@ -285,7 +285,7 @@ class GoalSection(Section):
 
 
 class LimitsSection(Section):
-    """What every schedule respects."""
+    """Limits of every schedule."""
 
     horizon: PositiveTime | None = Field("End of the planning time, s; default: 20 nutation periods.", "120 s")
     earliest: Time = Field("Earliest start of a pulse, s; default 0.", "5 s", default=0.0)

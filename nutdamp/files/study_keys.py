@@ -73,7 +73,7 @@ def by_name(value: Mapping[str, object]) -> bool:
 
 
 class ToleranceSection(Section):
-    """How far a quantity may be off: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
+    """Tolerance of a quantity: one of normal (one sigma), uniform, triangular (half width), bias (offset)."""
 
     written = "a tolerance, such as {normal: 2 %}"
 
@@ -289,7 +289,7 @@ Threshold = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT
 
 
 class LoopSensorSection(Section):
-    """What the loop sees: two rate gyros about the axes 1 and 2, or an accelerometer."""
+    """Sensor of the loop: two rate gyros about the axes 1 and 2, or an accelerometer."""
 
     kind: Literal["gyro", "accelerometer"] = Field(
         "gyro: ω1 and ω2; accelerometer: the acceleration at position along axis.", "gyro"

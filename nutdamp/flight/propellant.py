@@ -12,7 +12,7 @@ import numpy as np
 
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propagation import lightened
+from nutdamp.flight.dynamics import lightened
 from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel
 from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, VALVES, Spacecraft

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.flight.propagation import shed
+from nutdamp.flight.dynamics import shed
 from nutdamp.flight.propellant import Supply
 from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, Inputs, groups_of, list_inputs
 from nutdamp.physics import attitude

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import BadRequest, Unsuitable
-from nutdamp.flight.propagation import shed
+from nutdamp.flight.dynamics import shed
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Thruster
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propagation import Dynamics, make_dynamics
+from nutdamp.flight.dynamics import Dynamics, make_dynamics
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import BadRequest
 from nutdamp.flight import propagation
+from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
-from nutdamp.flight.propagation import Flight, shed
+from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel, cones_used
 from nutdamp.montecarlo.closed_form import Ends
 from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from nutdamp.common import results, work
+from nutdamp.common.numerics import down
 from nutdamp.errors import NutdampError
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
@@ -589,14 +590,6 @@ def _given_length(plan: Plan) -> Iterator[str]:
             "on the free motion of a symmetric body, and of a fixed length their starts alone cannot make up for all "
             "of the difference; without --on-time their length is corrected too"
         )
-
-
-def down(value: float) -> float:
-    """Value rounded down to four digits: a bound must not be rounded up."""
-    if value <= 0.0 or not math.isfinite(value):
-        return value
-    step = 10.0 ** (math.floor(math.log10(value)) - 3)
-    return math.floor(value / step * (1.0 + 1e-12)) * step
 
 
 def _degrees(angle: float) -> str:

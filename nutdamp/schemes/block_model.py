@@ -20,7 +20,8 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propagation import Flight, make_dynamics, shed
+from nutdamp.flight.dynamics import make_dynamics, shed
+from nutdamp.flight.propagation import Flight
 from nutdamp.flight.propellant import Supply
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.batch import Bodies, MotionStretch

@@ -11,8 +11,8 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, listed
 from nutdamp.flight import propagation
+from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import left_by
-from nutdamp.flight.propagation import shed
 from nutdamp.schemes.block_model import BlockModel, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockSearch, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions

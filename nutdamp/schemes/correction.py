@@ -17,7 +17,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.flight.propellant import supplied
 from nutdamp.physics import attitude
 from nutdamp.schemes.catalogue import Scheme, SchemeOptions

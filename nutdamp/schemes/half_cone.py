@@ -16,7 +16,7 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.flight.propagation import Arc
+from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import correction, one_pulse, pulse_pairs
 from nutdamp.schemes.catalogue import HalfConeOptions

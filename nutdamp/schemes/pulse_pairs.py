@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propagation import Arc
+from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import correction
 from nutdamp.schemes.correction import tolerable

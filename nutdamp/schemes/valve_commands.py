@@ -15,7 +15,7 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.flight.propagation import lightened, shed
+from nutdamp.flight.dynamics import lightened, shed
 from nutdamp.flight.propellant import Supply, supplied
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.correction import TAIL, Correction, misses

@@ -20,12 +20,13 @@ from support.golden import check_text
 from support.layout import check_layout, texts
 from support.shown import WIDE, check_star, flight_picture, heading, legend_words
 
+from nutdamp.common.numerics import down
 from nutdamp.figures import certificate as primer
 from nutdamp.figures import schemes, style, trade
 from nutdamp.figures.style import PULSE
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
-from nutdamp.planning.decision import Comparison, compare, down
+from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front, Point, certificate

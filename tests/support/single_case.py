@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo import propagated
 from nutdamp.montecarlo.cases import DispersedCases, DispersedModel, Thrusting, number_of, triple
 from nutdamp.montecarlo.inputs import Draws

@@ -43,8 +43,9 @@ from nutdamp.files.ccsds.message import (
     number,
 )
 from nutdamp.files.export import AttitudeSegment, Reference, interpolated
+from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import momentum_gained
-from nutdamp.flight.propagation import Flight, shed
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Inertia, Orbit, Spacecraft, Vector

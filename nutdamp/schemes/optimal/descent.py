@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.flight.propagation import make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
 from nutdamp.schemes.optimal import refinement
 from nutdamp.schemes.optimal.refinement import EndEquations

@@ -17,7 +17,8 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
+from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.schemes.optimal import bounds, refinement
 from nutdamp.schemes.optimal.bounds import Allowed

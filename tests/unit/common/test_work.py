@@ -12,7 +12,7 @@ from support.places import case
 
 from nutdamp.common import work
 from nutdamp.files.reader import load_spacecraft
-from nutdamp.flight import propagation
+from nutdamp.flight import dynamics, propagation
 from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import compare
@@ -48,9 +48,9 @@ def test_flights_count_by_legs_and_steps() -> None:
         with work.budget("flight", 1e9) as spent:
             flown = propagation.flown(body, Schedule(), until)
         if body.inertia.symmetric:
-            assert 0.0 < spent.done == propagation.LEG * len(flown.legs)
+            assert 0.0 < spent.done == dynamics.LEG * len(flown.legs)
         else:
-            assert spent.done > propagation.STEP * flown.steps > 10.0
+            assert spent.done > dynamics.STEP * flown.steps > 10.0
 
 
 @pytest.mark.parametrize("most", [20.0, deep(500.0)])

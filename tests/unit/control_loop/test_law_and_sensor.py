@@ -18,7 +18,7 @@ from nutdamp.control_loop.controller import Watch
 from nutdamp.control_loop.law import ComplexArray, Firing, Law
 from nutdamp.control_loop.sensor import Estimator, Signal, gain, is_blind, lag
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propagation import make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 

@@ -16,8 +16,10 @@ from support.strategies import schedules, symmetric_spinners, triaxial_spinners
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.files.reader import load_spacecraft
+from nutdamp.flight import dynamics as motion
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Dynamics, Flight, make_dynamics
+from nutdamp.flight.dynamics import Dynamics, make_dynamics
+from nutdamp.flight.propagation import Flight
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
@@ -63,7 +65,7 @@ def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -
     assert len(changed) == 2 * (8 - moved) + 1
     integrated = [leg for leg in changed if leg.end > leg.start]
     steps = sum(leg.path.steps for leg in integrated)
-    expected = len(changed) * propagation.LEG + len(integrated) * propagation.PULSE + steps * propagation.STEP
+    expected = len(changed) * motion.LEG + len(integrated) * motion.PULSE + steps * motion.STEP
     assert trial.done == pytest.approx(expected)
 
 
@@ -76,7 +78,7 @@ def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
 
 
 def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(propagation, "REMEMBERED", 3)
+    monkeypatch.setattr(motion, "REMEMBERED", 3)
     body = spinner()
     remembering = make_dynamics(body).remembering()
     for made in (train(2), train(2, 1), train(2, 0)):

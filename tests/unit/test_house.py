@@ -1,0 +1,80 @@
+"""The layout of the code, as `nutdamp/guide/contributing.md` describes it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+
+import pytest
+from support import places
+
+PACKAGE = places.ROOT / "nutdamp"
+LOOSE = {"__init__", "__main__", "api", "errors", "units"}
+LONGEST = 600
+"""Lines of a module."""
+
+RIDDLES = re.compile(r"(What|Whether|How|Which|That|Why|Where|When)\b")
+"""First words of a docstring that does not say what the thing is."""
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """The modules by their path below the package."""
+    return {
+        path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted(PACKAGE.rglob("*.py"))
+    }
+
+
+def documented(tree: ast.Module) -> Iterator[str]:
+    """The docstrings of a module, its classes and its functions."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
+            yield text
+
+
+def test_packages_are_folders_and_nothing_more() -> None:
+    markers = [path for path in PACKAGE.rglob("__init__.py") if path.parent != PACKAGE]
+    assert [path for path in markers if path.read_text(encoding="utf-8")] == []
+    assert {path.stem for path in PACKAGE.glob("*.py")} == LOOSE
+
+
+def test_a_module_can_be_read_in_a_sitting() -> None:
+    lines = {path: len((PACKAGE / path).read_text(encoding="utf-8").splitlines()) for path in trees()}
+    assert {path: count for path, count in lines.items() if count > LONGEST} == {}
+
+
+def test_a_class_name_stands_once() -> None:
+    named = defaultdict(list)
+    for path, tree in trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                named[node.name].append(path)
+    assert {name: paths for name, paths in named.items() if len(set(paths)) > 1} == {}
+
+
+def test_no_module_takes_what_another_keeps_to_itself() -> None:
+    taken = [
+        (path, alias.name)
+        for path, tree in trees().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("nutdamp.")
+        for alias in node.names
+        if alias.name.startswith("_")
+    ]
+    assert taken == []
+
+
+@pytest.mark.parametrize("package", sorted({path.partition("/")[0] for path in trees() if "/" in path}))
+def test_docstrings_say_what_a_thing_is(package: str) -> None:
+    riddles = [
+        (path, text.splitlines()[0])
+        for path, tree in trees().items()
+        if path.startswith(f"{package}/")
+        for text in documented(tree)
+        if RIDDLES.match(text)
+    ]
+    assert riddles == []
