@@ -227,7 +227,8 @@ def _dispersions(draws: Draws, file: dict[str, Any], turn: float, spin: float) -
         "attitude": spread(0.2, "deg"),
     }
     if "valve" in file and not any("impulse_bit" in one for one in file["thrusters"]):
-        known |= {key: spread(0.2 * turn, "ms") for key in file["valve"] if key != "on_time_is"}
+        times = {key: float(time.split()[0]) for key, time in file["valve"].items() if key != "on_time_is"}  # ms
+        known |= {key: spread(min(0.2 * turn, 0.3 * time), "ms") for key, time in times.items()}
     if any("impulse_bit" in one for one in file["thrusters"]):
         known["impulse_bit"] = spread(2.0, "%")
     if "cold" in file:
