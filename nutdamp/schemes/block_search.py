@@ -100,7 +100,7 @@ class BlockSequence(NamedTuple):
 
 
 class FlownSequence(NamedTuple):
-    """What was found, flown: how good it is, those that break a limit last, then the earlier end, and its pulses."""
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
 
     rank: tuple[bool, float, float, float]
     made: Schedule
@@ -108,7 +108,7 @@ class FlownSequence(NamedTuple):
 
 
 class BlockSearch:
-    """The blocks of one spacecraft: which there are, and how good they are in closed form."""
+    """The command blocks of one spacecraft and their ranking in closed form."""
 
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
@@ -227,7 +227,7 @@ class BlockSearch:
         return np.asarray(requirements.left_of(bound.part, left, self.body) / bound.most)
 
     def _spaced(self, every: int) -> bool:
-        """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
+        """True where pulses in one of ``every`` spins keep limits.gap."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
     def _counts(self, start: BlockState, every: int) -> NDArray[np.int64]:
@@ -262,7 +262,7 @@ class BlockSearch:
             within = min(enough, 10.0 * within, most)
 
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
+        """Least miss of blocks of each width and number, (w, n), in shares of its bound.
 
         Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
         shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
@@ -335,7 +335,7 @@ class BlockSearch:
 
     @cached_property
     def small(self) -> bool:
-        """Whether there are so few blocks that all are looked at."""
+        """True where blocks are so few that all are looked at."""
         widths = sum(len(commandable_widths(self.commands, one)) for one in self.channels)
         return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
 
@@ -372,13 +372,13 @@ class BlockSearch:
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
     def _longer_round(self, before: BlockState, after: BlockState) -> NDArray[np.bool_]:
-        """Whether H has gone round the Sun the longer way to the target, or once more: far for a few degrees."""
+        """True where H has gone round the Sun the longer way to the target, or once more."""
         if self.body.goal.axis is None:
             return np.zeros((), dtype=bool)
         return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
 
     def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
-        """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
+        """True where a pulse of the blocks is on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
         found = np.zeros(shape, dtype=bool)
         if not len(self.dark[0]):
@@ -423,7 +423,7 @@ class BlockSearch:
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
     def flown(self, found: BlockSequence) -> FlownSequence:
-        """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
+        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
         if found.blocks in self._flights:
             return self._flights[found.blocks]
         made = fired(self.body, found.blocks)
@@ -435,7 +435,7 @@ class BlockSearch:
         return self._flights[found.blocks]
 
     def doubted(self, flights: list[FlownSequence]) -> None:
-        """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
+        """Fly sequences cheaper than the best of ``flights``, the cheapest first, until one complies; add them."""
         best = min((one.rank for one in flights if not one.rank[0]), default=None)
         most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
         known = {one.found.blocks for one in flights}
@@ -497,7 +497,7 @@ class BlockSearch:
 
 
 def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
-    """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
+    """The first sequence of each kind: flights may differ where closed forms do not."""
     kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
     for one in ranked:
         kinds.setdefault(tuple((block.channel, block.every) for block in one.blocks), one)
@@ -505,7 +505,7 @@ def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
 
 
 def _promising(found: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
-    """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
+    """Sequences that leave least, and the front of miss against cost: ``most`` of each."""
     ranked, front = sorted(found, key=lambda one: one.rank), list[BlockSequence]()
     for one in ranked:
         if not front or one.rank[1] < front[-1].rank[1]:

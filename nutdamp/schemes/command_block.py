@@ -24,7 +24,7 @@ from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 ANY = "finer steps of delay and width in commands, or a longer limits.horizon"
-"""What may help where nothing is known to hinder."""
+"""Advice without a limit known to hinder."""
 
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> str:
@@ -41,7 +41,7 @@ def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> st
 
 
 def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
-    """That blocks are on no ``tick`` (s), where their steps are others than those."""
+    """Note on blocks off the ``tick`` (s); empty where all their steps are on it."""
     if tick is None:
         return ()
     steps = np.array([commands.delay_step, *commands.widths]) / tick
@@ -82,7 +82,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
 
 
 def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
-    """By how much one pulse of a channel turns H more than one of the width before, or than none, rad: the least."""
+    """Least difference, rad, by which pulses of neighbouring widths turn H; none is a width too."""
     assert model.body.commands is not None
     widths = commandable_widths(model.body.commands, channel)
     if len(widths):
@@ -106,7 +106,7 @@ FLOWN_PULSES = 1000
 """Pulses that are flown, after which no further sequence is."""
 
 ROUNDS = 3
-"""How often, each time from the best flights so far."""
+"""Searches near the best flights so far."""
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:

@@ -72,7 +72,7 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
 
 
 def _headline(compared: Comparison, plan: Plan, robust: str) -> Text:
-    """What to fly: scheme, pulses, cost and end."""
+    """Headline of the plan to fly: scheme, pulses, cost and end."""
     pulses = plan.pulses
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
@@ -122,7 +122,7 @@ def _left(bound: Bound, value: float | None) -> str:
 
 
 def _ends(decision: Decision) -> RenderableType:
-    """How the flight ends, flown and by the impulse sum (17), and where the spin axis points."""
+    """End of the flight, flown and by the impulse sum (17), and direction of the spin axis."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
     table, formula = facts(), plan.residual
     angles = [f"nutation {short(left.nutation)}", f"body cone {short(left.body_cone)}"]
@@ -200,14 +200,14 @@ def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
 
 
 def _infeasible(compared: Comparison) -> Iterator[str]:
-    """Why schemes have no plan."""
+    """Reasons of schemes without a plan."""
     for plan in compared.plans:
         if not plan.feasible:
             yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
 
 
 def _remarks(compared: Comparison, chosen: Plan) -> Iterator[str]:
-    """What the scheme to fly says of its plan."""
+    """Notes of the scheme to fly on its plan."""
     yield from (f"{chosen.scheme}: {text}" for text in (notes_on(chosen) if chosen in compared.plans else ()))
 
 

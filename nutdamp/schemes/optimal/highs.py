@@ -1,8 +1,4 @@
-"""HiGHS, reachability test.
-
-A small linear program that grows by columns, solved by HiGHS in whichever way gets to its end.
-
-Whether firings for at most so long each supply a goal: the nearest point of what they can supply.
+"""Linear programs that grow by columns, solved by HiGHS, and a test of reachability.
 
 All that slots can supply is a convex set, and the point of it that is farthest in a direction is known at once: every
 slot whole that helps that way. Wolfe (1976, Mathematical Programming 11) finds the point nearest to the goal from such
@@ -150,7 +146,7 @@ FLAT = 1e-12
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
-    """Whether some parts between 0 and 1 of the columns ``most`` (m, n) add up to ``goal`` (m,).
+    """True where some parts between 0 and 1 of the columns ``most`` (m, n) add up to ``goal`` (m,).
 
     ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after `CORNERS`.
     """

@@ -1,4 +1,4 @@
-"""Where strong thrusters leave little time: schedules from very many starts, each brought to the cheapest near it.
+"""Schedules from very many starts, each brought to the cheapest near it, for strong thrusters and short horizons.
 
 Sequences of a few channels at random moments, corners of the horizon among them, are descended as ideal impulses,
 which fly in closed form; the better half goes on, twice. About the best of them every channel is then priced at every
@@ -27,7 +27,7 @@ ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))
 """Steps of descent, and share of the sequences that goes on after them."""
 
 UNMET_COST = 100.0
-"""What a miss costs beside the propellant when the better part is chosen, per |H|, over the least cost."""
+"""Cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost."""
 
 SPARE = 2
 """Pulses more than equations when some are added: what they make needless goes back to nothing."""
@@ -255,9 +255,9 @@ def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> St
 
 
 def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Vector) -> Vector:
-    """What a small impulse of each channel at moments ``t`` (k,) saves of a sequence's cost, (channels, k), over all.
+    """Saving of a sequence's cost by a small impulse of each channel at moments ``t`` (k,), (channels, k), over all.
 
-    By the prices of the equations: what the impulse changes in them, less what it costs.
+    By the prices of the equations: its change in them, less its cost.
     """
     count, n = len(which), len(task.channels) * len(t)
     channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))

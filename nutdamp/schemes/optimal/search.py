@@ -69,7 +69,7 @@ MOST_LOOSE = 5000.0
 """Units that may be spent where H may move, so that some are left for schedules that keep it."""
 
 HASTE = 0.0008
-"""How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
+"""Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
 
 NEAR = 0.05
 """rad left from which a flight is near enough to be refined."""
@@ -78,7 +78,7 @@ SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
 
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""By how much more than the program's least time a schedule may need, tried in turn."""
+"""Shares added to the program's least time, tried in turn."""
 
 
 TRIED = 6
@@ -137,7 +137,7 @@ def _fewest(search: _LeastCostSearch) -> Schedule:
 
 
 class _FlownSchedule(NamedTuple):
-    """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
+    """A schedule, with its end error, rad (0: as good as none), and its cost."""
 
     left: float
     price: float
@@ -194,12 +194,12 @@ class _LeastCostSearch(Problem):
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
     def found(self) -> bool:
-        """Whether a schedule is found with this very horizon."""
+        """True where a schedule is found with this very horizon."""
         least = self.program().solve()
         return least.unmet <= UNMET and self.settled(least.cost) is not None
 
     def cured(self) -> str:
-        """Why the program has no solution, and what would do: each cure that is named was tried, or says that not."""
+        """Reason for a program without solution, and its cure: each that is named was tried, or says that not."""
         goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
         freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).found()
@@ -253,7 +253,7 @@ class _LeastCostSearch(Problem):
             ) from None
 
     def astray(self, schedule: Schedule | None) -> bool:
-        """Whether there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
+        """True where there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
         most = math.inf if self.options.shift is None else self.options.shift
         return schedule is None or self.flown(schedule).residual.axis_error > most
 
@@ -268,7 +268,7 @@ class _LeastCostSearch(Problem):
 
     @property
     def looser(self) -> bool:
-        """Whether H may end elsewhere, so that a schedule that keeps it, or brings it to the target, will do too."""
+        """True where H may end elsewhere, so that a schedule that keeps it, or reaches the target, will do too."""
         return self.options.free_axis or self.options.shift is not None
 
     def cheapest(self, first: Solution) -> Schedule | None:
@@ -309,7 +309,7 @@ class _LeastCostSearch(Problem):
         return schedule if self.hurried(other) and not self.hurried(schedule) else self.cheaper(schedule, other)
 
     def hurried(self, schedule: Schedule) -> bool:
-        """Whether a channel is on again before it was off for its shortest on-time: valves take their time."""
+        """True where a channel is on again before it was off for its shortest on-time: valves take their time."""
         each = ((channel, [pulse for pulse in schedule if pulse.channel == channel.name]) for channel in self.channels)
         return any(
             after.start - before.end < channel.min_on_time - TOUCHING
@@ -336,7 +336,7 @@ class _LeastCostSearch(Problem):
         return best
 
     def doubtful(self, schedule: Schedule | None, first: Solution) -> bool:
-        """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
+        """True where a schedule may not be the cheapest, so that very many starts are worth their time.
 
         So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
         as long as the rigorous bound does not prove it cheap enough.
@@ -353,12 +353,12 @@ class _LeastCostSearch(Problem):
         return not self.proved(schedule, PROVED)
 
     def proved(self, schedule: Schedule | None, share: float) -> bool:
-        """Whether the rigorous bound proves that nothing is cheaper than a schedule by more than that share of it."""
+        """True where a schedule costs at most that ``share`` more than the rigorous bound."""
         proof = None if schedule is None else self.rigorous(schedule)
         return schedule is not None and proof is not None and self.price(schedule) <= proof * (1.0 + share)
 
     def task(self) -> Task:
-        """What is to be done, for the descents."""
+        """Task of the descents."""
         return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
 
     def descended(self, known: Schedule | None) -> Schedule | None:
@@ -400,7 +400,7 @@ class _LeastCostSearch(Problem):
         return self.best(candidates)
 
     def others(self, least: float) -> Schedule | None:
-        """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
+        """Best plan of other schemes, as it is or corrected to cost less: they know large angles and far targets."""
         names = {channel.name: channel for channel in self.channels}
         candidates: list[_FlownSchedule] = []
         flights: list[Flight] = []
