@@ -155,10 +155,10 @@ def hastened(
             share = None if over() else _least_share(problem, span, small_angles)
             later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
             schedules = (cheapest(begin + part * span) for part in later if not over())
-            made = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
-            if made is None:
+            earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
+            if earlier is None:
                 break
-            best = made
+            best = earlier
     return best
 
 

@@ -211,7 +211,7 @@ class PulseParameters:
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
         names = {channel.name: channel for channel in spacecraft.channels}
         self.channels = [names[pulse.channel] for pulse in schedule]
-        self.made = schedule
+        self.original = schedule
         pace = 1.0 / abs(spacecraft.spin)
         self.room = rooms(spacecraft, schedule.pulses)
         start: list[float] = []
@@ -233,7 +233,7 @@ class PulseParameters:
         pulses = (
             channel_pulse(channel, float(t), float(on)) for channel, (t, on) in zip(self.channels, pairs, strict=True)
         )
-        return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
+        return Schedule(tuple(pulses), self.original.notes, self.original.bounds)
 
     def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: EndEquations, step: float) -> Vector:
         """Slopes of the equations by the scaled parameters, (equations, 2k) N m s."""

@@ -141,7 +141,7 @@ class _FlownSchedule(NamedTuple):
 
     left: float
     price: float
-    made: Schedule
+    schedule: Schedule
 
 
 class _LeastCostSearch(Problem):
@@ -171,15 +171,17 @@ class _LeastCostSearch(Problem):
             end = begin + span * (1.0 + margin)
             if end >= horizon:
                 break
-            if _LeastCostSearch(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).has_schedule():
                 high = end
                 break
             low = end
-        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).found():
+        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).has_schedule():
             return self  # shorter ones are looked at on the way to a schedule
         while high - low > SHARP * high:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if _LeastCostSearch(self.within(middle), self.options).found() else (middle, high)
+            low, high = (
+                (low, middle) if _LeastCostSearch(self.within(middle), self.options).has_schedule() else (middle, high)
+            )
         return _LeastCostSearch(self.within(high), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
@@ -193,7 +195,7 @@ class _LeastCostSearch(Problem):
         equal = [schedule for schedule in schedules if spent(schedule) <= least * (1.0 + SAME_COST)]
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
-    def found(self) -> bool:
+    def has_schedule(self) -> bool:
         """True where a schedule is found with this very horizon."""
         least = self.program().solve()
         return least.unmet <= UNMET and self.settled(least.cost) is not None
@@ -202,7 +204,7 @@ class _LeastCostSearch(Problem):
         """Reason for a program without solution, and its cure: each that is named was tried, or says that not."""
         goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
-        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).found()
+        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).has_schedule()
         return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
 
     def long_enough(self, needed: float) -> float | None:
@@ -214,7 +216,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted():
                 return None
             end = float(f"{needed * (1.0 + margin):.4g}")
-            if _LeastCostSearch(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).has_schedule():
                 return end
         return None
 
@@ -449,6 +451,6 @@ class _LeastCostSearch(Problem):
 
         All that leave up to `DAMPED_ANGLE` leave as little.
         """
-        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.made)]
+        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
         best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
-        return None if best is None else best.made
+        return None if best is None else best.schedule
