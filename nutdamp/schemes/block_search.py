@@ -35,7 +35,7 @@ FLOWN = 12
 """Sequences of blocks that are flown; as many more where none of them complies."""
 
 GENTLE = 10
-"""Times as many sequences of which these are those with the smallest pulses."""
+"""Multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too."""
 
 ALL_DELAYS = 16
 """Delays up to which all are looked at, if there are no more."""
@@ -77,7 +77,7 @@ CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
 SURELY = 3.0
-"""Times its error by which the length of a block that ends at the target differs from the way there, at most."""
+"""Largest difference of a block's length from the way to the target, over its end error."""
 
 LOWER = 0.98
 """Share of the nutation above which it does not count as lowered."""
@@ -87,7 +87,7 @@ LOOKED = 2e-6
 
 
 class BlockSequence(NamedTuple):
-    """Blocks, the motion after them in closed form, and how good that is: the less, the better.
+    """Blocks, the motion after them in closed form, and their rank: the less, the better.
 
     ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
     ``share``: the share.
@@ -475,7 +475,7 @@ class BlockSearch:
         return [self._in_form(sequence) for sequence in _by_blocks(chosen).values()]
 
     def _in_form(self, sequence: BlockSequence) -> BlockSequence:
-        """The same, ranked by the closed form alone."""
+        """The sequence, ranked by the closed form alone."""
         left = self.model.left(sequence.state)
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)

@@ -41,7 +41,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
 QUARTERINGS = 9
-"""Times that what lies between two times is looked at in quarters: to a 1e-5 of a slot."""
+"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot."""
 
 PARTS = 4
 """Parts of a slot in which the gain of a channel that is on for long is summed."""
@@ -58,7 +58,7 @@ ROUNDING = 1e-12
 
 
 class Lowered(NamedTuple):
-    """The best ``bound`` by prices over a ``factor``; ``gained`` is what channels on for long gain by them."""
+    """The best ``bound`` by prices over a ``factor``; ``gained``: gain of channels on for long by them."""
 
     bound: float
     factor: float
@@ -105,7 +105,7 @@ def stretches(program: Program, spans: Sequence[tuple[float, float]]) -> tuple[V
 
 
 def slackened(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The windows with what rounding may overstep."""
+    """The windows, widened by the tolerance for rounding."""
     return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
 
 
@@ -196,7 +196,7 @@ LOOKS = 33
 """Directions looked at at once where the best is looked for."""
 
 NARROWINGS = 9
-"""Times that the search is narrowed to a sixteenth: to 1e-11 rad."""
+"""Narrowings of the search to a sixteenth: to 1e-11 rad."""
 
 
 class Allowed(NamedTuple):

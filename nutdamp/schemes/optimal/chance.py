@@ -98,7 +98,7 @@ class Weights(NamedTuple):
 
 
 class ChanceModel:
-    """The cones of a ``program`` of small angles; ``goal`` (5,) N m s is what firing is to add."""
+    """The cones of a ``program`` of small angles; ``goal`` (5,) N m s: required sum of the firing."""
 
     def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.uncertain, self.limits = program, uncertain, limits
@@ -210,10 +210,10 @@ class ChanceModel:
 
 
 DIRECTIONS = 72
-"""In which the cones of two equations are looked at."""
+"""Directions in which the cones of two equations are looked at."""
 
 BEGUN = 16
-"""Of them, tangents to begin with, without margin."""
+"""Directions of the first tangents of such a cone, without margin."""
 
 WORST = 3
 """Tangents added to a cone at a time."""
@@ -228,7 +228,7 @@ PRICE = 1e-6
 """Relative reduced cost below which a column does not enter."""
 
 ROUNDS = 40
-"""Of the linear program, each with more tangents or columns."""
+"""Rounds of the linear program, each with more tangents or columns."""
 
 EXCESS = 10.0
 """Cost of passing all limits by themselves, over that of all there is to do: done where hardly anything else helps."""
@@ -238,7 +238,7 @@ SOME = 1e-9
 
 
 class Sure(NamedTuple):
-    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: what is left then."""
+    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
 
     burns: tuple[Burn, ...]
     excess: float
@@ -301,7 +301,7 @@ class ChanceProgram:
         return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
 
     def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
-        """Of a tangent, for one unit of each column, over the scale."""
+        """Coefficients of a tangent for one unit of each column, over the scale."""
         return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:

@@ -32,7 +32,7 @@ LINES = 4
 """Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
 
 NEWTON_STEPS = 25
-"""Of the lengths of the burns."""
+"""Newton steps for the lengths of the burns."""
 
 CONVERGED = 1e-12
 """Largest end error, over |H|."""

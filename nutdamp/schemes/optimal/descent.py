@@ -38,7 +38,7 @@ FLIGHT, CASE = 0.05, 0.0003
 
 @dataclass(frozen=True, eq=False)
 class Sequences:
-    """``which`` (b, n): the channels of b sequences of n pulses, by number.
+    """Channels ``which`` (b, n), by number, of b sequences of n pulses.
 
     ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n) s: its on-time.
     """
@@ -195,11 +195,11 @@ class DescentState:
     error: Vector
 
     def of(self, rows: Any) -> DescentState:
-        """Those of some sequences."""
+        """The states of some sequences."""
         return DescentState(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def put(self, rows: Any, other: DescentState) -> None:
-        """Replace those of some sequences."""
+        """Replace the states of some sequences."""
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(other, field.name)
 

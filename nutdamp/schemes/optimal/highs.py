@@ -28,7 +28,7 @@ costs, against which its tolerances count, it mostly does not at another; interi
 
 
 MOST_STEPS = 100_000
-"""Of the simplex or of the interior points, in one way of solving."""
+"""Steps of the simplex or of the interior points, in one way of solving."""
 
 
 SMALL, NONZERO = 10_000, 1e-2
@@ -36,7 +36,7 @@ SMALL, NONZERO = 10_000, 1e-2
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side of the equations costs.
+    """Unknowns ``x`` (n,), and ``prices`` (m,) of one more of each right-hand side of the equations.
 
     ``shadows`` are the same of the limits, at most zero.
     """
@@ -127,7 +127,7 @@ class _SilentSolver(highspy.Highs):
         self.setOptionValue("primal_feasibility_tolerance", 1e-9)
 
     def enableCallbacks(self) -> None:
-        """Called by the constructor; in highspy 1.16 this prints a banner to stdout, where CSV and JSON go."""
+        """No banner: in highspy 1.16 the constructor calls this, which prints one to stdout, where CSV and JSON go."""
         self.setOptionValue("output_flag", False)
         highspy.Highs.enableCallbacks(self)
 

@@ -82,7 +82,7 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
 
 
 def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
-    """Moments (n,) s at which what is worth ``worth`` (n, 5) at even ``times`` (n, 5) s is worth most, and how much.
+    """Moments (n,) s of the largest worth, and that worth, from ``worth`` (n, 5) at even ``times`` (n, 5) s.
 
     By the parabola through the best of the five and those beside it; at an end of them, that end.
     """
@@ -112,7 +112,7 @@ PRICE = 1e-7
 """Relative reduced cost below which a column cannot lower the cost any more."""
 
 PEAK = 1e-6
-"""The same for the best moment of a strong channel, which may lie ever so little beside one taken."""
+"""Relative reduced cost for the best moment of a strong channel, which may lie close beside one taken."""
 
 BEST = 250
 """Columns taken in per round, the best priced first."""
@@ -143,7 +143,7 @@ SOME = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
+    """Burns of least ``cost`` in time order; ``unmet``: share of all there is to do that columns cannot supply.
 
     Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the target H is to end,
     where it may. ``prices`` (equations,) are what one more N m s of each goal costs, zero where that is not known.
@@ -343,7 +343,7 @@ class Program:
         return np.asarray(worth)
 
     def _gains(self, weights: Vector) -> Vector:
-        """The same, less what it costs."""
+        """Worth of one unit of each channel in each slot, less its cost, (channels, slots)."""
         gains = self._worth(weights)
         cost = (self._price / self._dearest)[:, None]
         gains -= cost * self._dearness(self.centres) if self.haste else cost  # large: in place

@@ -33,7 +33,7 @@ SPARE = 2
 """Pulses more than equations when some are added: what they make needless goes back to nothing."""
 
 ADDITIONS = 2
-"""Times that pulses are added."""
+"""Rounds in which pulses are added."""
 
 MOMENTS = 97
 """Moments at which each channel is priced."""
@@ -48,7 +48,7 @@ FOUND = 1e-6
 """Largest miss, over |H|, of a schedule of ideal impulses."""
 
 EXACT = 1e-10
-"""The same of a schedule flown through real widths."""
+"""Largest miss, over |H|, of a schedule flown through real widths."""
 
 NEAR = 1.03
 """Schedules of ideal impulses so much dearer than the best go on to the true motion."""
@@ -57,13 +57,13 @@ NEEDLESS = 1e-3
 """Share of all there is to do below which a pulse may be left out."""
 
 NOTHING = 1e-10
-"""The same share below which it is left out even where nothing makes good for it."""
+"""Share of all there is to do below which a pulse is left out even where nothing makes good for it."""
 
 HALF = 0.5
 """Share of the least on-time from which a pulse is lengthened to it; shorter ones are left out."""
 
 WIDE, MOST_KICKS = 0.25, 24
-"""rad of the faster turn from which pulses are first taken as several kicks, and the most of them."""
+"""Angle of the faster turn, rad, from which pulses are first taken as several kicks, and the most of them."""
 
 CLOSE = 1e-5
 """Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended."""
@@ -136,7 +136,7 @@ def _pulses(task: Task, spare: int) -> int:
 
 
 def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator) -> Starts:
-    """``count`` sequences of random channels and moments; many begin or end with the time there is."""
+    """Random channels and moments of ``count`` sequences; many begin or end with the time there is."""
     limits, horizon = task.body.limits, task.body.horizon
     which = rng.integers(len(task.channels), size=(count, pulses))
     share = np.sort(rng.uniform(size=(count, pulses)), axis=1)
@@ -226,7 +226,7 @@ def _screened(task: Task, starts: Starts) -> _Best:
 
 
 def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> Starts | None:
-    """Each of the best with pulses more, where they are worth most; three choices of each."""
+    """The best sequences with more pulses, where they are worth most; three choices of each."""
     grid = np.linspace(task.body.limits.earliest, task.body.horizon, MOMENTS)
     every: list[Moments] = []
     for row in range(len(best.left)):

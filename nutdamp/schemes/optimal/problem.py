@@ -37,7 +37,7 @@ THRIFT = 0.004
 """Share of the least cost that is given away for fewer pulses."""
 
 GAIN = 0.0005
-"""The same where there are few, and share that is not worth another search."""
+"""Share of the cost given away where there are few, and share that is not worth another search."""
 
 
 class Unrepairable(Exception):
@@ -45,7 +45,7 @@ class Unrepairable(Exception):
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
-    """As few burns as hardly cost more than ``cost``, or whatever they cost: the longest are kept and may grow.
+    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow.
 
     The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
     """
@@ -101,7 +101,7 @@ def _repaired(program: Program, solution: Solution) -> Solution:
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
-    """Forbid slots at regular distances about too long burns, so that no burn can be too long; whether there are any.
+    """Forbid slots at regular distances about too long burns, so that no burn can be too long; true if there are any.
 
     Between two pulses the thruster is off for the gap, and no shorter than its shortest pulse: valves take their time.
     """
@@ -167,16 +167,16 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 
 
 LEFT = math.radians(1e-6)
-"""rad of nutation and distance from the target, and share of the spin, below which a plan has been found."""
+"""Largest nutation and distance from the target, rad, and spin error, as a share, of a plan."""
 
 LATEST = 64.0
-"""Times the horizon up to which a feasible one is looked for, to name it."""
+"""Multiple of the horizon up to which a feasible one is looked for, to name it."""
 
 SHARPEST = 1e-3
 """Relative accuracy of a least time by the program of small angles."""
 
 NAMED = 5e-3
-"""The same where it is only advice."""
+"""Relative accuracy of a least time that is only advice."""
 
 
 DEARER = 0.03

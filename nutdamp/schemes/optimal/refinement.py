@@ -59,7 +59,7 @@ class EndEquations:
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """``rows`` gives for times (n,) s what one N m s about each body axis adds to the equations, (n, equations, 3).
+    """Coefficients ``rows`` (n, equations, 3) of one N m s about each body axis at times (n,) s.
 
     ``goal`` (equations,) N m s is what all pulses together are to add. ``turning`` (equations,) rad/s are the rates at
     which the effects turn, for what is lost to a width.
@@ -86,7 +86,7 @@ class Influence:
 
 
 def growth_from(spacecraft: Spacecraft) -> float:
-    """s from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
+    """Time, s, from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
     growth = spacecraft.growth
     return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
 
@@ -173,7 +173,7 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
 
 
 def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
-    """`_turned_back` where dissipation changes ω3: on coasts it is ω/ω3, or tan θ, that grows by e^{κt} exactly."""
+    """Factor `_turned_back` where dissipation changes ω3: on coasts ω/ω3, or tan θ, grows by e^{κt} exactly."""
     body = flight.spacecraft
     knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
     grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
@@ -349,7 +349,7 @@ def refine(
     step: float,
     fly: Callable[[Schedule], Flight],
 ) -> Schedule:
-    """``schedule`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
+    """The ``schedule`` with centres and on-times of its pulses moved, as little as it takes, to meet ``equations``.
 
     ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
     leaves is for the caller to judge.

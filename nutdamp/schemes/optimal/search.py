@@ -33,7 +33,7 @@ from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
 CHOICES = 3
-"""Times that burns are chosen among all channels and moments: at small angles, then along the flight before."""
+"""Choices of burns among all channels and moments: at small angles, then along the flight before."""
 
 AIMS = 8
 """Flights along which the burns chosen are corrected, at most."""
@@ -57,10 +57,10 @@ STRONG = 0.3
 """Inertial periods within which a strong channel does all there is to do."""
 
 PROVED = 0.002
-"""Share above the rigorous bound below which they are not: there is little to be saved."""
+"""Share above the rigorous bound below which very many starts are not tried."""
 
 EQUAL = 1e-6
-"""The same where what H-keeping schedules cost is not looked at any more."""
+"""Share above the rigorous bound below which schedules that keep H are not tried."""
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
@@ -72,7 +72,7 @@ HASTE = 0.0008
 """Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
 
 NEAR = 0.05
-"""rad left from which a flight is near enough to be refined."""
+"""End error, rad, below which a flight is refined."""
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
@@ -82,10 +82,10 @@ MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 
 
 TRIED = 6
-"""So many of them, to name a horizon that is long enough..."""
+"""Margins tried to name a horizon that is long enough."""
 
 LATER = 4.0
-"""... where it is at most so many times the default one: longer ones take long to look through."""
+"""Longest horizon so tried, over the default one: longer ones take long to look through."""
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -111,7 +111,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
 
 
 def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
-    """With the horizon no later than dissipation has left a millionth of the nutation: waiting on costs ever less."""
+    """The spacecraft, its horizon cut where dissipation leaves a millionth of the nutation: waiting costs ever less."""
     if spacecraft.growth >= 0.0:
         return spacecraft
     faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
@@ -119,7 +119,7 @@ def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
 
 
 def _fewest(search: _LeastCostSearch) -> Schedule:
-    """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
+    """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
     from nutdamp.schemes import one_pulse, two_pulse
 
     body = search.spacecraft
@@ -185,7 +185,7 @@ class _LeastCostSearch(Problem):
         return _LeastCostSearch(self.within(high), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
-        """Of schedules that all do what is required that with least of what is to be saved.
+        """The schedule with least of the quantity to be saved, of ``schedules`` that all meet the requirement.
 
         Of those that take as much within `SAME_COST` the fewest pulses, then the earlier end.
         """
@@ -239,7 +239,7 @@ class _LeastCostSearch(Problem):
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
 
     def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
-        """The search without channels whose pulses are too short to do what is asked of them.
+        """The search without channels whose pulses are too short for their share.
 
         Raises Infeasible, naming the limit, where there are no others.
         """
@@ -283,7 +283,7 @@ class _LeastCostSearch(Problem):
         return best if best is None else self.fuller(best, first)
 
     def fuller(self, schedule: Schedule, first: Solution) -> Schedule:
-        """``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
+        """The ``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
 
         Burns are left out by what the linear program thinks that it costs.
         """
