@@ -47,7 +47,7 @@ ALLOCATION_HALVINGS = 6
 """Of what is between the size with which too few cases comply and the one with which enough do."""
 
 CASES = 8_192
-"""That each is tried in."""
+"""Drawn cases in which each allocation is tried."""
 
 FRESH = 20_011
 """Seed of the first draws in which what was found is checked, which nothing was chosen by; each check has its own."""

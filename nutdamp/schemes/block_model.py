@@ -226,8 +226,8 @@ class Trial(NamedTuple):
 
 
 class Acts(NamedTuple):
-    """What commands give, s: effective ``on_time``, ``centroid`` after the start, the ``spread`` of the thrust (length
-    of the rectangle with its second moment), and when command and thrust are ``over``.
+    """Response to commands, s: effective ``on_time``, ``centroid`` after the start, the ``spread`` of the thrust
+    (length of the rectangle with its second moment), and when command and thrust are ``over``.
     """
 
     on_time: Any

@@ -35,7 +35,7 @@ FLOWN = 12
 """Sequences of blocks that are flown; as many more where none of them complies."""
 
 GENTLE = 10
-"""Times as many sequences of which these are those with the smallest pulses."""
+"""Multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too."""
 
 ALL_DELAYS = 16
 """Delays up to which all are looked at, if there are no more."""
@@ -77,7 +77,7 @@ CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
 SURELY = 3.0
-"""Times its error by which the length of a block that ends at the target differs from the way there, at most."""
+"""Largest difference of a block's length from the way to the target, over its end error."""
 
 LOWER = 0.98
 """Share of the nutation above which it does not count as lowered."""
@@ -87,7 +87,7 @@ LOOKED = 2e-6
 
 
 class BlockSequence(NamedTuple):
-    """Blocks, the motion after them in closed form, and how good that is: the less, the better.
+    """Blocks, the motion after them in closed form, and their rank: the less, the better.
 
     ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
     ``share``: the share.
@@ -100,15 +100,15 @@ class BlockSequence(NamedTuple):
 
 
 class FlownSequence(NamedTuple):
-    """What was found, flown: how good it is, those that break a limit last, then the earlier end, and its pulses."""
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
 
     rank: tuple[bool, float, float, float]
-    made: Schedule
-    found: BlockSequence
+    schedule: Schedule
+    sequence: BlockSequence
 
 
 class BlockSearch:
-    """The blocks of one spacecraft: which there are, and how good they are in closed form."""
+    """The command blocks of one spacecraft and their ranking in closed form."""
 
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
@@ -134,38 +134,39 @@ class BlockSearch:
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
         start = BlockSequence((), self.model.start, (math.inf, math.inf, math.inf))
-        found = self._single(start)
+        sequences = self._single(start)
         firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
-            self.most = self.least_cost(found)
+            self.most = self.least_cost(sequences)
             if work.exhausted() or (self.most < math.inf and not self.small):
                 break
             if number == 2:
                 small = self.behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
-                firsts = [*_promising(found, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
+                firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
                 firsts += self._all_firsts(start) if self.small else []
             else:
                 firsts = _promising(firsts, FIRST // 2)
-            firsts = [one for one in firsts if one.rank[1] < self.most]
+            firsts = [first for first in firsts if first.rank[1] < self.most]
             firsts = [more for first in firsts for more in self.behind(first, self._rest(first), few=4)]
-            found += firsts
+            sequences += firsts
         self.most = math.inf
-        unsure = {sequence.blocks: sequence for sequence in found if sequence.share <= DOUBTFUL}
+        unsure = _by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
         self.doubtful = sorted(unsure.values(), key=lambda sequence: sequence.rank[1:])
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = list({one.blocks: one for one in sorted(found, key=lambda one: one.rank)}.values())
-        clear = sorted(ranked, key=lambda one: one.share)[: FLOWN // 2]
-        each = {len(one.blocks): one for one in reversed(ranked)}.values()
-        first = {one.blocks: one for one in (*ranked[: FLOWN // 2], *clear, *each)}
+        ranked = list(_by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
+        clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
+        each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
+        first = _by_blocks((*ranked[: FLOWN // 2], *clear, *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
-        gentle = sorted(sorted(ranked, key=lambda one: one.share)[: GENTLE * FLOWN], key=self._largest_pulse)
-        more = {one.blocks: one for one in (*of_each_kind(ranked)[:FLOWN], *gentle) if one.blocks not in first}
-        return [*first.values(), *islice(more.values(), 2 * FLOWN)]
+        gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
+        more = _by_blocks((*of_each_kind(ranked)[:FLOWN], *gentle))
+        others = (sequence for blocks, sequence in more.items() if blocks not in first)
+        return [*first.values(), *islice(others, 2 * FLOWN)]
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = {sequence.blocks: sequence for sequence in sequences if sequence.rank[0] <= 0.0}
+        complying = _by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
         cheapest = sorted(complying.values(), key=lambda sequence: sequence.rank)
         for sequence in islice(cheapest, DOUBTS if self.small else FLOWN):
             if work.exhausted():
@@ -175,11 +176,11 @@ class BlockSearch:
                     return sequence.rank[1]
         return math.inf
 
-    def _largest_pulse(self, found: BlockSequence) -> float:
+    def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
-        named = {one.name: one for one in self.channels}
+        named = {channel.name: channel for channel in self.channels}
         spin = self.body.spin
-        return max(float(self.model.turned_by(named[one.channel], one.width, spin)) for one in found.blocks)
+        return max(float(self.model.turned_by(named[block.channel], block.width, spin)) for block in sequence.blocks)
 
     def behind(
         self,
@@ -227,7 +228,7 @@ class BlockSearch:
         return np.asarray(requirements.left_of(bound.part, left, self.body) / bound.most)
 
     def _spaced(self, every: int) -> bool:
-        """Whether pulses in one of ``every`` spins are as far apart as limits.gap requires."""
+        """True where pulses in one of ``every`` spins keep limits.gap."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
     def _counts(self, start: BlockState, every: int) -> NDArray[np.int64]:
@@ -247,7 +248,7 @@ class BlockSearch:
             for channel in self.channels
             for every in self.commands.every
         ]
-        most = max((one.max() for _, _, one in short if one.size), default=0.0)
+        most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
         within = SURELY
         while True:
             trials = (
@@ -255,14 +256,14 @@ class BlockSearch:
                 for channel, every, lacks in short
                 for trial in self._chosen(start.state, channel, every, np.argwhere(lacks <= within))
             )
-            found = sorted(self.behind(start, trials), key=lambda one: one.rank)
-            enough = SURELY * max(found[0].rank[0], 1.0) if found else math.inf
+            sequences = sorted(self.behind(start, trials), key=lambda sequence: sequence.rank)
+            enough = SURELY * max(sequences[0].rank[0], 1.0) if sequences else math.inf
             if enough <= within or within >= most or work.exhausted():
-                return found
+                return sequences
             within = min(enough, 10.0 * within, most)
 
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """By how much blocks of each width and number (w, n) miss at least, in shares of the bound of what is missed.
+        """Least miss of blocks of each width and number, (w, n), in shares of its bound.
 
         Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
         shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
@@ -317,7 +318,7 @@ class BlockSearch:
     def _parts(self, start: BlockSequence) -> Iterator[BlockSequence]:
         """First blocks that go a part of the way to the target."""
         heading, way = self.model.course(start.state)
-        every = next((one for one in self.commands.every if self._spaced(one)), None)
+        every = next((spins for spins in self.commands.every if self._spaced(spins)), None)
         if self.body.goal.axis is None or every is None:
             return
         for channel in self.channels:
@@ -335,8 +336,8 @@ class BlockSearch:
 
     @cached_property
     def small(self) -> bool:
-        """Whether there are so few blocks that all are looked at."""
-        widths = sum(len(commandable_widths(self.commands, one)) for one in self.channels)
+        """True where blocks are so few that all are looked at."""
+        widths = sum(len(commandable_widths(self.commands, channel)) for channel in self.channels)
         return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
 
     @property
@@ -362,8 +363,8 @@ class BlockSearch:
 
     def _all_firsts(self, start: BlockSequence) -> list[BlockSequence]:
         """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
-        found = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
-        return sorted(found, key=lambda one: one.rank[1])[:ALL_FIRSTS]
+        firsts = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
+        return sorted(firsts, key=lambda first: first.rank[1])[:ALL_FIRSTS]
 
     def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
@@ -372,18 +373,18 @@ class BlockSearch:
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
     def _longer_round(self, before: BlockState, after: BlockState) -> NDArray[np.bool_]:
-        """Whether H has gone round the Sun the longer way to the target, or once more: far for a few degrees."""
+        """True where H has gone round the Sun the longer way to the target, or once more."""
         if self.body.goal.axis is None:
             return np.zeros((), dtype=bool)
         return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
 
     def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
-        """Whether a pulse of the blocks would be on in a blackout window, or just beside it."""
+        """True where a pulse of the blocks is on in a blackout window, or just beside it."""
         shape = np.shape(after.sun_pulse)
-        found = np.zeros(shape, dtype=bool)
+        dark = np.zeros(shape, dtype=bool)
         if not len(self.dark[0]):
-            return found
-        work.spend(LOOKED * found.size * len(self.dark[0]))
+            return dark
+        work.spend(LOOKED * dark.size * len(self.dark[0]))
         turn = self.model.turn
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
@@ -392,8 +393,8 @@ class BlockSearch:
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
-            found |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
-        return found
+            dark |= np.maximum(low, 0.0) <= np.minimum(high, trial.count - 1)
+        return dark
 
     def _at_delays(
         self, state: BlockState, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
@@ -422,29 +423,29 @@ class BlockSearch:
         most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
-    def flown(self, found: BlockSequence) -> FlownSequence:
-        """How good the blocks are when they are flown. Raises Infeasible where they cannot be."""
-        if found.blocks in self._flights:
-            return self._flights[found.blocks]
-        made = fired(self.body, found.blocks)
-        left = left_by(propagation.flown(self.body, made))
+    def flown(self, sequence: BlockSequence) -> FlownSequence:
+        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
+        if sequence.blocks in self._flights:
+            return self._flights[sequence.blocks]
+        schedule = fired(self.body, sequence.blocks)
+        left = left_by(propagation.flown(self.body, schedule))
         share = max(float(self.share(bound, left)) for bound in self.bounds)
         missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
-        rank = not keeps_limits(self.body, made), missed, made.cost, made.end
-        self._flights[found.blocks] = FlownSequence(rank, made, found)
-        return self._flights[found.blocks]
+        rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
+        self._flights[sequence.blocks] = FlownSequence(rank, schedule, sequence)
+        return self._flights[sequence.blocks]
 
     def doubted(self, flights: list[FlownSequence]) -> None:
-        """Fly what would be cheaper than the best of the ``flights`` if it complied, the cheapest first, and add it."""
-        best = min((one.rank for one in flights if not one.rank[0]), default=None)
+        """Fly sequences cheaper than the best of ``flights``, the cheapest first, until one complies; add them."""
+        best = min((flight.rank for flight in flights if not flight.rank[0]), default=None)
         most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
-        known = {one.found.blocks for one in flights}
-        cheaper = (one for one in self.doubtful if one.rank[1] < most and one.blocks not in known)
-        for found in islice(cheaper, DOUBTS if self.small else FLOWN):
+        known = {flight.sequence.blocks for flight in flights}
+        cheaper = (sequence for sequence in self.doubtful if sequence.rank[1] < most and sequence.blocks not in known)
+        for sequence in islice(cheaper, DOUBTS if self.small else FLOWN):
             if work.exhausted():
                 return
             with suppress(Infeasible):
-                flights.append(self.flown(found))
+                flights.append(self.flown(sequence))
                 if flights[-1].rank[:2] == (False, 0.0):
                     return
 
@@ -453,30 +454,31 @@ class BlockSearch:
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
-        named, found = {one.name: one for one in self.channels}, list[BlockSequence]()
-        made = {one.found.blocks: one for one in sorted(flights, key=lambda one: one.rank)}
-        best = of_each_kind([one.found for one in made.values()])
-        for one in (made[each.blocks] for each in best[:CORRECTED]):
-            *earlier, last = one.found.blocks
+        named, sequences = {channel.name: channel for channel in self.channels}, list[BlockSequence]()
+        distinct = {flight.sequence.blocks: flight for flight in sorted(flights, key=lambda flight: flight.rank)}
+        best = of_each_kind([flight.sequence for flight in distinct.values()])
+        for flight in (distinct[each.blocks] for each in best[:CORRECTED]):
+            *earlier, last = flight.sequence.blocks
             state, number, channel = self.model.start, 1, named[last.channel]
             for block in earlier:
                 trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
                 state = self.model.after(state, named[block.channel], trial)
                 number = block.first + (block.count - 1) * block.every + 1
             before = BlockSequence(tuple(earlier), state, (math.inf, math.inf, math.inf))
-            off = self.model.apart(one.found.state, propagation.flown(self.body, one.made))
+            off = self.model.apart(flight.sequence.state, propagation.flown(self.body, flight.schedule))
             trials = iter([(channel, self._around(before, channel, last, number))])
-            found += self.behind(before, trials, off=off)
-        known = {one.found.blocks for one in flights}
-        ranked = {one.blocks: one for one in sorted(found, key=lambda one: one.rank) if one.blocks not in known}
+            sequences += self.behind(before, trials, off=off)
+        known = {flight.sequence.blocks for flight in flights}
+        other = (sequence for sequence in sequences if sequence.blocks not in known)
+        ranked = _by_blocks(sorted(other, key=lambda sequence: sequence.rank))
         chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
-        return [self._in_form(one) for one in {one.blocks: one for one in chosen}.values()]
+        return [self._in_form(sequence) for sequence in _by_blocks(chosen).values()]
 
-    def _in_form(self, found: BlockSequence) -> BlockSequence:
-        """The same, ranked by the closed form alone."""
-        left = self.model.left(found.state)
+    def _in_form(self, sequence: BlockSequence) -> BlockSequence:
+        """The sequence, ranked by the closed form alone."""
+        left = self.model.left(sequence.state)
         share = max(float(self.share(bound, left)) for bound in self.bounds)
-        return found._replace(rank=(share if share > 1.0 else 0.0, *found.rank[1:]), share=share)
+        return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
 
     def _around(self, before: BlockSequence, channel: Channel, last: Block, number: int) -> Trial:
         """Blocks about as long and as late as the ``last`` one, from the Sun pulse of that ``number`` on."""
@@ -496,18 +498,23 @@ class BlockSearch:
         return Trial(wait, delay, width, count, last.every)
 
 
+def _by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
+    """Sequences by their blocks, the last of equal ones at the place of the first."""
+    return {sequence.blocks: sequence for sequence in sequences}
+
+
 def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
-    """The first of each kind of sequence: their flights may differ much though their closed forms do not."""
+    """The first sequence of each kind: flights may differ where closed forms do not."""
     kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
-    for one in ranked:
-        kinds.setdefault(tuple((block.channel, block.every) for block in one.blocks), one)
+    for sequence in ranked:
+        kinds.setdefault(tuple((block.channel, block.every) for block in sequence.blocks), sequence)
     return list(kinds.values())
 
 
-def _promising(found: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
-    """Those that leave least, and those of the rest that leave less than all that cost as little: ``most`` of each."""
-    ranked, front = sorted(found, key=lambda one: one.rank), list[BlockSequence]()
-    for one in ranked:
-        if not front or one.rank[1] < front[-1].rank[1]:
-            front.append(one)
-    return list({one.blocks: one for one in (*ranked[:most], *front[:most])}.values())
+def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
+    """Sequences that leave least, and the front of miss against cost: ``most`` of each."""
+    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[BlockSequence]()
+    for sequence in ranked:
+        if not front or sequence.rank[1] < front[-1].rank[1]:
+            front.append(sequence)
+    return list(_by_blocks((*ranked[:most], *front[:most])).values())

@@ -24,14 +24,14 @@ from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 ANY = "finer steps of delay and width in commands, or a longer limits.horizon"
-"""What may help where nothing is known to hinder."""
+"""Advice without a limit known to hinder."""
 
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> str:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
-    form, flown = search.model.left(chosen.found.state), left_by(propagation.flown(search.body, chosen.made))
+    form, flown = search.model.left(chosen.sequence.state), left_by(propagation.flown(search.body, chosen.schedule))
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
-    several = len(chosen.made.blocks) > 1
+    several = len(chosen.schedule.blocks) > 1
     compared = f"none of the {search.looked:,} sequences compared" if several else "no other single block"
     scope = f"{compared} does better in closed form" if first else "of those flown none does better"
     return (
@@ -41,7 +41,7 @@ def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> st
 
 
 def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
-    """That blocks are on no ``tick`` (s), where their steps are others than those."""
+    """Note on blocks off the ``tick`` (s); empty where all their steps are on it."""
     if tick is None:
         return ()
     steps = np.array([commands.delay_step, *commands.widths]) / tick
@@ -54,10 +54,10 @@ def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> str:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
-    left = left_by(propagation.flown(search.body, chosen.made))
+    left = left_by(propagation.flown(search.body, chosen.schedule))
     missed = {bound.part: bound.most for bound in search.bounds if float(search.share(bound, left)) > 1.0}
-    more = [f"--max-blocks {BLOCKS}"] * (len(chosen.made.blocks) == most < BLOCKS)
-    named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.made)]
+    more = [f"--max-blocks {BLOCKS}"] * (len(chosen.schedule.blocks) == most < BLOCKS)
+    named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.schedule)]
     if shed(search.body) is not None:  # with other blocks the moments fall otherwise: no cure is sure to help
         return "what limits these blocks, if the moments of inertia did not fall: " + listed(named or [ANY])
     return "to leave less: " + listed(named or [ANY])
@@ -70,7 +70,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
     way, half = body.to_turn if body.goal.axis is not None else 0.0, 0.5 * commands.delay_step
     spin, damped = abs(body.spin), abs(model.rate * body.spin)
     aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
-    steps = [step for one in channels for step in _steps(model, one)]
+    steps = [step for channel in channels for step in _steps(model, channel)]
     along = 0.5 * min(steps, default=0.0)
     for part, what in ((Part.DISTANCE, "the end of H"), (Part.NUTATION, "the nutation")):
         most = missed.get(part, math.inf)
@@ -82,7 +82,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
 
 
 def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
-    """By how much one pulse of a channel turns H more than one of the width before, or than none, rad: the least."""
+    """Least difference, rad, by which pulses of neighbouring widths turn H; none is a width too."""
     assert model.body.commands is not None
     widths = commandable_widths(model.body.commands, channel)
     if len(widths):
@@ -90,15 +90,15 @@ def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
         yield float(np.diff(turned, prepend=0.0).min())
 
 
-def used_up(body: Spacecraft, made: Schedule) -> Iterator[str]:
+def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[str]:
     """Limits that the blocks of a schedule use up."""
     commands, limits = body.commands, body.limits
     assert commands is not None
-    if body.horizon - made.end < 2.0 * spin_turn(body):
-        yield f"a longer limits.horizon (the blocks end at {made.end:.4g} s of {body.horizon:.4g} s)"
-    if limits.max_pulses is not None and len(made) >= limits.max_pulses:
+    if body.horizon - schedule.end < 2.0 * spin_turn(body):
+        yield f"a longer limits.horizon (the blocks end at {schedule.end:.4g} s of {body.horizon:.4g} s)"
+    if limits.max_pulses is not None and len(schedule) >= limits.max_pulses:
         yield f"more limits.max_pulses ({limits.max_pulses})"
-    if any(block.count == commands.max_count for block in made.blocks):
+    if any(block.count == commands.max_count for block in schedule.blocks):
         yield f"a larger commands.max_count ({commands.max_count})"
 
 
@@ -106,7 +106,7 @@ FLOWN_PULSES = 1000
 """Pulses that are flown, after which no further sequence is."""
 
 ROUNDS = 3
-"""How often, each time from the best flights so far."""
+"""Searches near the best flights so far."""
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
@@ -122,7 +122,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if spun and spacecraft.goal.axis is not None:
         raise Infeasible("sets the spin or turns H, not both; optimal does")
     able = at_hand(spacecraft, usable(spacecraft, axial=spun))
-    channels = [one for one in able if commandable_widths(commands, one).size]
+    channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = BlockSearch(spacecraft, channels, commands)
@@ -131,29 +131,33 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
     for round_ in range(ROUNDS + 1):
-        for number, found in enumerate(best if round_ == 0 else search.nearer(flights)):
-            met = any(one.rank[:2] == (False, 0.0) for one in flights)
-            pulses = sum(len(one.made) for one in flights)
+        for number, sequence in enumerate(best if round_ == 0 else search.nearer(flights)):
+            met = any(flight.rank[:2] == (False, 0.0) for flight in flights)
+            pulses = sum(len(flight.schedule) for flight in flights)
             if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or (met and number >= FLOWN * (round_ == 0)):
                 break
             try:
-                flights.append(search.flown(found))
+                flights.append(search.flown(sequence))
             except Infeasible as reason:
                 why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
     search.doubted(flights)
     if not flights:
         raise Infeasible(why)
     chosen = _cheapest(flights)
-    first = chosen.found.rank[:2] <= best[0].rank[:2]
+    first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first), *off_ticks(tick, commands)]
     if chosen.rank[1] > 1.0:
         notes.insert(1, cures(search, chosen, options.max_blocks or BLOCKS))
-    return replace(chosen.made, notes=tuple(notes))
+    return replace(chosen.schedule, notes=tuple(notes))
 
 
 def _cheapest(flights: Sequence[FlownSequence]) -> FlownSequence:
     """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
-    best = min(flights, key=lambda one: one.rank)
+    best = min(flights, key=lambda flight: flight.rank)
     broken, missed, cost, _ = best.rank
-    equal = [one for one in flights if one.rank[:2] == (broken, missed) and one.rank[2] <= cost * (1.0 + SAME_COST)]
-    return min(equal, key=lambda one: (len(one.made), one.made.end, one.rank))
+    equal = [
+        flight
+        for flight in flights
+        if flight.rank[:2] == (broken, missed) and flight.rank[2] <= cost * (1.0 + SAME_COST)
+    ]
+    return min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))

@@ -52,7 +52,7 @@ MOVED = 8
 """Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
 
 BEFORE, AFTER = 12, 24
-"""Where their length is given: pulses corrected before the equal ones, which damp the nutation, and at the end."""
+"""Pulses of given length corrected before the equal ones, which damp the nutation, and at the end."""
 
 CLEARLY = 0.5
 """Largest residual, over that of an earlier candidate, with which a later or dearer one is taken."""

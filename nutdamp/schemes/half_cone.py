@@ -219,7 +219,7 @@ def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
 def _costs(
     here: Spacecraft, channel: Channel, push: Vector, cones: int, h: float, target: Vector
 ) -> tuple[Vector, Vector]:
-    """What the rest of the row costs when H is pushed along ``push`` (n, 3), (n,) N m s, and by how much it then is.
+    """Cost of the rest of the row, (n,) N m s, after pushes of H along ``push`` (n, 3), and their sizes, (n,) N m s.
 
     The rest is the row of cones - 1 half cones from the far end of the cone that the push makes.
     """

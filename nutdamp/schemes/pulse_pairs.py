@@ -289,7 +289,7 @@ ON_CONE = 1e-3
 """Share of its natural size below which the first jump counts as nothing."""
 
 BESIDE = 0.05
-"""How far beside the target, as a share of the angles at hand, a search goes that would find nothing on it."""
+"""Distance beside the target, over the angles at hand, of a search that finds nothing on it."""
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:

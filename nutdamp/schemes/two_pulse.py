@@ -36,7 +36,7 @@ CLOSE_IN_COST = 1.02
 """Among candidates within this factor of the cheapest the one that ends first is preferred."""
 
 CLOSE_IN_SHORT = 1.1
-"""Where on-times cannot give the whole impulse, candidates that miss nearly as much count as equal."""
+"""Factor of the miss within which candidates count as equal, with on-times that cannot give the whole impulse."""
 
 MANY = 2000
 """Closings of H looked at for each pair one by one."""

@@ -31,7 +31,7 @@ from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
-"""What the reasons of schemes, which know nothing of valves, are about."""
+"""Addition to the reasons of schemes, which know nothing of valves."""
 
 ROUNDING = 1e-12
 """Share by which an on-time may pass its bounds."""

@@ -32,7 +32,7 @@ MOST_PULSES = 200
 
 
 def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iterator[Schedule]:
-    """Those that keep limits and requirement, flown by ``fly``; none where H has a target."""
+    """Simple spin changes that keep limits and requirement, flown by ``fly``; none where H has a target."""
     if spacecraft.goal.spin is None or spacecraft.goal.axis is not None:
         return
     for channel in spacecraft.channels:
@@ -112,7 +112,7 @@ MOST_ELSEWHERE = 1500.0
 def elsewhere(
     problem: Problem, best: Schedule | None, first: Solution, cheapest: Callable[[float], Schedule | None]
 ) -> Schedule | None:
-    """``best``; where there is none, or a dear one, the cheapest that is found with shorter horizons.
+    """The ``best``; where there is none, or a dear one, the cheapest with shorter horizons.
 
     ``first`` and ``cheapest`` as in `hastened`.
     """
@@ -130,7 +130,7 @@ def elsewhere(
 def hastened(
     problem: Problem, best: Schedule, first: Solution, cheapest: Callable[[float], Schedule | None]
 ) -> Schedule:
-    """``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
+    """The ``best``, or one that ends earlier, costs and leaves as much, and has no more pulses.
 
     ``first`` is the program's solution for the whole horizon; ``cheapest`` gives the cheapest schedule found within a
     horizon, s. By how much earlier an end may be small angles tell; the horizons that are tried lie a little later.
@@ -155,10 +155,10 @@ def hastened(
             share = None if over() else _least_share(problem, span, small_angles)
             later = () if share is None else (share + part * (1.0 - share) for part in PARTS)
             schedules = (cheapest(begin + part * span) for part in later if not over())
-            made = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
-            if made is None:
+            earlier = next((schedule for schedule in schedules if schedule is not None and better(schedule)), None)
+            if earlier is None:
                 break
-            best = made
+            best = earlier
     return best
 
 

@@ -1,6 +1,4 @@
-"""Lower bounds, primer function.
-
-What no schedule can beat: lower bounds of the cost, by duality and by the length of the way.
+"""Lower bounds of the cost of a schedule, by duality and by the length of the way.
 
 The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
 schedules that leave no more than `Allowed`, and none of them knows of gaps, ticks and on-times, which can only raise
@@ -16,17 +14,14 @@ Schedules that cost more need no bound.
 
 *Spin.* A final spin costs impulse too: with M3 in place of one component, and |m| in place of the other.
 
-*First order.* The same for the program of small angles, with all its equations: see `primer`.
+*First order.* The same for the program of small angles, with all its equations: see `SmallAngles`.
 
 *Turn.* Where ω3 stays, H·e3 = Cω3, so H never comes nearer to the origin than r = C|ω3|. From |H0| = r/cos θ0 the
 shortest way round that sphere to the direction of the target is the tangent, r tan θ0, and an arc of the sphere.
 
-What a second of each channel is worth by the prices of a program, over its cost: how high that is, and what it adds
-up to where it is above one.
-
-By weak duality prices y prove that no schedule costs less than what they are worth at the goal, once no second of a
-channel is worth more than it costs. A price that is too high somewhere is lowered until it is not, for channels that
-act within a moment; from those that have to be on for long, what a stretch of them gains is taken off:
+*Primer.* q is the worth of a second of a channel by prices y, over its cost. By weak duality prices prove that no
+schedule costs less than their worth at the goal, once q ≤ 1 everywhere. Prices that are too high somewhere are lowered
+for channels that act within a moment; for those that have to be on for long, the gain of each stretch is taken off:
 ∫ max(0, q - 1) c dt. Between the times looked at, q is known by its curvature.
 """
 
@@ -46,7 +41,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
 QUARTERINGS = 9
-"""Times that what lies between two times is looked at in quarters: to a 1e-5 of a slot."""
+"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot."""
 
 PARTS = 4
 """Parts of a slot in which the gain of a channel that is on for long is summed."""
@@ -63,7 +58,7 @@ ROUNDING = 1e-12
 
 
 class Lowered(NamedTuple):
-    """The best ``bound`` by prices over a ``factor``; ``gained`` is what channels on for long gain by them."""
+    """The best ``bound`` by prices over a ``factor``; ``gained``: gain of channels on for long by them."""
 
     bound: float
     factor: float
@@ -110,12 +105,12 @@ def stretches(program: Program, spans: Sequence[tuple[float, float]]) -> tuple[V
 
 
 def slackened(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The windows with what rounding may overstep."""
+    """The windows, widened by the tolerance for rounding."""
     return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
 
 
 def lowered(curve: SmallAngles, strong: NDArray[np.bool_], goal: float) -> Lowered | None:
-    """What prices prove that are worth ``goal``; None where they prove nothing. ``strong``: act within a moment."""
+    """Bound proved by prices worth ``goal``; None where they prove nothing. ``strong``: act within a moment."""
     highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
     if highest <= 0.0:
         return None
@@ -158,7 +153,7 @@ def _ends(curve: SmallAngles, begins: Vector, lengths: Vector) -> list[Vector]:
 
 
 def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> float:
-    """What ``which`` channels gain by being on whenever it pays, with prices lowered by a ``factor``."""
+    """Gain of ``which`` channels that are on whenever it pays, with prices lowered by a ``factor``."""
     which_ones = np.flatnonzero(which)
     if not len(which_ones):
         return 0.0
@@ -201,11 +196,11 @@ LOOKS = 33
 """Directions looked at at once where the best is looked for."""
 
 NARROWINGS = 9
-"""Times that the search is narrowed to a sixteenth: to 1e-11 rad."""
+"""Narrowings of the search to a sixteenth: to 1e-11 rad."""
 
 
 class Allowed(NamedTuple):
-    """What may be left: ``nutation`` and distance ``off`` the target in rad, ``spin`` as a share of the final one."""
+    """Largest end errors: ``nutation`` and distance ``off`` the target, rad, ``spin`` as a share of the final one."""
 
     nutation: float = 0.0
     off: float = 0.0
@@ -343,7 +338,7 @@ class Proof(NamedTuple):
 
 
 def first_order(program: Program, prices: Vector) -> Proof:
-    """What the ``program`` of small angles cannot go below, by ``prices`` (equations,) of one N m s each.
+    """Lower bound of the ``program`` of small angles, by ``prices`` (equations,) of one N m s each.
 
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """

@@ -1,14 +1,9 @@
-"""Chance-constrained program and its dual bound.
+"""Chance-constrained program: least-cost firing that meets a requirement with a margin of k sigmas.
 
-Least-cost firing that meets a requirement with a margin of so many sigmas: the cones of `chance`, cut by cut.
-
-The linear program has tangents of the cones, added where its solution breaks them (Kelley 1960), and columns by price.
-
-What is left after firing, to first order in the dispersed inputs: cones in the on-times, and their tangents.
-
-What is left is linear in the on-times τ and in the inputs x, of one sigma each: r = Σ G τ - g + (D0 + Σ D τ) x. In each
-direction u it is to keep u·r + k |(D0 + Σ D τ)ᵀ u| ≤ L, a second-order cone in τ (Boyd & Vandenberghe 2004, 4.4.2).
-For every w with |w| ≤ 1 that implies the tangent u·(Σ G τ - g) + k w·(D0 + Σ D τ)ᵀ u ≤ L, linear in τ.
+The end error is linear in the on-times τ and in the inputs x, of one sigma each: r = Σ G τ - g + (D0 + Σ D τ) x. In
+each direction u it keeps u·r + k |(D0 + Σ D τ)ᵀ u| ≤ L, a second-order cone in τ (Boyd & Vandenberghe 2004, 4.4.2).
+For every w with |w| ≤ 1 that implies the tangent u·(Σ G τ - g) + k w·(D0 + Σ D τ)ᵀ u ≤ L, linear in τ. The linear
+program has tangents of the cones, added where its solution breaks them (Kelley 1960), and columns by price.
 """
 
 from __future__ import annotations
@@ -28,7 +23,7 @@ from nutdamp.spacecraft.model import Vector
 Complex = NDArray[np.complex128]
 
 KINDS = ("nutation", "shift", "spin")
-"""What may be left, see `ChanceLimit`."""
+"""Limited end errors, see `ChanceLimit`."""
 
 TURNS = 100_000
 """More than there are turns in a horizon: pulses are numbered by channel and turn."""
@@ -36,7 +31,7 @@ TURNS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Uncertain:
-    """How d dispersed inputs of one sigma act, for each of K channels; what is (2,) is of nutation and shift.
+    """Effects of d dispersed inputs of one sigma, for each of K channels; (2,): of nutation and shift.
 
     ``effect`` (K,) and ``axial`` (K,): torque about the transverse axes (complex) and axis 3, N m, with biases.
     ``begin`` (2, d) complex N m s: by what each changes what is to be undone; ``rates`` (2, d) rad/s: the two rates.
@@ -78,7 +73,7 @@ class Tangent(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """What one sigma of each input leaves: ``shared`` (d,), and of each of the ``pulses`` (g,) its ``own`` (g, d)."""
+    """End error by one sigma of each input: ``shared`` (d,), and of each of the ``pulses`` (g,) its ``own`` (g, d)."""
 
     shared: Complex
     pulses: NDArray[np.int_]
@@ -92,7 +87,7 @@ class Spread(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """Of a channel and a kind, what priced tangents add up to: Re(E(t) (``fixed`` + ``rate`` t + ``own`` of the turn)).
+    """Sum of priced tangents for a channel and a kind: Re(E(t) (``fixed`` + ``rate`` t + ``own`` of the turn)).
 
     E is what `ChanceModel.turns` gives; ``own`` (turns,).
     """
@@ -103,7 +98,7 @@ class Weights(NamedTuple):
 
 
 class ChanceModel:
-    """The cones of a ``program`` of small angles; ``goal`` (5,) N m s is what firing is to add."""
+    """The cones of a ``program`` of small angles; ``goal`` (5,) N m s: required sum of the firing."""
 
     def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.uncertain, self.limits = program, uncertain, limits
@@ -123,7 +118,7 @@ class ChanceModel:
         return np.asarray(columns.channel * TURNS + self.turn_of(columns.t))
 
     def turns(self, kind: int, columns: ProgramColumns) -> Complex:
-        """What one unit of torque in each column (n,) does, before any dispersion: turned back, and lost to widths."""
+        """Effect of one unit of torque in each column (n,), without dispersion: turned back, less losses to widths."""
         if kind == 2:
             return np.ones(len(columns.t), dtype=complex)
         body, late = self.program.spacecraft, self.uncertain.delay[columns.channel]
@@ -135,7 +130,7 @@ class ChanceModel:
         return np.asarray(turned)
 
     def effects(self, kind: int) -> tuple[Complex, Complex]:
-        """Of the channels, N m: what they do (K,), and by what inputs change it but for the rate, (K, d)."""
+        """Effects of the channels, N m, (K,), and changes by the inputs but for the rate, (K, d)."""
         inputs = self.uncertain
         if kind == 2:
             return inputs.axial.astype(complex), inputs.axial_torque.astype(complex)
@@ -144,11 +139,11 @@ class ChanceModel:
         ]
 
     def rates(self, kind: int) -> Vector:
-        """By what inputs change the rate at which effects turn, (d,) rad/s."""
+        """Changes by the inputs of the rate at which effects turn, (d,) rad/s."""
         return self.uncertain.rates[kind] if kind < 2 else np.zeros(len(self.uncertain.own))
 
     def start(self, kind: int) -> Complex:
-        """By what inputs change what is left without any firing, (d,) N m s."""
+        """Changes by the inputs of the end error without firing, (d,) N m s."""
         inputs = self.uncertain
         return inputs.spin.astype(complex) if kind == 2 else inputs.begin[kind] + inputs.less * self.goal[kind]
 
@@ -158,7 +153,7 @@ class ChanceModel:
         return Tangent(limit, complex(u), np.zeros(count), np.zeros((0, 1 + count)))
 
     def row(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
-        """What a second of each column adds to a tangent, N m, (n,)."""
+        """Coefficients of a tangent per second of each column, N m, (n,)."""
         kind = tangent.limit.kind
         effects, changes = self.effects(kind)
         effect = effects[columns.channel]
@@ -175,18 +170,18 @@ class ChanceModel:
         return np.asarray((np.conj(tangent.u) * self.turns(kind, columns) * total).real)
 
     def right(self, tangent: Tangent, margin: float) -> float:
-        """What the columns of a tangent may add up to, N m s."""
+        """Upper limit of the sum of a tangent over its columns, N m s."""
         kind = tangent.limit.kind
         taken = (np.conj(tangent.u) * (margin * self.start(kind) @ tangent.shared - self.goal[kind])).real
         return float(tangent.limit.most - taken)
 
     def left(self, columns: ProgramColumns, on_times: Vector) -> Complex:
-        """What is left of nutation, shift and spin, (3,) N m s."""
+        """End errors of nutation, shift and spin, (3,) N m s."""
         each = [self.turns(kind, columns) * self.effects(kind)[0][columns.channel] @ on_times for kind in range(3)]
         return np.asarray(np.array(each, dtype=np.complex128) - self.goal)
 
     def spread(self, kind: int, columns: ProgramColumns, on_times: Vector) -> Spread:
-        """What one sigma of each input leaves, N m s, after columns have been on for ``on_times`` (n,) s."""
+        """End error by one sigma of each input, N m s, with columns on for ``on_times`` (n,) s."""
         shared = ~self.uncertain.own
         effect, changed = (part[columns.channel] for part in self.effects(kind))
         each = (self.turns(kind, columns) * on_times)[:, None]
@@ -198,7 +193,7 @@ class ChanceModel:
         return Spread(total, pulses, own)
 
     def weights(self, kind: int, channel: int, priced: Sequence[tuple[Tangent, float]], margin: float) -> Weights:
-        """What a second of a channel is worth by tangents of one kind and their prices."""
+        """Worth of a second of a channel by tangents of one kind and their prices."""
         effects, changes = (part[channel] for part in self.effects(kind))
         fixed = rate = 0j
         own = np.zeros(self.count, dtype=complex)
@@ -215,10 +210,10 @@ class ChanceModel:
 
 
 DIRECTIONS = 72
-"""In which the cones of two equations are looked at."""
+"""Directions in which the cones of two equations are looked at."""
 
 BEGUN = 16
-"""Of them, tangents to begin with, without margin."""
+"""Directions of the first tangents of such a cone, without margin."""
 
 WORST = 3
 """Tangents added to a cone at a time."""
@@ -233,7 +228,7 @@ PRICE = 1e-6
 """Relative reduced cost below which a column does not enter."""
 
 ROUNDS = 40
-"""Of the linear program, each with more tangents or columns."""
+"""Rounds of the linear program, each with more tangents or columns."""
 
 EXCESS = 10.0
 """Cost of passing all limits by themselves, over that of all there is to do: done where hardly anything else helps."""
@@ -243,7 +238,7 @@ SOME = 1e-9
 
 
 class Sure(NamedTuple):
-    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: what is left then."""
+    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
 
     burns: tuple[Burn, ...]
     excess: float
@@ -306,7 +301,7 @@ class ChanceProgram:
         return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
 
     def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
-        """Of a tangent, for one unit of each column, over the scale."""
+        """Coefficients of a tangent for one unit of each column, over the scale."""
         return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
@@ -368,7 +363,7 @@ class ChanceProgram:
         return self._slots(channel_, slot)
 
     def _worth(self, channel: int, active: list[tuple[Tangent, float]], margin: float) -> Vector:
-        """What one unit of a channel in each slot is worth by tangents and their prices."""
+        """Worth of one unit of a channel in each slot by tangents and their prices."""
         worth = np.zeros(len(self.program.centres))
         for kind in {limit.kind for limit in self.limits}:
             turned, turn = self._slots_of(kind, channel)

@@ -1,4 +1,4 @@
-"""Firing almost without a pause, one channel after another: what ends earliest, and what a short horizon takes.
+"""Firing almost without a pause, one channel after another: the earliest end, and the least cost in a short horizon.
 
 The program of `linear_program` lets channels fire at once. Here they share each slot of time: what one channel after
 another can supply is the convex hull of what each can, so that within a horizon the program has a solution where, to
@@ -32,10 +32,10 @@ LINES = 4
 """Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
 
 NEWTON_STEPS = 25
-"""Of the lengths of the burns."""
+"""Newton steps for the lengths of the burns."""
 
 CONVERGED = 1e-12
-"""What may be left, over |H|."""
+"""Largest end error, over |H|."""
 
 SHORTEST = 0.02
 """Share of a slot below which a burn is left out before the lengths are found."""
@@ -44,7 +44,7 @@ HALVINGS = 10
 """Steps in which the earliest end is found, from what small angles allow."""
 
 LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""By how much later than small angles allow the earliest end may be, tried in turn."""
+"""Shares added to the earliest end by small angles, tried in turn."""
 
 PROGRAM = 4.0
 """Units of work of a program."""
@@ -58,7 +58,7 @@ class Piece(NamedTuple):
 
 
 def possible(problem: Problem) -> bool:
-    """Whether burns may follow each other without a gap, begin at any time and be of any number."""
+    """True where burns may follow each other without a gap, begin at any time and be of any number."""
     limits = problem.spacecraft.limits
     return limits.gap == 0.0 and limits.tick is None and limits.max_pulses is None and bool(problem.channels)
 

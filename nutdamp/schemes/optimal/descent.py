@@ -1,13 +1,9 @@
-"""Interior-point descent of many pulse sequences at once.
+"""Interior-point descent of many pulse sequences at once, each to the cheapest schedule near it.
 
-Many sequences of pulses at once, each brought to the cheapest schedule near it: its channels, in its order.
-
-Unknown are starts and on-times; what the flight leaves of the equations must vanish, and on-times, gap, windows and
-horizon bound them linearly. A primal-dual interior-point iteration with quasi-Newton curvature (Nocedal and Wright
-2006, ch. 18.3 and 19) that keeps all bounds at every step, on arrays that carry the sequence first. Slopes are
+Channels and their order stay. Unknown are starts and on-times; the misses of the flight must vanish, and on-times, gap,
+windows and horizon bound them linearly. A primal-dual interior-point iteration with quasi-Newton curvature (Nocedal and
+Wright 2006, ch. 18.3 and 19) keeps all bounds at every step, on arrays that carry the sequence first. Slopes are
 differences of flights, which cost little where hundreds are flown at a time.
-
-Sequences of pulses flown many at a time: what each leaves of the equations, costs, and has to keep.
 """
 
 from __future__ import annotations
@@ -42,7 +38,7 @@ FLIGHT, CASE = 0.05, 0.0003
 
 @dataclass(frozen=True, eq=False)
 class Sequences:
-    """``which`` (b, n): the channels of b sequences of n pulses, by number.
+    """Channels ``which`` (b, n), by number, of b sequences of n pulses.
 
     ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n) s: its on-time.
     """
@@ -87,7 +83,7 @@ class Task:
         self._target, self._across = body.target_axis, refinement.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
-        """What the flights of ``x`` (b, …) leave of the equations, (b, equations), over |H|.
+        """Misses of the flights of ``x`` (b, …), (b, equations), over |H|.
 
         Pulses act as so many ``kicks`` spread over them, without disturbances; 0 is the true motion.
         """
@@ -121,7 +117,7 @@ class Task:
         return np.asarray(every[:, self.chosen] / self.momentum)
 
     def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
-        """What the unknowns in units of ``scale`` (b, …) change in the misses, ``here`` now: (b, equations, …)."""
+        """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b, equations, …)."""
         number = x.shape[1]
         moved = x[:, None, :] + DIFFERENCE * scale[:, None, :] * np.eye(number)
         there = self.misses(np.repeat(which, number, axis=0), moved.reshape(-1, number), kicks)
@@ -129,7 +125,7 @@ class Task:
         return np.swapaxes(changes, 1, 2) / DIFFERENCE
 
     def price(self, which: Indices, on: Vector) -> Vector:
-        """What sequences cost with on-times ``on`` (…, n) s."""
+        """Cost of sequences with on-times ``on`` (…, n) s."""
         return np.asarray(np.sum(self.costs[which] * on, axis=-1))
 
     def scale(self, which: Indices) -> Vector:
@@ -181,7 +177,7 @@ PROXIMAL = 1e-9
 
 @dataclass(eq=False)
 class DescentState:
-    """Where the descents of b sequences are: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
+    """State of the descents of b sequences: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
 
     ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations, ``curvature`` (b, v, v) of
     the Lagrangian, ``barrier`` and ``penalty`` (b,), ``error`` (b,) of the conditions for an optimum.
@@ -199,11 +195,11 @@ class DescentState:
     error: Vector
 
     def of(self, rows: Any) -> DescentState:
-        """Those of some sequences."""
+        """The states of some sequences."""
         return DescentState(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def put(self, rows: Any, other: DescentState) -> None:
-        """Replace those of some sequences."""
+        """Replace the states of some sequences."""
         for field in fields(self):
             getattr(self, field.name)[rows] = getattr(other, field.name)
 
@@ -239,7 +235,7 @@ class Descent:
 
     @property
     def cost(self) -> Vector:
-        """What the sequences cost now, (b,)."""
+        """Present cost of the sequences, (b,)."""
         which = self.sequences.which
         return self.task.price(which, self.state.x[:, which.shape[1] : 2 * which.shape[1]])
 

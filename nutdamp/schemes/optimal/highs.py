@@ -1,8 +1,4 @@
-"""HiGHS, reachability test.
-
-A small linear program that grows by columns, solved by HiGHS in whichever way gets to its end.
-
-Whether firings for at most so long each supply a goal: the nearest point of what they can supply.
+"""Linear programs that grow by columns, solved by HiGHS, and a test of reachability.
 
 All that slots can supply is a convex set, and the point of it that is farthest in a direction is known at once: every
 slot whole that helps that way. Wolfe (1976, Mathematical Programming 11) finds the point nearest to the goal from such
@@ -32,7 +28,7 @@ costs, against which its tolerances count, it mostly does not at another; interi
 
 
 MOST_STEPS = 100_000
-"""Of the simplex or of the interior points, in one way of solving."""
+"""Steps of the simplex or of the interior points, in one way of solving."""
 
 
 SMALL, NONZERO = 10_000, 1e-2
@@ -40,7 +36,7 @@ SMALL, NONZERO = 10_000, 1e-2
 
 
 class Optimum(NamedTuple):
-    """Unknowns ``x`` (n,), and ``prices`` (m,): what one more of each right-hand side of the equations costs.
+    """Unknowns ``x`` (n,), and ``prices`` (m,) of one more of each right-hand side of the equations.
 
     ``shadows`` are the same of the limits, at most zero.
     """
@@ -131,7 +127,7 @@ class _SilentSolver(highspy.Highs):
         self.setOptionValue("primal_feasibility_tolerance", 1e-9)
 
     def enableCallbacks(self) -> None:
-        """Called by the constructor; in highspy 1.16 this prints a banner to stdout, where CSV and JSON go."""
+        """No banner: in highspy 1.16 the constructor calls this, which prints one to stdout, where CSV and JSON go."""
         self.setOptionValue("output_flag", False)
         highspy.Highs.enableCallbacks(self)
 
@@ -150,7 +146,7 @@ FLAT = 1e-12
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:
-    """Whether some parts between 0 and 1 of the columns ``most`` (m, n) add up to ``goal`` (m,).
+    """True where some parts between 0 and 1 of the columns ``most`` (m, n) add up to ``goal`` (m,).
 
     ``off``: by how much its rows 2 and 3 may be missed, in norm. None where that is not known after `CORNERS`.
     """

@@ -1,12 +1,8 @@
-"""Column generation.
-
-Least-cost firing of body-fixed channels as a linear program over channels and firing times.
+"""Least-cost firing of body-fixed channels: a linear program over channels and firing times, by column generation.
 
 Unknown are on-times. Time is cut into slots in which a channel can be on for at most the slot, so that long burns
 and what their width loses come out right; a channel that gives all that is needed within one slot fires impulses at
 any moment. Columns enter the program by their price, since a handful of equations needs few of them.
-
-The unknowns of the linear program of `optimal`: how long to fire a channel at a moment, or in a slot of time.
 """
 
 from __future__ import annotations
@@ -86,7 +82,7 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
 
 
 def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
-    """Moments (n,) s at which what is worth ``worth`` (n, 5) at even ``times`` (n, 5) s is worth most, and how much.
+    """Moments (n,) s of the largest worth, and that worth, from ``worth`` (n, 5) at even ``times`` (n, 5) s.
 
     By the parabola through the best of the five and those beside it; at an end of them, that end.
     """
@@ -116,7 +112,7 @@ PRICE = 1e-7
 """Relative reduced cost below which a column cannot lower the cost any more."""
 
 PEAK = 1e-6
-"""The same for the best moment of a strong channel, which may lie ever so little beside one taken."""
+"""Relative reduced cost for the best moment of a strong channel, which may lie close beside one taken."""
 
 BEST = 250
 """Columns taken in per round, the best priced first."""
@@ -147,7 +143,7 @@ SOME = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """Burns of least ``cost`` in time order; ``unmet`` is what the columns could not supply, over all there is to do.
+    """Burns of least ``cost`` in time order; ``unmet``: share of all there is to do that columns cannot supply.
 
     Where the program could not be solved both are infinite. ``off`` (2,) N m s is how far from the target H is to end,
     where it may. ``prices`` (equations,) are what one more N m s of each goal costs, zero where that is not known.
@@ -249,7 +245,7 @@ class Program:
         )
 
     def _unmet(self, optimum: highs.Optimum) -> float:
-        """What slacks have to supply, over all there is to do."""
+        """Sum of the slacks, over all there is to do."""
         return float(optimum.x[: 2 * len(self.influence.goal)].sum())
 
     def _master(self, columns: ProgramColumns, reach: Vector | None) -> highs.GrowingProgram:
@@ -309,11 +305,11 @@ class Program:
         return 1.0 + self.haste * times / float(self.centres[-1])
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
-        """What one unit of each column does in the equations, (equations, n)."""
+        """Coefficients of one unit of each column, (equations, n)."""
         return np.asarray(np.einsum("nek,nk->en", self._rows(columns), self._direction[columns.channel]))
 
     def _rows(self, columns: ProgramColumns) -> Vector:
-        """What one N m s of each column about each body axis adds to the equations, (n, equations, 3).
+        """Coefficients of one N m s of each column about each body axis, (n, equations, 3).
 
         Once slots were looked at as often as there are any, all of them are, and kept.
         """
@@ -328,7 +324,7 @@ class Program:
         return rows
 
     def _slot_rows(self) -> Vector:
-        """What one N m s in each slot adds to the equations, (equations, 3, slots)."""
+        """Coefficients of one N m s in each slot, (equations, 3, slots)."""
         if self._grid is None:
             lost = self.influence.widths(np.array([self.width]))[0]
             self._grid = np.ascontiguousarray((self.influence.rows(self.centres) * lost[:, None]).transpose(1, 2, 0))
@@ -339,7 +335,7 @@ class Program:
         return np.asarray((np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1))
 
     def _worth(self, weights: Vector) -> Vector:
-        """What one unit of each channel in each slot is worth by prices ``weights``, (channels, slots)."""
+        """Worth of one unit of each channel in each slot by prices ``weights``, (channels, slots)."""
         grid = self._slot_rows()
         worth = self._direction @ (weights @ grid.reshape(len(weights), -1)).reshape(3, -1)
         if self.forbidden.any():
@@ -347,14 +343,14 @@ class Program:
         return np.asarray(worth)
 
     def _gains(self, weights: Vector) -> Vector:
-        """The same, less what it costs."""
+        """Worth of one unit of each channel in each slot, less its cost, (channels, slots)."""
         gains = self._worth(weights)
         cost = (self._price / self._dearest)[:, None]
         gains -= cost * self._dearness(self.centres) if self.haste else cost  # large: in place
         return gains
 
     def reachable(self) -> bool | None:
-        """Whether all slots together can supply the goal, by `reach`; None where that is not known."""
+        """True where all slots together can supply the goal, see `supplies`; None where that is not known."""
         if self._scale == 0.0 or self.strong.any():  # strong ones act at moments, of which slots are only samples
             return None
         work.spend(SOLVED + SLOT * self.forbidden.size)
@@ -364,7 +360,7 @@ class Program:
         return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
 
     def _out_of_reach(self, weights: Vector) -> bool:
-        """Whether prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
+        """True where prices ``weights`` prove that all slots together do not supply the goal (Farkas' lemma)."""
         if self.strong.any():  # these act at moments, of which the slots are only samples
             return False
         size = float(np.abs(weights).max())

@@ -1,4 +1,4 @@
-"""Where strong thrusters leave little time: schedules from very many starts, each brought to the cheapest near it.
+"""Schedules from very many starts, each brought to the cheapest near it, for strong thrusters and short horizons.
 
 Sequences of a few channels at random moments, corners of the horizon among them, are descended as ideal impulses,
 which fly in closed form; the better half goes on, twice. About the best of them every channel is then priced at every
@@ -27,13 +27,13 @@ ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))
 """Steps of descent, and share of the sequences that goes on after them."""
 
 UNMET_COST = 100.0
-"""What a miss costs beside the propellant when the better part is chosen, per |H|, over the least cost."""
+"""Cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost."""
 
 SPARE = 2
 """Pulses more than equations when some are added: what they make needless goes back to nothing."""
 
 ADDITIONS = 2
-"""Times that pulses are added."""
+"""Rounds in which pulses are added."""
 
 MOMENTS = 97
 """Moments at which each channel is priced."""
@@ -48,7 +48,7 @@ FOUND = 1e-6
 """Largest miss, over |H|, of a schedule of ideal impulses."""
 
 EXACT = 1e-10
-"""The same of a schedule flown through real widths."""
+"""Largest miss, over |H|, of a schedule flown through real widths."""
 
 NEAR = 1.03
 """Schedules of ideal impulses so much dearer than the best go on to the true motion."""
@@ -57,13 +57,13 @@ NEEDLESS = 1e-3
 """Share of all there is to do below which a pulse may be left out."""
 
 NOTHING = 1e-10
-"""The same share below which it is left out even where nothing makes good for it."""
+"""Share of all there is to do below which a pulse is left out even where nothing makes good for it."""
 
 HALF = 0.5
 """Share of the least on-time from which a pulse is lengthened to it; shorter ones are left out."""
 
 WIDE, MOST_KICKS = 0.25, 24
-"""rad of the faster turn from which pulses are first taken as several kicks, and the most of them."""
+"""Angle of the faster turn, rad, from which pulses are first taken as several kicks, and the most of them."""
 
 CLOSE = 1e-5
 """Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended."""
@@ -136,7 +136,7 @@ def _pulses(task: Task, spare: int) -> int:
 
 
 def random_starts(task: Task, pulses: int, count: int, rng: np.random.Generator) -> Starts:
-    """``count`` sequences of random channels and moments; many begin or end with the time there is."""
+    """Random channels and moments of ``count`` sequences; many begin or end with the time there is."""
     limits, horizon = task.body.limits, task.body.horizon
     which = rng.integers(len(task.channels), size=(count, pulses))
     share = np.sort(rng.uniform(size=(count, pulses)), axis=1)
@@ -226,7 +226,7 @@ def _screened(task: Task, starts: Starts) -> _Best:
 
 
 def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> Starts | None:
-    """Each of the best with pulses more, where they are worth most; three choices of each."""
+    """The best sequences with more pulses, where they are worth most; three choices of each."""
     grid = np.linspace(task.body.limits.earliest, task.body.horizon, MOMENTS)
     every: list[Moments] = []
     for row in range(len(best.left)):
@@ -255,9 +255,9 @@ def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> St
 
 
 def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Vector) -> Vector:
-    """What a small impulse of each channel at moments ``t`` (k,) saves of a sequence's cost, (channels, k), over all.
+    """Saving of a sequence's cost by a small impulse of each channel at moments ``t`` (k,), (channels, k), over all.
 
-    By the prices of the equations: what the impulse changes in them, less what it costs.
+    By the prices of the equations: its change in them, less its cost.
     """
     count, n = len(which), len(task.channels) * len(t)
     channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))

@@ -1,8 +1,6 @@
-"""Costs, equations, burns made feasible.
+"""Problem of the scheme optimal: channels, costs, equations, program of small angles, bounds and reasons.
 
-What the scheme optimal is to do: channels, costs, equations; their program of small angles, bounds and reasons.
-
-Burns of the linear program that can be fired: few of them, within on-times, gap and number, as pulses.
+Burns of the linear program become pulses that can be fired: few, within on-times, gap and number.
 """
 
 from __future__ import annotations
@@ -40,7 +38,7 @@ THRIFT = 0.004
 """Share of the least cost that is given away for fewer pulses."""
 
 GAIN = 0.0005
-"""The same where there are few, and share that is not worth another search."""
+"""Share of the cost given away where there are few, and share that is not worth another search."""
 
 
 class Unrepairable(Exception):
@@ -48,7 +46,7 @@ class Unrepairable(Exception):
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
-    """As few burns as hardly cost more than ``cost``, or whatever they cost: the longest are kept and may grow.
+    """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow.
 
     The optimum itself has a burn at every alignment, for the shorter a burn the less it loses to its width.
     """
@@ -104,7 +102,7 @@ def _repaired(program: Program, solution: Solution) -> Solution:
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
-    """Forbid slots at regular distances about too long burns, so that no burn can be too long; whether there are any.
+    """Forbid slots at regular distances about too long burns, so that no burn can be too long; true if there are any.
 
     Between two pulses the thruster is off for the gap, and no shorter than its shortest pulse: valves take their time.
     """
@@ -135,7 +133,7 @@ def _too_long(burn: Burn) -> bool:
 
 
 def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
-    """What to forbid: ends of too long burns, too short ones, the less of two too near, the least if too many."""
+    """Spans to forbid, s: ends of too long burns, too short ones, the less of two too near, the least if too many."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
@@ -170,16 +168,16 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 
 
 LEFT = math.radians(1e-6)
-"""rad of nutation and distance from the target, and share of the spin, below which a plan has been found."""
+"""Largest nutation and distance from the target, rad, and spin error, as a share, of a plan."""
 
 LATEST = 64.0
-"""Times the horizon up to which a feasible one is looked for, to name it."""
+"""Multiple of the horizon up to which a feasible one is looked for, to name it."""
 
 SHARPEST = 1e-3
 """Relative accuracy of a least time by the program of small angles."""
 
 NAMED = 5e-3
-"""The same where it is only advice."""
+"""Relative accuracy of a least time that is only advice."""
 
 
 DEARER = 0.03
@@ -187,7 +185,7 @@ DEARER = 0.03
 
 
 class Problem:
-    """What stays the same while a schedule is looked for."""
+    """Channels, costs and equations of one search."""
 
     def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
         self.spacecraft, self.options = spacecraft, options
@@ -211,7 +209,7 @@ class Problem:
 
     @property
     def closed(self) -> bool:
-        """Whether the motion between pulses is that of a symmetric body left alone."""
+        """True where the motion between pulses is that of a symmetric body left alone."""
         return self._dynamics.free and self.spacecraft.growth == 0.0
 
     def program(self, spacecraft: Spacecraft | None = None, equations: EndEquations | None = None) -> Program:
@@ -229,7 +227,7 @@ class Problem:
         return replace(self.spacecraft, limits=replace(self.spacecraft.limits, horizon=horizon))
 
     def feasible(self, horizon: float) -> bool:
-        """Whether the program of small angles has a solution within ``horizon`` s."""
+        """True where the program of small angles has a solution within ``horizon`` s."""
         program = self.program(self.within(horizon))
         known = program.reachable()
         return program.solve(enough=True).unmet <= UNMET if known is None else known
@@ -253,7 +251,7 @@ class Problem:
         return {name: count for name, count in needed.items() if count > self.program().forbidden.shape[1]}
 
     def with_bounds(self, schedule: Schedule, first: Solution | None = None) -> Schedule:
-        """The schedule with what any other must cost."""
+        """The schedule with the lower bounds of its cost."""
         program = self.program()
         first = first or program.solve()
         least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
@@ -269,7 +267,7 @@ class Problem:
         return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
 
     def rigorous(self, schedule: Schedule) -> float | None:
-        """What any schedule must cost that leaves no more than this one; None where nothing is known to hold."""
+        """Lower bound of the cost of schedules that leave no more than this one; None where none is known."""
         body = self.spacecraft
         left = self.leaves(self.flown(schedule))
         return bounds.rigorous(body, self.prices(), self.price(schedule), left, shift=self.equations.shift)
@@ -282,16 +280,16 @@ class Problem:
         return {channel.name: channel.strength for channel in self.spacecraft.channels}
 
     def price(self, schedule: Schedule) -> float:
-        """What a schedule costs by the program's own prices."""
+        """Cost of a schedule by the program's own prices."""
         price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
         return math.fsum(price[pulse.channel] * pulse.on_time for pulse in schedule)
 
     def worth(self, schedule: Schedule) -> float:
-        """What is to be least: the cost, or the number of pulses."""
+        """Quantity to be least: the cost, or the number of pulses."""
         return float(len(schedule)) if self.options.least == "pulses" else self.price(schedule)
 
     def dear(self, schedule: Schedule | None, least: float, share: float = DEARER) -> bool:
-        """Whether there is no schedule, or one so dear that it is worth looking for another."""
+        """True where there is no schedule, or one so dear that it is worth looking for another."""
         return schedule is None or self.price(schedule) > least * (1.0 + share)
 
     def cheaper(self, known: Schedule | None, other: Schedule | None) -> Schedule | None:
@@ -300,22 +298,22 @@ class Problem:
         return min(there, key=lambda schedule: (self.worth(schedule), self.price(schedule)), default=None)
 
     def left(self, flown: Flight) -> float:
-        """Largest of what a flight leaves, rad: nutation, distance from the target, and spin as a share of itself."""
+        """Largest end error of a flight, rad: nutation, distance from the target, and spin as a share of itself."""
         nutation, off, spin = self.leaves(flown)
         return max(nutation, max(off - (self.options.shift or 0.0), 0.0), spin)
 
     def leaves(self, flown: Flight) -> Allowed:
-        """What a flight leaves of what is requested."""
+        """End errors of a flight in the requested quantities."""
         residual, goal = flown.residual, self.spacecraft.goal
         off = residual.axis_error if self.equations.shift else 0.0
         return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
     def rounded(self, schedule: Schedule) -> float:
-        """What starts and on-times on ticks can leave, rad, added up as chance does; without ticks zero."""
+        """End error by starts and on-times on ticks, rad, root sum square; zero without ticks."""
         return math.hypot(*rounded_off(self.spacecraft, schedule))
 
     def not_found(self) -> str:
-        """Why no schedule was found although the program has solutions: the limits that it does not know of."""
+        """Reason for no schedule although the program has solutions: the limits that it does not know of."""
         if too_few := self._too_few():
             return too_few
         limits = self.spacecraft.limits
@@ -335,7 +333,7 @@ class Problem:
         )
 
     def _too_few(self) -> str:
-        """That max_pulses pulses cannot give the impulse that it takes; empty where that is not known."""
+        """Reason that max_pulses pulses cannot give the impulse needed; empty where that is not known."""
         body, most = self.spacecraft, self.spacecraft.limits.max_pulses
         if most is None or not body.inertia.symmetric or body.growth != 0.0 or body.disturbances:
             return ""
@@ -349,7 +347,7 @@ class Problem:
         )
 
     def cure(self, long_enough: Callable[[float], float | None]) -> str:
-        """Why the program has no solution, and which limit to relax; ``long_enough``: see `relaxed`."""
+        """Reason for a program without solution, and the limit to relax; ``long_enough``: see `relaxed`."""
         body = self.spacecraft
         names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
         nutation = EndEquations(shift=False)

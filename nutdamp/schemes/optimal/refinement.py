@@ -1,23 +1,15 @@
-"""Residual equations, Newton refinement, rounding to ticks.
-
-What a short firing at one moment does to what is left at the end: the equations of the linear program.
+"""Equations of the end errors, refinement of a schedule on its flight, rounding to ticks.
 
 Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), shift of H
 (two, square to the target axis) and spin (one). Before anything is planned they are those of small angles; after that
 those along a flight, at its true angles.
 
-Starts and on-times on the ticks of the commands, so that together they leave as little as they can.
+Refinement moves and lengthens pulses until the flown motion leaves nothing: a quasi-Newton iteration for the nearest
+solution. Its slopes are those of the equations, which cost no flights, corrected at each step (Broyden 1965). Room is
+shared between neighbours beforehand, so that no limit can be broken.
 
-Rounding each pulse on its own leaves what half a tick of each can do. Here starts and on-times are stepped to and fro,
-two pulses at a time, by the linear model of what is left, which is taken anew about the ticks found.
-
-The last digits of a schedule: move and lengthen its pulses until the flown motion leaves nothing.
-
-A quasi-Newton iteration for the nearest solution. The slopes are those of `refinement`, which cost no
-flights, corrected by what each step shows (Broyden 1965).
-Room is shared between neighbours beforehand, so that no limit can be broken.
-
-What can be turned of a schedule of body-fixed channels: centre and on-time of each pulse.
+On ticks, starts and on-times are stepped to and fro, two pulses at a time, by the linear model of the end error, which
+is taken anew about the ticks reached: each pulse rounded on its own leaves the effect of half a tick.
 """
 
 from __future__ import annotations
@@ -50,7 +42,7 @@ KNOTS = 400
 
 @dataclass(frozen=True, slots=True)
 class EndEquations:
-    """Which of the five are requested; the nutation always is."""
+    """Requested equations of the five; the nutation always is one."""
 
     shift: bool = True
     spin: bool = False
@@ -61,13 +53,13 @@ class EndEquations:
         return [0, 1, *([2, 3] if self.shift else []), *([4] if self.spin else [])]
 
     def beside(self, off: Vector) -> Vector:
-        """What is left (equations,) N m s where H ends ``off`` (2,) N m s beside its target, and nothing else is."""
+        """End errors, (equations,) N m s, with H ``off`` (2,) N m s beside its target and no other error."""
         return np.array([0.0, 0.0, *off, 0.0])[self.chosen]
 
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """``rows`` gives for times (n,) s what one N m s about each body axis adds to the equations, (n, equations, 3).
+    """Coefficients ``rows`` (n, equations, 3) of one N m s about each body axis at times (n,) s.
 
     ``goal`` (equations,) N m s is what all pulses together are to add. ``turning`` (equations,) rad/s are the rates at
     which the effects turn, for what is lost to a width.
@@ -82,7 +74,7 @@ class Influence:
         return np.sinc(np.outer(width, self.turning) / (2 * np.pi))
 
     def of(self, schedule: Schedule, step: float) -> Vector:
-        """What all pulses add, (equations,) N m s, each taken in parts of at most ``step`` s."""
+        """Sum of all pulses, (equations,) N m s, each taken in parts of at most ``step`` s."""
         if not len(schedule):
             return np.zeros(len(self.turning))
         counts = [int(np.ceil(pulse.on_time / step)) or 1 for pulse in schedule]
@@ -94,7 +86,7 @@ class Influence:
 
 
 def growth_from(spacecraft: Spacecraft) -> float:
-    """s from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
+    """Time, s, from which nutation counts: the end of the horizon where it is damped (or all is lost), else 0."""
     growth = spacecraft.growth
     return min(spacecraft.horizon, MOST_GROWN / -growth) if growth < 0.0 else 0.0
 
@@ -141,7 +133,7 @@ def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
 
 
 def misses(flight: Flight, equations: EndEquations) -> Vector:
-    """What a flight leaves of the equations, (equations,) N m s; zero where it ends as requested."""
+    """End errors of a flight, (equations,) N m s; zero where it ends as requested."""
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back
@@ -181,7 +173,7 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
 
 
 def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
-    """`_turned_back` where dissipation changes ω3: on coasts it is ω/ω3, or tan θ, that grows by e^{κt} exactly."""
+    """Factor `_turned_back` where dissipation changes ω3: on coasts ω/ω3, or tan θ, grows by e^{κt} exactly."""
     body = flight.spacecraft
     knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
     grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
@@ -219,7 +211,7 @@ class PulseParameters:
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
         names = {channel.name: channel for channel in spacecraft.channels}
         self.channels = [names[pulse.channel] for pulse in schedule]
-        self.made = schedule
+        self.original = schedule
         pace = 1.0 / abs(spacecraft.spin)
         self.room = rooms(spacecraft, schedule.pulses)
         start: list[float] = []
@@ -241,10 +233,10 @@ class PulseParameters:
         pulses = (
             channel_pulse(channel, float(t), float(on)) for channel, (t, on) in zip(self.channels, pairs, strict=True)
         )
-        return Schedule(tuple(pulses), self.made.notes, self.made.bounds)
+        return Schedule(tuple(pulses), self.original.notes, self.original.bounds)
 
     def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: EndEquations, step: float) -> Vector:
-        """What the scaled parameters change in the equations, (equations, 2k) N m s."""
+        """Slopes of the equations by the scaled parameters, (equations, 2k) N m s."""
         rows = along(flown, equations, step).rows
         columns = []
         begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in schedule), strict=True))
@@ -357,7 +349,7 @@ def refine(
     step: float,
     fly: Callable[[Schedule], Flight],
 ) -> Schedule:
-    """``schedule`` with centres and on-times of all its pulses moved, as little as it takes, towards ``equations`` met.
+    """The ``schedule`` with centres and on-times of its pulses moved, as little as it takes, to meet ``equations``.
 
     ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
     leaves is for the caller to judge.

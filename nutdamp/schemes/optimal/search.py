@@ -33,7 +33,7 @@ from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
 CHOICES = 3
-"""Times that burns are chosen among all channels and moments: at small angles, then along the flight before."""
+"""Choices of burns among all channels and moments: at small angles, then along the flight before."""
 
 AIMS = 8
 """Flights along which the burns chosen are corrected, at most."""
@@ -57,10 +57,10 @@ STRONG = 0.3
 """Inertial periods within which a strong channel does all there is to do."""
 
 PROVED = 0.002
-"""Share above the rigorous bound below which they are not: there is little to be saved."""
+"""Share above the rigorous bound below which very many starts are not tried."""
 
 EQUAL = 1e-6
-"""The same where what H-keeping schedules cost is not looked at any more."""
+"""Share above the rigorous bound below which schedules that keep H are not tried."""
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
@@ -69,23 +69,23 @@ MOST_LOOSE = 5000.0
 """Units that may be spent where H may move, so that some are left for schedules that keep it."""
 
 HASTE = 0.0008
-"""How much dearer the end of the horizon seems than its beginning, so that of equals the early burns are taken."""
+"""Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
 
 NEAR = 0.05
-"""rad left from which a flight is near enough to be refined."""
+"""End error, rad, below which a flight is refined."""
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
 
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""By how much more than the program's least time a schedule may need, tried in turn."""
+"""Shares added to the program's least time, tried in turn."""
 
 
 TRIED = 6
-"""So many of them, to name a horizon that is long enough..."""
+"""Margins tried to name a horizon that is long enough."""
 
 LATER = 4.0
-"""... where it is at most so many times the default one: longer ones take long to look through."""
+"""Longest horizon so tried, over the default one: longer ones take long to look through."""
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -111,7 +111,7 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
 
 
 def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
-    """With the horizon no later than dissipation has left a millionth of the nutation: waiting on costs ever less."""
+    """The spacecraft, its horizon cut where dissipation leaves a millionth of the nutation: waiting costs ever less."""
     if spacecraft.growth >= 0.0:
         return spacecraft
     faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
@@ -119,7 +119,7 @@ def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
 
 
 def _fewest(search: _LeastCostSearch) -> Schedule:
-    """The least number of pulses found: one or two by the schemes that look for them, else as the program thins."""
+    """The schedule of fewest pulses: one or two by the schemes that look for them, else as the program thins."""
     from nutdamp.schemes import one_pulse, two_pulse
 
     body = search.spacecraft
@@ -137,11 +137,11 @@ def _fewest(search: _LeastCostSearch) -> Schedule:
 
 
 class _FlownSchedule(NamedTuple):
-    """A schedule that was found: what it leaves in rad (0: as good as nothing), and what it costs."""
+    """A schedule, with its end error, rad (0: as good as none), and its cost."""
 
     left: float
     price: float
-    made: Schedule
+    schedule: Schedule
 
 
 class _LeastCostSearch(Problem):
@@ -171,19 +171,21 @@ class _LeastCostSearch(Problem):
             end = begin + span * (1.0 + margin)
             if end >= horizon:
                 break
-            if _LeastCostSearch(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).has_schedule():
                 high = end
                 break
             low = end
-        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).found():
+        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).has_schedule():
             return self  # shorter ones are looked at on the way to a schedule
         while high - low > SHARP * high:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if _LeastCostSearch(self.within(middle), self.options).found() else (middle, high)
+            low, high = (
+                (low, middle) if _LeastCostSearch(self.within(middle), self.options).has_schedule() else (middle, high)
+            )
         return _LeastCostSearch(self.within(high), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
-        """Of schedules that all do what is required that with least of what is to be saved.
+        """The schedule with least of the quantity to be saved, of ``schedules`` that all meet the requirement.
 
         Of those that take as much within `SAME_COST` the fewest pulses, then the earlier end.
         """
@@ -193,16 +195,16 @@ class _LeastCostSearch(Problem):
         equal = [schedule for schedule in schedules if spent(schedule) <= least * (1.0 + SAME_COST)]
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
-    def found(self) -> bool:
-        """Whether a schedule is found with this very horizon."""
+    def has_schedule(self) -> bool:
+        """True where a schedule is found with this very horizon."""
         least = self.program().solve()
         return least.unmet <= UNMET and self.settled(least.cost) is not None
 
     def cured(self) -> str:
-        """Why the program has no solution, and what would do: each cure that is named was tried, or says that not."""
+        """Reason for a program without solution, and its cure: each that is named was tried, or says that not."""
         goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
-        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).found()
+        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).has_schedule()
         return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
 
     def long_enough(self, needed: float) -> float | None:
@@ -214,7 +216,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted():
                 return None
             end = float(f"{needed * (1.0 + margin):.4g}")
-            if _LeastCostSearch(self.within(end), self.options).found():
+            if _LeastCostSearch(self.within(end), self.options).has_schedule():
                 return end
         return None
 
@@ -237,7 +239,7 @@ class _LeastCostSearch(Problem):
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
 
     def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
-        """The search without channels whose pulses are too short to do what is asked of them.
+        """The search without channels whose pulses are too short for their share.
 
         Raises Infeasible, naming the limit, where there are no others.
         """
@@ -253,7 +255,7 @@ class _LeastCostSearch(Problem):
             ) from None
 
     def astray(self, schedule: Schedule | None) -> bool:
-        """Whether there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
+        """True where there is no schedule, or one that, rounded to ticks, shifts H by more than it may."""
         most = math.inf if self.options.shift is None else self.options.shift
         return schedule is None or self.flown(schedule).residual.axis_error > most
 
@@ -268,7 +270,7 @@ class _LeastCostSearch(Problem):
 
     @property
     def looser(self) -> bool:
-        """Whether H may end elsewhere, so that a schedule that keeps it, or brings it to the target, will do too."""
+        """True where H may end elsewhere, so that a schedule that keeps it, or reaches the target, will do too."""
         return self.options.free_axis or self.options.shift is not None
 
     def cheapest(self, first: Solution) -> Schedule | None:
@@ -281,7 +283,7 @@ class _LeastCostSearch(Problem):
         return best if best is None else self.fuller(best, first)
 
     def fuller(self, schedule: Schedule, first: Solution) -> Schedule:
-        """``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
+        """The ``schedule``, or one of up to `FEW` pulses for each equation where, flown, it saves `SAVED` of the cost.
 
         Burns are left out by what the linear program thinks that it costs.
         """
@@ -309,7 +311,7 @@ class _LeastCostSearch(Problem):
         return schedule if self.hurried(other) and not self.hurried(schedule) else self.cheaper(schedule, other)
 
     def hurried(self, schedule: Schedule) -> bool:
-        """Whether a channel is on again before it was off for its shortest on-time: valves take their time."""
+        """True where a channel is on again before it was off for its shortest on-time: valves take their time."""
         each = ((channel, [pulse for pulse in schedule if pulse.channel == channel.name]) for channel in self.channels)
         return any(
             after.start - before.end < channel.min_on_time - TOUCHING
@@ -336,7 +338,7 @@ class _LeastCostSearch(Problem):
         return best
 
     def doubtful(self, schedule: Schedule | None, first: Solution) -> bool:
-        """Whether a schedule may not be the cheapest, so that very many starts are worth their time.
+        """True where a schedule may not be the cheapest, so that very many starts are worth their time.
 
         So where nothing was found; and where thrusters are strong, within a few nutation periods and where it is dear,
         as long as the rigorous bound does not prove it cheap enough.
@@ -353,12 +355,12 @@ class _LeastCostSearch(Problem):
         return not self.proved(schedule, PROVED)
 
     def proved(self, schedule: Schedule | None, share: float) -> bool:
-        """Whether the rigorous bound proves that nothing is cheaper than a schedule by more than that share of it."""
+        """True where a schedule costs at most that ``share`` more than the rigorous bound."""
         proof = None if schedule is None else self.rigorous(schedule)
         return schedule is not None and proof is not None and self.price(schedule) <= proof * (1.0 + share)
 
     def task(self) -> Task:
-        """What is to be done, for the descents."""
+        """Task of the descents."""
         return Task(self.spacecraft, self.equations, self.channels, self.costs, self.program().off)
 
     def descended(self, known: Schedule | None) -> Schedule | None:
@@ -400,7 +402,7 @@ class _LeastCostSearch(Problem):
         return self.best(candidates)
 
     def others(self, least: float) -> Schedule | None:
-        """What other schemes plan, as it is and corrected to cost less: they know large angles, and far targets."""
+        """Best plan of other schemes, as it is or corrected to cost less: they know large angles and far targets."""
         names = {channel.name: channel for channel in self.channels}
         candidates: list[_FlownSchedule] = []
         flights: list[Flight] = []
@@ -449,6 +451,6 @@ class _LeastCostSearch(Problem):
 
         All that leave up to `DAMPED_ANGLE` leave as little.
         """
-        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.made)]
+        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
         best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
-        return None if best is None else best.made
+        return None if best is None else best.schedule

@@ -290,7 +290,7 @@ def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
         flights = [search.flown(found) for found in best]
         assert "no other single block does better in closed form" in scope_note(search, flights[0], first=True)
         assert "no other" not in scope_note(search, flights[-1], first=False)
-        assert plan.pulses.blocks == min(flights, key=lambda made: made.rank).found.blocks
+        assert plan.pulses.blocks == min(flights, key=lambda flight: flight.rank).sequence.blocks
         assert (plan.pulses.blocks == best[0].blocks) <= ("no other single block" in plan.pulses.notes[0])
 
 
