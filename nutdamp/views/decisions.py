@@ -74,6 +74,7 @@ def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
     if not decision.plan.commandable:
         yield f"{decision.plan.scheme} cannot be commanded: no command block fires its pulses."
     yield from _growing(decision)
+    yield from _unaided(decision)
     if decision.plan.spacecraft.loop is not None:
         yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
 
@@ -94,29 +95,35 @@ TURNED = math.radians(0.1)
 
 
 def _growing(decision: Decision) -> Iterator[str]:
-    """Time for which growing nutation keeps the requirement, or from which decaying nutation does."""
-    body = decision.plan.spacecraft
-    now, idle = body.nutation, requirements.outgrown(body, body.nutation)
-    most_of = {bound.part: most(bound.most) for bound in requirements.required(body)}
-    alone = requirements.only_nutation(body)
-    damped = requirements.subsides(body)
-    if alone and damped is not None and damped < body.horizon:
-        fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {most_of[Part.NUTATION]}"
-        sooner = ", before this plan ends" if decision.plan.end > damped else ""
-        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on{sooner}: {fallen}."
-    if idle and alone:
-        grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {most_of[Part.NUTATION]}"
-        yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
+    """Time for which nutation that grows keeps the requirement after the last pulse."""
     if not len(decision.plan.pulses):
         return
     left, whose, until = decision.final.nutation, "", decision.flight.until
     if decision.cases is not None:
         left = decision.cases.levels[Part.NUTATION]
         whose = f" (not exceeded in {verdicts.exact_percent(decision.cases.probability)} of cases)"
+    body = decision.plan.spacecraft
     again = requirements.outgrown(body, left)
     if again and left > TELLING:
-        grows = f"from {degrees(left)}{whose} to {most_of[Part.NUTATION]} in {lasting(again)}"
+        most_nutation = next(most(bound.most) for bound in requirements.required(body) if bound.part is Part.NUTATION)
+        grows = f"from {degrees(left)}{whose} to {most_nutation} in {lasting(again)}"
         yield f"After {'the last pulse' if until is None else moment(until)} what is left grows again: {grows}."
+
+
+def _unaided(decision: Decision) -> Iterator[str]:
+    """Time up to which, or from which on, the requirement is met without a pulse."""
+    body = decision.plan.spacecraft
+    if not requirements.only_nutation(body):
+        return
+    now, idle, damped = body.nutation, requirements.outgrown(body, body.nutation), requirements.subsides(body)
+    limit_ = next((most(bound.most) for bound in requirements.required(body) if bound.part is Part.NUTATION), "")
+    if damped is not None and damped < body.horizon:
+        fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {limit_}"
+        sooner = ", before this plan ends" if decision.plan.end > damped else ""
+        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on{sooner}: {fallen}."
+    if idle:
+        grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {limit_}"
+        yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
 
 
 def decision_table(decision: Decision, values: str = "nominal") -> Table:

@@ -13,14 +13,16 @@ from io import StringIO
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from nutdamp.errors import listed
+from nutdamp.flight.end_state import at_start
 from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK
+from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, limit, notes, size, verdict
-from nutdamp.views.end_tables import add_aspects, angle_names, angle_texts, cone_margins, lasting
+from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text, cone_margins, lasting
 from nutdamp.views.layout import FittedColumns, columns, facts
 from nutdamp.views.plan_tables import SHORT_NAMES, channel_text
 from nutdamp.views.text import MISSING, RPM, degrees, mass, quantity
@@ -45,8 +47,11 @@ FINE = 0.01
 COARSE = 5e-4
 """Degrees below which an angle without a limit is shown as 0."""
 
-NEXT = "-v all values · --csv pulses.csv · --plot plan.png · nutdamp report"
-"""Next steps, the last line."""
+NEXT = "--plot plan.png · nutdamp report"
+"""Next steps at the end of the last line."""
+
+DIGITS = 8
+"""Figures of a value beside its limit, at most."""
 
 
 def glance(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> RenderableType:
@@ -62,24 +67,45 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
         head = [Text.assemble(("NO PLAN", "bold red"), f": {reason}")]
         return _fitted([*title, *head], [], [], [*_infeasible(compared)], _schemes(compared, ""))
     plan = decision.plan
-    head = [_headline(compared, plan, robust), coloured(verdict(decision), decision.met)]
-    warnings = verdicts.warnings(compared, beside_verdict=True)
+    head = [_headline(compared, decision, robust), coloured(verdict(decision), decision.met)]
+    warnings = [*_unreached(compared, plan)]
+    if not robust:  # its candidates are those that were made for the tolerances
+        warnings = [*verdicts.warnings(compared, beside_verdict=True), *warnings]
     head += [Text.assemble(("warning: ", "bold red"), text) for text in warnings]
     said_of = [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *_remarks(compared, plan)]
-    fired = [] if not len(plan.pulses) else [Text(), _fired(plan)]
-    return _fitted([*title, *head], [*_requirements(decision)], [_ends(decision), *fired], said_of,
-                   _schemes(compared, robust or plan.scheme))  # fmt: skip
+    table = _schemes(compared, robust or plan.scheme)
+
+    def screen(first: int) -> RenderableType:
+        fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
+        required, middle = _requirements(decision), [_ends(decision), *fired]
+        return _fitted([*title, *head], required, middle, said_of, table, blocks=bool(plan.pulses.blocks))
+
+    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
 
 
-def _headline(compared: Comparison, plan: Plan, robust: str) -> Text:
-    """Headline of the plan to fly: scheme, pulses, cost and end."""
+def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
+    """Warnings of what no plan that may be recommended can do, and of those that could."""
+    for aspect in at_start(compared.spacecraft):
+        if not aspect.kept:
+            where = f"the spin axis is {degrees(aspect.least)} from {aspect.keep.name} at t = 0 already"
+            yield f"{where} ({bounds_text(aspect.keep)}): no plan can keep that"
+    others = [other.scheme for other in compared.plans if other.feasible and not other.commandable]
+    better = [scheme for scheme in others if compared.meets(compared[scheme])]
+    if better and plan.commandable and not compared.meets(plan):
+        yield f"no command block fires {listed(better)}, which would meet the requirement: --timed recommends those"
+
+
+def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
+    """Headline of the plan to fly: scheme, pulses, cost and end; it says where that is not enough."""
+    plan = decision.plan
     pulses = plan.pulses
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
-    blocks = f"{len(pulses.blocks)} command block{'s' * (len(pulses.blocks) != 1)}, " if pulses.blocks else ""
+    blocks = f"{len(pulses.blocks)} block{'s' * (len(pulses.blocks) != 1)}, " if pulses.blocks else ""
     count = f"{blocks}{len(pulses)} pulse{'s' * (len(pulses) != 1)}, {spent}, ends at {pulses.end:.4g} s"
-    return Text.assemble(("FLY ", "bold"), (robust or plan.scheme, "bold"), f": {count}")
+    lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
+    return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
 
 def short(angle: float | None, largest: float = math.inf) -> str:
@@ -118,33 +144,46 @@ def _slack(line: Line) -> float:
 
 
 def _left(bound: Bound, value: float | None) -> str:
-    return size(bound, value) if bound.part is Part.SPIN else f"{short(value, bound.most)} deg"
+    """Residual of a part, with as many digits as it takes to stand on its side of the limit."""
+    if bound.part is Part.SPIN or value is None or math.isnan(value):
+        return size(bound, value)
+    text, figures, shown = short(value, bound.most), 3, float(f"{math.degrees(bound.most):.4g}")
+    while (float(text) > shown) != (value > bound.most) and figures < DIGITS:
+        figures += 1
+        text = f"{math.degrees(value):.{figures}g}"
+    return f"{text} deg"
+
+
+def _limits(body: Spacecraft) -> tuple[float, float]:
+    """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
+    most = {bound.part: bound.most for bound in requirements.required(body)}
+    ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
+    return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
 def _ends(decision: Decision) -> RenderableType:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
-    table, formula = facts(), plan.residual
-    angles = [f"nutation {short(left.nutation)}", f"body cone {short(left.body_cone)}"]
-    angles += [f"space cone {short(left.space_cone)}"]
+    table, formula, (least, turn) = facts(), plan.residual, _limits(body)
+    angles = [f"nutation {short(left.nutation, least)}", f"body cone {short(left.body_cone, least)}"]
+    angles += [f"space cone {short(left.space_cone, least)}"]
     if formula is not None:
-        angles[0] += f" (17: {short(formula.nutation)})"
+        angles[0] += f" (17: {short(formula.nutation, least)})"
     table.add_row("ends, deg", "  ".join(angles))
     first, second = angle_texts(body, decision.final.axis)
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
-    turned = f"turned by {short(left.momentum_shift)} deg"
-    turned = turned if body.goal.axis is None else f"{short(left.axis_error)} deg off target"
+    turned = f"turned by {short(left.momentum_shift, turn)} deg"
+    turned = turned if body.goal.axis is None else f"{short(left.axis_error, turn)} deg off target"
     spun = abs(decision.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
     spin = f"; spin {decision.final.spin * RPM:.5g} rpm" * spun
     table.add_row("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}")
-    if lasting(decision.flight):
+    if len(plan.pulses) and lasting(decision.flight):
         table.add_row("", lasting(decision.flight))
-    add_aspects(table, [aspect for aspect in decision.aspects if not aspect.kept])
     return table
 
 
-def _fired(plan: Plan) -> RenderableType:
-    """The blocks or pulses to fire, of many the first ones and the last."""
+def _fired(plan: Plan, first: int) -> RenderableType:
+    """The blocks or pulses to fire, of many the ``first`` ones and the last."""
     flown = plan.flight
     _, after = flown.around_pulses()
     rows: list[list[str]]
@@ -164,11 +203,12 @@ def _fired(plan: Plan) -> RenderableType:
         ]  # fmt: skip
         heads = ("pulse", "start s", "on-time s", "channel", "nutation after, deg")
     table = columns(*heads, text=("channel",))
-    for row in rows if len(rows) <= ROWS else rows[:FIRST]:
+    whole = len(rows) <= ROWS - FIRST + first
+    for row in rows if whole else rows[:first]:
         table.add_row(*row)
-    if len(rows) > ROWS:
+    if not whole:
         between = [""] * len(heads)
-        between[0], between[heads.index("channel")] = "…", f"{len(rows) - FIRST - 1} more"
+        between[0], between[heads.index("channel")] = "…", f"{len(rows) - first - 1} more"
         table.add_row(*between)
         table.add_row(*rows[-1])
     return table
@@ -177,21 +217,24 @@ def _fired(plan: Plan) -> RenderableType:
 def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     """One line a scheme; the one to fly is marked."""
     body = compared.spacecraft
-    propellant = all(plan.pulses.propellant is not None for plan in compared.plans if plan.feasible)
+    propellant = any(plan.pulses.propellant is not None for plan in compared.plans if plan.feasible)
+    least, turn = _limits(body)
     shift = "momentum shift" if body.goal.axis is None else "off target"
     heads = ["scheme", "pulses", "end s", "propellant g" if propellant else "impulse N m s", "nutation", shift]
     heads += ["cases"] * bool(compared.shares)
     table = columns(*heads, "verdict", text=("verdict",))
+    table.whole = ("verdict",)
     for plan in compared.plans:
         name = Text(plan.scheme, style="bold" if plan.scheme == chosen else "")
         if not plan.feasible:
             table.add_row(name, *[""] * (len(heads) - 1), "infeasible" if plan.failure is None else "error")
             continue
         flown, pulses = plan.flown, plan.pulses
-        spent = f"{1e3 * (pulses.propellant or 0.0):.4g}" if propellant else f"{pulses.total_impulse:.4g}"
+        used = MISSING if pulses.propellant is None else f"{1e3 * pulses.propellant:.4g}"
+        spent = used if propellant else f"{pulses.total_impulse:.4g}"
         nutation = None if flown is None else flown.nutation
         turned = None if flown is None else flown.momentum_shift if body.goal.axis is None else flown.axis_error
-        cells = [str(len(pulses)), f"{pulses.end:.4g}", spent, short(nutation), short(turned)]
+        cells = [str(len(pulses)), f"{pulses.end:.4g}", spent, short(nutation, least), short(turned, turn)]
         if compared.shares:
             cells.append(verdicts.share_text(compared.shares.get(plan)).removesuffix(" %"))
         met = compared.meets(plan)
@@ -217,9 +260,13 @@ def _fitted(
     middle: Sequence[RenderableType],
     more: Sequence[str],
     schemes: FittedColumns,
+    *,
+    blocks: bool = False,
 ) -> RenderableType:
     """All parts within the lines there are; notes go first, then requirements that are met with room."""
     lines = _lines(*head, *middle, schemes) + len(required) + 2
+    apart = [Text()] * (lines <= LINES)
+    lines -= 1 - len(apart)
     shown = list(required)
     if lines > LINES and len(required) > TIGHTEST:
         tight = sorted(required, key=lambda row: row[:2])[:TIGHTEST]
@@ -232,15 +279,15 @@ def _fitted(
         table.add_row(*cells)
     told: list[str] = []
     for text in more:
-        taken = _lines(Text(f"note: {text}"))
-        if lines + taken <= LINES and len(told) < NOTES:
-            told.append(text)
-            lines += taken
+        lines += _lines(Text(f"note: {text}"))
+        if lines > LINES or len(told) == NOTES:
+            break
+        told.append(text)
     hidden = len(more) - len(told) + len(required) - len(shown)
     further = f"-v {hidden} more note{'s' * (hidden != 1)}" if hidden else "-v all values"
     remarks = [Text.assemble(("note: ", "bold"), text) for text in told]
-    steps = Text(NEXT.replace("-v all values", further), style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, Text(), schemes, *remarks, steps)
+    steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
+    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *remarks, steps)
 
 
 def _lines(*parts: RenderableType) -> int:

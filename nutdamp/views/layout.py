@@ -31,8 +31,12 @@ def facts() -> Table:
 class FittedColumns(Table):
     """A table of numbers; where the screen is too narrow to show them whole, each row is a block of its own."""
 
+    whole: tuple[str, ...] = ()
+    """Headings of columns whose cells stay on one line."""
+
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        widths = _widths(self._texts, options.max_width - GAP * (len(self.columns) - 1))
+        room = options.max_width - GAP * (len(self.columns) - 1)
+        widths = _widths(self._texts, room, [str(column.header) in self.whole for column in self.columns])
         if options.max_width < NARROW or widths is None:
             yield from self._blocks()
             return
@@ -64,13 +68,14 @@ def _text(cell: RenderableType) -> Text:
     return cell if isinstance(cell, Text) else Text(str(cell))
 
 
-def _widths(columns: list[list[str]], room: int) -> list[int] | None:
+def _widths(columns: list[list[str]], room: int, unbroken: list[bool]) -> list[int] | None:
     """Characters for each column such that no word is cut; None where there is no ``room`` for that.
 
-    A number with its sign, as in "< 1e-9", or with its percent sign is one word.
+    A number with its sign, as in "< 1e-9", or with its percent sign is one word; so are cells of ``unbroken`` columns.
     """
     least = [max((cell_len(word) for text in texts for word in WORD.findall(text)), default=0) for texts in columns]
     whole = [max(cell_len(line) for text in texts for line in text.split("\n")) for texts in columns]
+    least = [most if kept else fewest for fewest, most, kept in zip(least, whole, unbroken, strict=True)]
     spare = room - sum(least)
     if spare < 0:
         return None

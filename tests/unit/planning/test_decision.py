@@ -184,7 +184,7 @@ def test_nutation_that_grows_or_decays_is_said_to_keep_the_requirement_for_a_whi
     """Before any pulse and again after the last one; the times end where a flight without pulses says."""
     decided = decided_of(STAGE, "two-pulse")
     wide = replace(decided, cases=counted(1.0, 0.54, probability=0.99))
-    before, after, loop = decisions.notes(wide)
+    after, before, loop = decisions.notes(wide)
     assert [before, loop] == list(decisions.notes(decided))
     assert list(decisions.notes(decided, looped=True)) == []
     assert idle(STAGE, 1.0, 62.41) == pytest.approx(2.0, rel=1e-4)  # the times that the text names

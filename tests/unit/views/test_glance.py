@@ -39,8 +39,9 @@ def test_a_plan_is_seen_at_a_glance(name: str) -> None:
     lines = screen(compared(nutdamp.load(places.CONFIGS / f"{name}.yaml")))
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
-    assert [line for line in lines if line.startswith(("FLY ", "NO PULSE"))] == [lines[1]]
+    assert [line for line in lines if line.startswith(("FLY ", "NO PULSE", "NOT ENOUGH"))] == [lines[1]]
     assert lines[-1].startswith("-v ")
+    assert lines[-1].endswith("nutdamp report")
     assert not any("…" in line and "more" not in line for line in lines)
 
 
@@ -82,3 +83,20 @@ def test_of_many_pulses_the_first_ones_and_the_last_are_shown() -> None:
 )
 def test_zero_is_written_one_way_below_what_matters(degrees: float, largest: float, text: str) -> None:
     assert short(math.radians(degrees), math.radians(largest)) == text
+
+
+def test_a_plan_that_misses_is_no_headline_to_fly_and_digits_stand_on_their_side_of_the_limit() -> None:
+    body = nutdamp.example().with_(requirement={"nutation": "0.5 deg", "momentum_shift": "0.16836 deg"})
+    lines = screen(compared(body, "four-pulse"))
+    assert lines[1].startswith("NOT ENOUGH: four-pulse")
+    (row,) = (line for line in lines if line.startswith("shift of H"))
+    left, most = (float(text.split()[1]) for text in (row[row.index("nominal") :], row[row.index("limit") :]))
+    assert row.endswith("NOT met")
+    assert left > most
+
+
+@pytest.mark.usefixtures("plans_shared")
+def test_what_only_timed_pulses_reach_names_the_option() -> None:
+    body = nutdamp.load(places.CONFIGS / "lunar-prospector.yaml")
+    plans = nutdamp.compare(body, options=nutdamp.Options(max_blocks=1), samples=0)
+    assert any("--timed" in line for line in screen(plans))
