@@ -27,7 +27,7 @@ from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
-from nutdamp.views.budget_tables import _warnings
+from nutdamp.views.budget_tables import _notes, _warnings
 
 
 def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:
@@ -339,6 +339,13 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
         nutdamp.budget(replace(STAGE, loop=None), [(0.1, 0.05)])
 
 
+def test_the_table_says_what_its_columns_are() -> None:
+    body = craft(loop=loop(gyro()))
+    named = [str(cell) for cell in _notes(HoldingBudget(body, None, ())).columns[0].cells]
+    assert "low, high" in named
+    assert ("tank" in named) is (body.tank is not None)
+
+
 @pytest.mark.parametrize(("pulses", "propellant", "scale"), [(1e-4, None, "linear"), (5e-3, 2e-9, "log")])
 def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propellant: float | None, scale: str) -> None:
     """Hand-made cycles: the sawtooth rises from low to high at the growth of the body, bars are as long as figures."""
@@ -354,6 +361,7 @@ def test_the_picture_shows_what_is_held_and_what_it_takes(pulses: float, propell
     names = ["no firing", "0.5 to 0.1 deg", "1 to 0.1 deg", "largest"]
     assert [str(line.get_label()) for line in courses.lines] == names
     free, first, second = (np.asarray(line.get_xydata()) for line in courses.lines[:3])
+    assert courses.get_ylim()[1] > 2.0  # the largest nutation has its line
     hours = 3600.0 if courses.get_xlabel() == "time, hours" else 1.0
     size = 100.0 + 4.0 / 1e-3
     assert (free[0], free[-1, 0] * hours) == (pytest.approx([0.0, 0.5]), pytest.approx(size))

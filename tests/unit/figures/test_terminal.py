@@ -12,6 +12,7 @@ from rich.text import Text
 from support.builders import cross, spinner
 from support.cases import deep
 
+import nutdamp
 from nutdamp.figures.braille import FAINT, BraillePanel, framed, ticks
 from nutdamp.figures.terminal import motion_drawing
 from nutdamp.flight import propagation
@@ -195,3 +196,14 @@ def test_the_dots_are_the_track() -> None:
     place = (seen / size - 0.5) * 2.0 * 1.1 * radius
     assert len(seen) > 150
     assert np.hypot(*place.T) == pytest.approx(radius, rel=0.03)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_pole_curve_says_where_its_axes_are_not_those_of_the_file(turned: bool) -> None:
+    tensor = [[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]] if turned else np.diag([100.0, 120.0, 80.0])
+    state = {"spin": 3.0, "nutation": "5 deg"}
+    body = nutdamp.load({"name": "turned", "inertia": {"tensor": np.asarray(tensor).tolist()}, "state": state})
+    flight = propagation.flown(body, Schedule(), body.inertial_period)
+    stream = io.StringIO()
+    Console(file=stream, width=120).print(motion_drawing(flight, flight.sampled(50, body.inertial_period)))
+    assert ("principal axes" in stream.getvalue()) is turned

@@ -263,6 +263,13 @@ def test_a_plan_that_keeps_h_has_no_azimuth_and_one_that_fails_no_end() -> None:
     assert (infeasible["final"], infeasible["target"]) == (None, None)
 
 
+def test_the_plan_of_a_watched_axis_has_its_angles_and_one_that_fails_none() -> None:
+    watched = read_spacecraft(POINTED + "keep: [{name: star, direction: [90 deg, 0 deg], min: 1 deg}]\n", "f.yaml")
+    (aspect,) = plan_json(planning.plan(watched, "two-pulse"))["aspects"]
+    assert (aspect["name"], aspect["min_deg"]) == ("star", pytest.approx(1.0))
+    assert "aspects" not in plan_json(planning.Plan(watched, "two-pulse", None, "why"))
+
+
 @pytest.mark.parametrize("command", ["plan", "simulate", deep("verify")])
 def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, command: str) -> None:
     """The command that shows both models gives the angles of each, one a row."""
