@@ -219,7 +219,7 @@ def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     body = compared.spacecraft
     propellant = any(plan.pulses.propellant is not None for plan in compared.plans if plan.feasible)
     least, turn = _limits(body)
-    shift = "momentum shift" if body.goal.axis is None else "off target"
+    shift = (Part.SHIFT if body.goal.axis is None else Part.DISTANCE).label
     heads = ["scheme", "pulses", "end s", "propellant g" if propellant else "impulse N m s", "nutation", shift]
     heads += ["cases"] * bool(compared.shares)
     table = columns(*heads, "verdict", text=("verdict",))
