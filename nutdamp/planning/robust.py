@@ -172,7 +172,7 @@ class RobustComparison:
     @property
     def joined(self) -> Comparison:
         """Comparison with the robust plan in it as `ROBUST`, unless it is one of those compared."""
-        if self.chosen is None or any(_kind(plan) == _kind(self.chosen.plan) for plan in self.comparison.plans):
+        if self.chosen is None or self.name != ROBUST:
             return self.comparison
         plan = replace(self.chosen.plan, scheme=ROBUST)
         flown = None if self.comparison.flown is None else {**self.comparison.flown, plan: self.chosen}
@@ -180,10 +180,11 @@ class RobustComparison:
 
     @property
     def name(self) -> str:
-        """The name of the robust plan in `joined`."""
-        known = self.comparison.plans if self.chosen is None else self.joined.plans
-        chosen = None if self.chosen is None else _kind(self.chosen.plan)
-        return next((plan.scheme for plan in known if plan.feasible and _kind(plan) == chosen), "")
+        """Name of the robust plan in `joined`; empty where there is none."""
+        if self.chosen is None:
+            return ""
+        kind = _kind(self.chosen.plan)
+        return next((plan.scheme for plan in self.comparison.plans if plan.feasible and _kind(plan) == kind), ROBUST)
 
     @property
     def lucky(self) -> bool:

@@ -163,7 +163,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
     if row.dated:
         from nutdamp.files.export import reference
 
-        reference(plan.spacecraft)
+        reference(plan.spacecraft)  # refuses a file without epoch or frame
         last = request.end() if row.track else plan.pulses.end
         if plan.spacecraft.utc(last) is None:
             cure = "an earlier --until" if row.track else "a shorter horizon"

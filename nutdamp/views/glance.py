@@ -133,7 +133,8 @@ def _requirements(decision: Decision) -> list[tuple[float, bool, tuple[str | Tex
             kept = margin >= -SLACK
             word = coloured("met" if kept else "NOT met", kept)
             label = f"axis from {aspect.keep.name}"
-            rows.append((margin, kept, (label, "", f"nominal {degrees(angle)}", f"limit {bound}", word)))
+            slack = 1.0 - float(aspect.keep.used(aspect.least, aspect.largest))
+            rows.append((slack, kept, (label, "", f"nominal {degrees(angle)}", f"limit {bound}", word)))
     return rows
 
 
@@ -185,7 +186,7 @@ def _ends(decision: Decision) -> RenderableType:
 def _fired(plan: Plan, first: int) -> RenderableType:
     """The blocks or pulses to fire, of many the ``first`` ones and the last."""
     flown = plan.flight
-    _, after = flown.around_pulses()
+    (_, after), (least, _) = flown.around_pulses(), _limits(plan.spacecraft)
     rows: list[list[str]]
     heads: tuple[str, ...]
     if plan.pulses.blocks:
@@ -198,7 +199,7 @@ def _fired(plan: Plan, first: int) -> RenderableType:
     else:
         rows = [
             [str(number), f"{pulse.loaded[0]:.4f}", f"{pulse.loaded[1]:.4f}" if pulse.loaded[1] else "ideal",
-             channel_text(pulse, plan.spacecraft), short(left)]
+             channel_text(pulse, plan.spacecraft), short(left, least)]
             for number, (pulse, left) in enumerate(zip(plan.pulses, after.nutation.tolist(), strict=True), 1)
         ]  # fmt: skip
         heads = ("pulse", "start s", "on-time s", "channel", "nutation after, deg")
@@ -284,7 +285,7 @@ def _fitted(
             break
         told.append(text)
     hidden = len(more) - len(told) + len(required) - len(shown)
-    further = f"-v {hidden} more note{'s' * (hidden != 1)}" if hidden else "-v all values"
+    further = f"-v all values ({hidden} more)" if hidden else "-v all values"
     remarks = [Text.assemble(("note: ", "bold"), text) for text in told]
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
     return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *remarks, steps)
