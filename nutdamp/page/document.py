@@ -1,14 +1,20 @@
-"""Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks."""
+"""Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks.
+
+Each kind of block names the macro of the templates that shows it.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
+
+from nutdamp.views.text import MISSING
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
@@ -16,27 +22,55 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """One column of a table; ``number``: flush right, and sorted by value."""
+    """One column of a table; ``number``: flush right; ``dots``: a dot beside each number shows it to scale."""
 
     name: str
     unit: str = ""
     number: bool = True
+    dots: bool = False
+
+
+class Cell(NamedTuple):
+    """One cell: its ``text``, the ``name`` of its column, and the place of its ``dot``, in % of the largest number."""
+
+    text: str
+    name: str
+    number: bool
+    dot: float | None = None
+
+    @property
+    def missed(self) -> bool:
+        """True for a requirement that is not met."""
+        return self.text.startswith("NOT ") or self.text == "FAIL"
 
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A table with one row for each thing compared; the first column names it.
-
-    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit. ``stacked``: where there is
-    little room each row becomes a block, so that nothing has to be scrolled.
-    """
+    """A table with one row for each thing compared; the first column names it; ``mark`` is the row to stand out."""
 
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
-    sortable: bool = True
-    stacked: bool = False
+    kind: ClassVar[str] = "sheet"
+
+    @property
+    def cells(self) -> tuple[tuple[Cell, ...], ...]:
+        """Rows of cells."""
+        names = [", ".join(filter(None, column[:2])) for column in self.columns]
+        numbers = [
+            [number_in(row[at]) if column.dots else None for row in self.rows] for at, column in enumerate(self.columns)
+        ]
+        most = [max((abs(value) for value in values if value is not None), default=0.0) for values in numbers]
+        return tuple(
+            tuple(
+                Cell(text, name, column.number, None if value is None or not largest else 100.0 * abs(value) / largest)
+                for text, name, column, value, largest in zip(
+                    row, names, self.columns, (values[index] for values in numbers), most, strict=True
+                )
+            )
+            for index, row in enumerate(self.rows)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,53 +79,36 @@ class FactList:
 
     title: str
     rows: tuple[tuple[str, str], ...]
+    kind: ClassVar[str] = "facts"
 
 
 @dataclass(frozen=True, slots=True)
 class Prose:
-    """A paragraph."""
+    """A paragraph; ``alarm``: it stands in a red frame."""
 
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remarks:
-    """Remarks, each with the name of its subject."""
-
-    rows: tuple[tuple[str, str], ...]
+    alarm: bool = False
+    kind: ClassVar[str] = "prose"
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """A list of short paragraphs."""
+    """A list of short paragraphs, each with the name of its subject, if any."""
 
-    rows: tuple[str, ...]
-
-
-LONG = 550.0
-"""Units of a drawing of which text of 7.5 units is 9 px high on a page of 720 px."""
+    rows: tuple[tuple[str, str], ...]
+    kind: ClassVar[str] = "points"
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An ``<svg>`` element, its title, a caption, and a description for those who do not see it.
-
-    For narrow screens there is another drawing, ``narrow``, or ``views``: panels and entries of the legend as view
-    boxes on the group called ``name`` in it, which are shown as wide as they are at most, in px.
-    """
+    """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a phone, if any."""
 
     svg: str
     title: str
     caption: str
     described: str
     narrow: str = ""
-    name: str = ""
-    views: tuple[tuple[str, int], ...] = ()
-
-    @property
-    def long(self) -> bool:
-        """True where its text is too small to read where the page is little wider than a narrow screen."""
-        return float(self.svg.split('viewBox="', 1)[1].split()[2]) > LONG
+    kind: ClassVar[str] = "picture"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +117,25 @@ class Listing:
 
     title: str
     text: str
+    kind: ClassVar[str] = "listing"
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Blocks side by side where there is room; ``still``: shown only where no script moves the view before them."""
+
+    blocks: tuple[Block, ...]
+    still: bool = False
+    kind: ClassVar[str] = "beside"
+
+
+@dataclass(frozen=True, slots=True)
+class Details:
+    """Blocks behind their title, which a click opens; they are not printed."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    kind: ClassVar[str] = "details"
 
 
 class Circle(NamedTuple):
@@ -143,25 +179,18 @@ class Moving:
     how: str
     command: tuple[str, ...]
     data: str
+    kind: ClassVar[str] = "moving"
 
 
-Block = Sheet | FactList | Prose | Remarks | Points | Picture | Moving | Listing
+Block = Sheet | FactList | Prose | Points | Picture | Listing | Moving | Beside | Details
 
 
 class PageSection(NamedTuple):
-    """A heading with its blocks; ``name`` is the target of links."""
+    """A heading with its blocks; ``name`` is its id."""
 
     name: str
     title: str
     blocks: tuple[Block, ...]
-
-
-class Figure(NamedTuple):
-    """One of the few numbers to read first; ``note``: the number to compare it with."""
-
-    name: str
-    value: str
-    note: str = ""
 
 
 class Control(NamedTuple):
@@ -174,52 +203,86 @@ class Control(NamedTuple):
     date: str = ""
 
     @property
-    def named(self) -> tuple[tuple[str, str], ...]:
-        """Names and values of the entries given, but for the title."""
-        pairs = zip(self._fields[1:], self[1:], strict=True)
-        return tuple((name, value) for name, value in pairs if value)
+    def line(self) -> str:
+        """The entries but for the title, on one line."""
+        return " · ".join(filter(None, (self.number, self.author, self.date)))
+
+    @property
+    def number(self) -> str:
+        """Number of the document and its issue."""
+        return " ".join(filter(None, (self.document, self.issue and f"iss {self.issue}")))
 
 
 UNCONTROLLED = Control()
 """Configuration control of a page without any entry."""
 
 
+class Margin(NamedTuple):
+    """One requirement as texts and as a bar: shares of its limit, of the nominal value and of the cases, in %."""
+
+    texts: tuple[str, ...]
+    met: bool
+    bar: tuple[float, float]
+
+
+class Contender(NamedTuple):
+    """One scheme on the first screen: its texts; ``chosen``: it is the one to fly."""
+
+    name: str
+    texts: tuple[str, ...]
+    chosen: bool
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report: title, verdict, the decision, numbers to read first, sections.
+    """A whole report: title, decision, motion, schemes at a glance, and sections.
 
-    ``met``: whether the requirement is, None where nothing is required; ``good``: nothing is missed at all.
+    ``state``: "met", "unchecked" where tolerances were not, "missed". ``good``: nothing is missed at all, required or
+    not. ``source``: the beginning of the hash of the input file.
     """
 
     title: str
     control: Control
-    verdict: str
-    met: bool | None
+    source: str
+    state: str
     good: bool
-    decision: tuple[Block, ...]
-    figures: tuple[Figure, ...]
+    met: bool | None
+    headline: tuple[str, str]
+    verdict: str
+    margins: tuple[Margin, ...]
+    facts: FactList | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    motion: tuple[Block, ...]
+    contenders: tuple[Contender, ...]
     sections: tuple[PageSection, ...]
     made_by: str
+
+    def with_sections(self, sections: Iterable[PageSection]) -> Page:
+        """Copy with these sections."""
+        return replace(self, sections=tuple(sections))
+
+    @property
+    def summary(self) -> str:
+        """Headline, verdict and warnings as one text."""
+        return " ".join(
+            [f"{''.join(self.headline)}.", f"{self.verdict}." if self.verdict else "", *self.warnings]
+        ).strip()
 
     @property
     def footer(self) -> str:
         """Text at the foot of each sheet of paper, beside its number."""
-        document, issue, date = self.control.document, self.control.issue, self.control.date
-        return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
+        return ", ".join(filter(None, (self.control.number or self.title, self.control.date, self.source)))
 
 
-def sheet_of(title: str, table: Table) -> Sheet:
-    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
-
-    Where the first column has no heading, each row is a quantity of its own unit.
-    """
+def sheet_of(title: str, table: Table, dots: Iterable[str] = ()) -> Sheet:
+    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
     columns = []
     for column in table.columns:
         name, _, unit = plain(column.header).partition("\n")
-        columns.append(Column(name, unit, column.justify == "right"))
+        columns.append(Column(name, unit, column.justify == "right", name in dots))
     first = columns[0]
-    headed = (first._replace(name=first.name or "quantity"), *columns[1:])
-    return Sheet(title, headed, _rows(table), sortable=bool(first.name))
+    return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table))
 
 
 def facts_of(title: str, table: Table) -> FactList:
@@ -233,10 +296,10 @@ def facts_of(title: str, table: Table) -> FactList:
     return FactList(title, tuple(rows))
 
 
-def blocks_of(title: str, screen: Group) -> Iterator[Block]:
+def blocks_of(title: str, screen: RenderableType) -> Iterator[Block]:
     """Blocks of a screen: a line straight above a table is its title, else ``title`` is."""
     above = ""
-    for part in screen.renderables:
+    for part in _parts(screen):
         if isinstance(part, Table):
             maker = sheet_of if part.show_header else facts_of
             yield maker(above or title, part)
@@ -249,6 +312,15 @@ def blocks_of(title: str, screen: Group) -> Iterator[Block]:
         yield Prose(above)
 
 
+def _parts(screen: RenderableType) -> Iterator[RenderableType]:
+    """Tables and texts of a screen, groups within it resolved."""
+    if isinstance(screen, Group):
+        for part in screen.renderables:
+            yield from _parts(part)
+    else:
+        yield screen
+
+
 def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
     cells: list[Iterable[str]] = [map(plain, column.cells) for column in table.columns]
     return tuple(zip(*cells, strict=True))
@@ -257,3 +329,14 @@ def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
 def plain(cell: object) -> str:
     """The text of a cell, which in the tables of the screens is a text with or without a style."""
     return cell.plain if isinstance(cell, Text) else str(cell)
+
+
+def number_in(text: str) -> float | None:
+    """The number in a cell; None where it is not known or a word."""
+    if text == MISSING:
+        return None
+    try:
+        value = float(text.lstrip("<≥").strip())
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

@@ -1,141 +1,100 @@
-"""The pictures of a page: the recommended schedule, drawn from its flight through the real widths."""
+"""The pictures of a page: inline SVG, their titles as text of the page."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nutdamp.figures import dispersion, export, geometry, overview, schemes, trade
+from nutdamp.figures import dispersion, export, image, overview, trade
 from nutdamp.figures.overview import NARROW
 from nutdamp.page.document import Picture
-from nutdamp.page.panels import picture
-from nutdamp.physics import attitude
-from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views.text import degrees
 from nutdamp.views.tolerance_tables import budget_rows
 
 if TYPE_CHECKING:
-    from nutdamp.flight.track import Track
+    from matplotlib.figure import Figure
+
     from nutdamp.montecarlo.study import Results
 
 
-UNEQUAL = " With I1 ≠ I2 the space cone is what ω traces about H in free motion: not circular, nor closed."
-"""Note on cones that are not circular."""
+POINTS = 72.0
+"""Units of an SVG in an inch."""
+
+FLIGHT = (
+    (
+        "motion",
+        "Pole curve: the tip of the rotation vector ω in the body. Axis track: the spin axis in space, "
+        "with the places of the angular momentum H.",
+        "Pole curve in the body and track of the spin axis in space, with numbered pulses",
+    ),
+    ("history", "Body rates and cone angles over time; bars mark the pulses.", "Body rates and cone angles over time"),
+)
+"""Names of the pictures of a flight, their captions and descriptions."""
 
 
-def pictures_of(plan: Plan) -> tuple[Picture, ...]:
-    """Pole curve and axis track, cones in space, rates and angles over time, firings; raises MissingExtra."""
+def flight_pictures(plan: Plan) -> tuple[Picture, ...]:
+    """Motion and history of a plan, from its flight through the real widths; raises MissingExtra."""
     flown, track = export.shown(plan)
-    drawn = [
-        (
-            "motion",
-            "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
-            "Axis track: the direction of the spin axis in space, with the places of the angular momentum H"
-            + (", enlarged in a panel of their own." if geometry.momentum_inset(flown, track) is not None else ".")
-            + _wanders(plan, track),
-            "Pole curve in the body and track of the spin axis in space",
-        ),
-        (
-            "sphere",
-            f"The cones in space: {'the inside of ' * (plan.spacecraft.inertia.a < 0.0)}the body cone rolls on the "
-            "space cone about H." + UNEQUAL * (not plan.spacecraft.inertia.symmetric),
-            "Spherical view of body cone, space cone, angular momentum and spin axis",
-        ),
-        (
-            "history",
-            "Body rates and cone angles over time; bars mark the pulses. The nutation is shown on a log axis too.",
-            "Body rates and cone angles over time",
-        ),
-    ]
-    if len(plan.pulses):
-        through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
-        how, unit = ("by which impulse", "impulse") if plan.pulses.idealised else ("for how long", "on-time")
-        caption = f"Which channel fires, when and {how}: “pulse: {unit}” beside the bars where there is room, and in "
-        caption += "the schedule."
-        caption += through * plan.pulses.through_valves
-        if any(pulse.channel == STEERABLE for pulse in plan.pulses):
-            caption += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
-        drawn.append(("timeline", caption, "Timeline of the firings"))
+
+    def figure(name: str, *, narrow: bool = False) -> Figure:
+        return overview.flight_figure(name, flown, track, narrow=narrow)
+
     return tuple(
-        picture(
-            overview.flight_figure(name, flown, track),
-            caption,
-            described,
-            overview.flight_figure(name, flown, track, narrow=True) if name in NARROW else None,
-        )
-        for name, caption, described in drawn
+        _picture(figure(name), caption, described, figure(name, narrow=True) if name in NARROW else None)
+        for name, caption, described in FLIGHT
     )
 
 
-def _wanders(plan: Plan, track: Track) -> str:
-    """Note on the distance that H goes between the pulses, where its end is bounded by less; empty elsewhere."""
-    body = plan.spacecraft
-    most_of = {bound.part: bound.most for bound in requirements.required(body)}
-    if requirements.aim(body) is not Part.SHIFT or Part.SHIFT not in most_of:
-        return ""
-    farthest = float(attitude.angle_between(track.momentum[:1], track.momentum).max())
-    if farthest <= most_of[Part.SHIFT]:
-        return ""
-    return f" Between the pulses H is up to {degrees(farthest)} from where it was: what is required is for the end."
-
-
-def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
-    """The schemes beside each other; raises MissingExtra."""
-    return picture(
-        schemes.schemes_figure(compared, decided),
-        "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, its row says "
-        "so, whatever it costs. Values below the range of an axis are drawn at its left edge.",
-        "Dot plots of cost, end, nutation and shift of H by scheme",
-    )
-
-
-def trade_picture_of(compared: Comparison, fronts: Sequence[Front]) -> Picture:
+def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
     wide, narrow = (
         trade.trade_figure(compared.spacecraft, fronts, compared.recommended, narrow=narrow) for narrow in (False, True)
     )
-    return picture(
-        wide,
-        "What an earlier end costs: each mark is a schedule for one of the end times tried, numbered along each front; "
-        "between them a schedule may cost less than the line.",
-        "Cost of schedules over the end of the last pulse",
-        narrow,
-    )
+    caption = "Each mark is a schedule for one of the end times tried, numbered along each front."
+    return _picture(wide, caption, "Cost of schedules over the end of the last pulse", narrow)
 
 
-def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
-    """Distribution of the cases of a study, final H, effect of each tolerance; raises MissingExtra."""
-    body = dispersed.study.model.spacecraft
-    bounded = any(bound.part is requirements.aim(body) for bound in requirements.required(body))
-    limited = bool(requirements.required(body))
+def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
+    """Distribution of the cases of a study, and effect of each tolerance; raises MissingExtra."""
+    limited = bool(requirements.required(dispersed.study.model.spacecraft))
     biased = any(row.bias for row in budget_rows(dispersed.study))
     drawn = (
         (
             "cases",
-            "How many cases leave how much nutation, and how far H has moved, with what is required: "
-            "histograms, and the share of cases beyond each value.",
-            "Histograms and distribution functions of nutation and shift of H",
-        ),
-        (
-            "momentum",
-            "Where H ends in each case, with the ellipse that holds as many cases as must comply"
-            + (", and what is required of it." if bounded else ".")
-            + " The shift of H is counted from where H was at t = 0 in that case." * (body.goal.axis is None),
-            "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
+            "How many cases leave how much nutation, and how far H has moved.",
+            "Histograms and distribution functions of nutation and of the end of H",
         ),
         (
             "budget",
-            f"One sigma of each input{', or its bias (hatched),' * biased} alone: what it does to the nutation, and to "
-            "where H ends." + " What is required holds for all inputs together." * limited,
+            f"One sigma of each input{', or its bias (hatched),' * biased} alone."
+            + " What is required holds for all inputs together." * limited,
             "Tornado of the tolerance budget",
         ),
     )
     return tuple(
-        picture(dispersion.dispersion_figure(name, dispersed, scheme=scheme), caption, described)
+        _picture(dispersion.dispersion_figure(name, dispersed, scheme=scheme), caption, described)
         for name, caption, described in drawn
     )
+
+
+def _picture(figure: Figure, caption: str, described: str, narrow: Figure | None = None) -> Picture:
+    title = str(figure.get_label()) or figure.get_suptitle()
+    return Picture(_untitled(figure), title, caption, described, "" if narrow is None else _untitled(narrow))
+
+
+def _untitled(figure: Figure) -> str:
+    """The SVG of a figure without the line above it, which breaks where it must as text of the page."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
+    if title is None:
+        return image.svg(figure)
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    top = POINTS * (figure.get_figheight() - title.get_window_extent(renderer).y0 / figure.dpi)
+    title.set_visible(False)
+    box = f"0 {top:.1f} {POINTS * figure.get_figwidth():.1f} {POINTS * figure.get_figheight() - top:.1f}"
+    return re.sub(r'(?<=\bviewBox=")[^"]*', box, image.svg(figure), count=1)

@@ -146,9 +146,10 @@ def _(compared: Comparison) -> str:
 
 @results.html.register
 def _(spacecraft: Spacecraft) -> str | None:
-    from nutdamp.page.craft import spacecraft_facts
+    from nutdamp.page.document import facts_of
+    from nutdamp.views.plan_tables import derived_table
 
-    return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
+    return _block(facts_of(spacecraft.name, derived_table(spacecraft)))
 
 
 @results.html.register

@@ -10,13 +10,13 @@ import numpy as np
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Residual
 from nutdamp.page.document import Column, Sheet
-from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views import verdicts
-from nutdamp.views.decisions import COUNT, KEPT
-from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text
+from nutdamp.views.decisions import COUNT
+from nutdamp.views.end_tables import angle_names, angle_texts
 from nutdamp.views.plan_tables import MILLISECONDS, channel_text, flown_by, ratios
 from nutdamp.views.text import MISSING, digits, in_degrees, longitude
 
@@ -45,19 +45,19 @@ def comparison_sheet(compared: Comparison) -> Sheet:
 def _columns(compared: Comparison) -> list[tuple[Column, Cell]]:
     columns: list[tuple[Column, Cell]] = [
         (Column("pulses"), lambda plan: str(len(plan.pulses))),
-        (Column("ends at", "s"), lambda plan: f"{plan.pulses.end:.3f}"),
-        (Column("impulse", "N m s"), lambda plan: _number(plan.pulses.total_impulse)),
+        (Column("ends at", "s", dots=True), lambda plan: f"{plan.pulses.end:.3f}"),
+        (Column("impulse", "N m s", dots=True), lambda plan: _number(plan.pulses.total_impulse)),
         *((Column("impulse", name), cell) for name, cell in ratios(compared.spacecraft)),
     ]
     if any(plan.feasible and plan.pulses.propellant is not None for plan in compared.plans):
-        columns.append((Column("propellant", "g"), lambda plan: _number(plan.pulses.propellant, 1e3)))
+        columns.append((Column("propellant", "g", dots=True), lambda plan: _number(plan.pulses.propellant, 1e3)))
     columns += [
-        (Column("nutation left", "deg"), lambda plan: _angle(plan.flown, "nutation")),
-        (Column("shift of H", "deg"), lambda plan: _angle(plan.flown, "momentum_shift")),
+        (Column("nutation left", "deg", dots=True), lambda plan: _angle(plan.flown, "nutation")),
+        (Column("shift of H", "deg", dots=True), lambda plan: _angle(plan.flown, "momentum_shift")),
     ]
     body = compared.spacecraft
     if body.goal.axis is not None:
-        columns.append((Column("off the target", "deg"), lambda plan: _angle(plan.flown, "axis_error")))
+        columns.append((Column("off the target", "deg", dots=True), lambda plan: _angle(plan.flown, "axis_error")))
     columns += [
         (Column(f"axis: {angle_names(body)[0]}", "deg"), lambda plan: _pointing(plan, 0)),
         (Column(f"axis: {angle_names(body)[1]}", "deg"), lambda plan: _pointing(plan, 1)),
@@ -118,23 +118,6 @@ def on_times(pulses: Schedule) -> tuple[Column, list[str]]:
     """The column of on-times to be loaded; its name tells where valves change them."""
     name = "on-time, commanded" if pulses.through_valves else "on-time"
     return Column(name, "s"), ["ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}" for pulse in pulses]
-
-
-def aspects_sheet(decided: Decision) -> Sheet:
-    """One row a direction that is watched: least and largest angle of the spin axis from it, and the limits of both."""
-    rows = tuple(
-        (
-            aspect.keep.name,
-            *(cell for angle, at in (aspect[1:3], aspect[3:5]) for cell in (in_degrees(angle), f"{at:.3f}")),
-            bounds_text(aspect.keep) or "none",
-            KEPT[aspect.kept] if aspect.keep in decided.plan.spacecraft.keep else MISSING,
-        )
-        for aspect in decided.aspects
-    )
-    names = ("direction", ""), ("least angle", "deg"), ("at", "s"), ("largest angle", "deg"), ("at", "s")
-    heads = [Column(name, unit, bool(unit)) for name, unit in (*names, ("limit", ""), ("verdict", ""))]
-    title = "The spin axis from directions that the file names, to one nutation period after the last pulse"
-    return Sheet(title, tuple(heads), rows, sortable=False, stacked=True)
 
 
 def residual_sheet(title: str, left: Residual) -> Sheet:
