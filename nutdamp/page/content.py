@@ -99,7 +99,7 @@ def report_page(
         motion=() if decided is None else (moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
         contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
         sections=(),
-        made_by=f"Made by nutdamp {__version__}.",
+        made_by=f"nutdamp {__version__}",
     )
     return page.with_sections(_sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :]))
 
@@ -124,8 +124,9 @@ def _sections(
         identity = [("document", page.control.line), ("input file", _file_line(repeat))]
         known = [(name, text) for name, text in identity if text]
         blocks = manoeuvre_blocks(decided, dispersed, known, page.summary)
-        yield PageSection("manoeuvre", title, tuple(blocks))
+        # Before the sheet, which is a page of its own in print: one line after it would be another.
         yield PageSection("verification", "Verification", tuple(_verification(decided.plan)))
+        yield PageSection("manoeuvre", title, tuple(blocks))
     yield PageSection("background", "Background", tuple(_background(compared, decided, dispersed, repeat)))
 
 
@@ -161,7 +162,7 @@ def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
 
 
 def _margin(row: glance.RequirementRow) -> Margin:
-    texts = (row.label, row.nominal, row.dispersed, row.limit, row.verdict.plain)
+    texts = (row.label, row.nominal, row.dispersed, row.limit, f"margin {row.margin}", row.verdict.plain)
     return Margin(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
 
 

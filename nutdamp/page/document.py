@@ -14,7 +14,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.views.text import MISSING
+from nutdamp.views.text import MISSING, sentence
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
@@ -265,14 +265,15 @@ class Page:
     @property
     def summary(self) -> str:
         """Headline, verdict and warnings as one text."""
-        return " ".join(
-            [f"{''.join(self.headline)}.", f"{self.verdict}." if self.verdict else "", *self.warnings]
-        ).strip()
+        parts = ("".join(self.headline), self.verdict, *self.warnings)
+        return " ".join(sentence(part.removesuffix(".")) for part in parts if part)
 
     @property
     def footer(self) -> str:
         """Text at the foot of each sheet of paper, beside its number."""
-        return ", ".join(filter(None, (self.control.number or self.title, self.control.date, self.source)))
+        return ", ".join(
+            filter(None, (self.control.number or self.title, self.control.date, self.source, self.made_by))
+        )
 
 
 def sheet_of(title: str, table: Table, dots: Iterable[str] = ()) -> Sheet:
@@ -332,11 +333,11 @@ def plain(cell: object) -> str:
 
 
 def number_in(text: str) -> float | None:
-    """The number in a cell; None where it is not known or a word."""
+    """The number in a cell, 0 for "< 1e-9"; None where it is not known or a word."""
     if text == MISSING:
         return None
     try:
-        value = float(text.lstrip("<≥").strip())
+        value = 0.0 if text.startswith("<") else float(text)
     except ValueError:
         return None
     return value if math.isfinite(value) else None

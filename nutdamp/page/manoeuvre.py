@@ -54,7 +54,7 @@ def manoeuvre_blocks(
         yield Prose(" ".join(obstacles) or summary, alarm=bool(obstacles))
         return
     zero = body.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
-    yield FactList("Sheet", (*identity, ("UTC of t = 0", zero)))
+    yield FactList("", (*identity, ("UTC of t = 0", zero)))
     yield Prose(summary, alarm=decision.met is False)
     points = None
     if dispersed is not None:
@@ -63,7 +63,7 @@ def manoeuvre_blocks(
         points = Checkpoints(dispersed.study)
     yield FactList("GO at t = 0 with", tuple(_conditions(decision, points)))
     yield _fired(plan, points)
-    yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
+    yield FactList("", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
     yield Sheet(
         "Signatures",
         tuple(Column(name, number=False) for name in SIGNED),

@@ -132,7 +132,7 @@ def short(angle: float | None, largest: float = math.inf) -> str:
 
 
 class RequirementRow(NamedTuple):
-    """Requirement in words: its label, values in the cases and nominally, limit and verdict.
+    """Requirement in words: its label, values in the cases and nominally, limit, verdict and margin.
 
     ``used``: shares of the limit that the nominal value and that of the cases take, NaN where it is not known.
     """
@@ -142,6 +142,7 @@ class RequirementRow(NamedTuple):
     nominal: str
     limit: str
     verdict: Text
+    margin: str
     used: tuple[float, float]
 
     @property
@@ -169,15 +170,23 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
         used = [math.nan if value is None else value / bound.most for value in values]
         met = coloured(verdicts.VERDICT[line.met], line.met)
-        rows.append(RequirementRow(bound.part.label, *words, met, (used[0], used[1])))
+        rows.append(RequirementRow(bound.part.label, *words, met, _margin(bound, line.margin), (used[0], used[1])))
     for aspect in decision.aspects:
         for text, angle, margin in cone_margins(aspect):
             kept = margin >= -SLACK
             words = "", f"nominal {degrees(angle)}", f"limit {text}"
             used_up = float(aspect.keep.used(aspect.least, aspect.largest))
             met = coloured(verdicts.VERDICT[kept], kept)
-            rows.append(RequirementRow(f"axis from {aspect.keep.name}", *words, met, (used_up, math.nan)))
+            rows.append(
+                RequirementRow(
+                    f"axis from {aspect.keep.name}", *words, met, f"{short(margin)} deg", (used_up, math.nan)
+                )
+            )
     return rows
+
+
+def _margin(bound: Bound, margin: float) -> str:
+    return size(bound, margin) if bound.part is Part.SPIN else f"{short(margin, bound.most)} deg"
 
 
 def _left(bound: Bound, value: float | None) -> str:
