@@ -495,8 +495,8 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """Sentence at the top of the page."""
-        return self.page.verdict
+        """Headline, verdict and warnings at the top of the page."""
+        return self.page.summary
 
     @property
     def met(self) -> bool | None:

@@ -137,9 +137,10 @@ def _title(body: Spacecraft) -> str:
 
 
 def _state(decided: Decision | None) -> str:
+    """Name of the colour of the decision."""
     if decided is None or decided.met is False:
         return "missed"
-    return "unchecked" if decided.cases is None else "met"
+    return "met" if decided.cases is not None and _good(decided) else "caution"
 
 
 def _good(decided: Decision) -> bool:
@@ -233,7 +234,7 @@ def _background(
 ) -> Iterator[Block]:
     """What is looked up only: spacecraft, pulses, method, assumptions, input."""
     body = compared.spacecraft
-    yield Details("Spacecraft", tuple(blocks_of(body.name, check_screen(body))))
+    yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:
         ends = facts_of("Final state", decisions.end_facts(decided))
         fired = (pulse_sheet(decided.plan),) if len(decided.plan.pulses) else ()
@@ -251,7 +252,9 @@ def _repeat(repeat: Repeat, dispersed: Results | None) -> Iterator[Block]:
     yield Listing("Command", printable(repeat.command))
     facts = [("seed of the dispersed cases", str(dispersed.study.seed))] if dispersed is not None else []
     facts += [("input file", _file_line(repeat))] if repeat.text else []
-    yield FactList("Versions", (*_versions(), *facts, *repeat.settings))
+    yield FactList("Versions", (*_versions(), *facts))
+    if repeat.settings:
+        yield FactList("Set in place of what the file says", repeat.settings)
     if repeat.text:
         yield Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n"))
 

@@ -237,8 +237,8 @@ class Contender(NamedTuple):
 class Page:
     """A whole report: title, decision, motion, schemes at a glance, and sections.
 
-    ``state``: "met", "unchecked" where tolerances were not, "missed". ``good``: nothing is missed at all, required or
-    not. ``source``: the beginning of the hash of the input file.
+    ``state``: "met", "caution" where tolerances were not checked or a limit is broken, "missed". ``good``: nothing is
+    missed at all, required or not. ``source``: the beginning of the hash of the input file.
     """
 
     title: str

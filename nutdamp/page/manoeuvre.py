@@ -25,7 +25,7 @@ from nutdamp.views.plan_tables import channel_text
 from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity
 
 if TYPE_CHECKING:
-    from nutdamp.montecarlo.checkpoints import Checkpoints, Range
+    from nutdamp.montecarlo.checkpoints import Checkpoints
     from nutdamp.montecarlo.study import Results
 
 
@@ -54,7 +54,7 @@ def manoeuvre_blocks(
         yield Prose(" ".join(obstacles) or summary, alarm=bool(obstacles))
         return
     zero = body.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
-    yield FactList("", (*identity, ("UTC of t = 0", zero)))
+    yield FactList("Document and time", (*identity, ("UTC of t = 0", zero)))
     yield Prose(summary, alarm=decision.met is False)
     points = None
     if dispersed is not None:
@@ -63,7 +63,7 @@ def manoeuvre_blocks(
         points = Checkpoints(dispersed.study)
     yield FactList("GO at t = 0 with", tuple(_conditions(decision, points)))
     yield _fired(plan, points)
-    yield FactList("", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
+    yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
     yield Sheet(
         "Signatures",
         tuple(Column(name, number=False) for name in SIGNED),
@@ -137,20 +137,21 @@ def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
     angles = after.nutation[np.array(counts) - 1].tolist()
     columns.append((Column("nutation after", "deg"), [short(angle, least) for angle in angles]))
     if points is not None:
-        columns.append((Column("hold if outside", "deg"), _ranges(points, counts)))
+        columns.append((Column("hold if outside", "deg"), _ranges(points, counts, angles, least)))
     columns.append((Column("done", number=False), ["☐"] * len(counts)))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet("Fire", tuple(column for column, _ in columns), rows)
 
 
-def _ranges(points: Checkpoints, counts: Sequence[int]) -> list[str]:
-    """Range of the nutation in flown cases after each row that has one."""
+def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float], limit: float) -> list[str]:
+    """Range of the nutation in flown cases after each row that has one, with that ``expected`` (rad) in it."""
     from nutdamp.montecarlo.checkpoints import even
 
-    checked = [counts[number - 1] for number in even(len(counts), CHECKED)]
-    ranges: dict[int, Range] = dict(zip(checked, points.nutation_after(checked), strict=True))
-    texts = {count: f"{short(least)} to {short(most)}" for count, (least, most) in ranges.items()}
-    return [texts.get(count, MISSING) for count in counts]
+    rows = [number - 1 for number in even(len(counts), CHECKED)]
+    texts = [MISSING] * len(counts)
+    for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
+        texts[row] = f"{short(min(least, expected[row]), limit)} to {short(max(most, expected[row]), limit)}"
+    return texts
 
 
 def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Column, list[str]]]:
