@@ -45,7 +45,7 @@ from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, verdicts
 from nutdamp.views.check_tables import check_screen
-from nutdamp.views.text import mass, quantity
+from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade_tables import apart, beats, front_parts
 from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 
@@ -195,7 +195,7 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
 
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
-    yield Prose(verdicts.sentence(verdicts.reason(compared)))
+    yield Prose(sentence(verdicts.reason(compared)))
     yield comparison_sheet(compared)
     chosen = compared.recommended
     own = [
@@ -225,8 +225,9 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     note = budget_note(verified, aimed=body.goal.axis is not None)
     flights = sheet_of("Differences from the flown motion are the largest on the way", methods_table(verified))
-    blocks = (flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified)))
-    yield Details("Independent flights and error budget", (*blocks, *[Prose(note)] * bool(note)))
+    blocks: list[Block] = [flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified))]
+    blocks += [Prose(note)] * bool(note)
+    yield Details("Independent flights and error budget", tuple(blocks))
 
 
 def _background(

@@ -169,8 +169,12 @@ def _block_columns(plan: Plan) -> list[tuple[Column, list[str]]]:
     def counted(value: float, count: int | None) -> str:
         return f"{value:.6g}" if count is None else f"{value:.6g} ({count})"
 
-    delays = [counted(block.delay, commands and commands.delay_counts(block.delay)) for block in blocks]
-    widths = [counted(block.width, commands and commands.width_counts(block.width)) for block in blocks]
+    delays = [
+        counted(block.delay, None if commands is None else commands.delay_counts(block.delay)) for block in blocks
+    ]
+    widths = [
+        counted(block.width, None if commands is None else commands.width_counts(block.width)) for block in blocks
+    ]
     counts = "" if commands is None else " (counts)"
     return [
         (Column("thrusters", number=False), [names.get(block.channel, block.channel) for block in blocks]),

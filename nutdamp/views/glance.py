@@ -12,6 +12,7 @@ from io import StringIO
 from typing import NamedTuple
 
 from rich.console import Console, Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import listed
@@ -207,7 +208,7 @@ def _limits(body: Spacecraft) -> tuple[float, float]:
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
-def ends(decision: Decision) -> RenderableType:
+def ends(decision: Decision) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
     table, formula, (least, turn) = facts(), plan.residual, _limits(body)
