@@ -32,12 +32,12 @@ from nutdamp.page.document import (
     blocks_of,
     facts_of,
     plain,
+    sheet,
     sheet_of,
 )
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.page.pictures import dispersion_pictures, flight_pictures, trade_picture
-from nutdamp.page.sheets import comparison_sheet, pulse_sheet
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
 from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Standing
@@ -45,12 +45,18 @@ from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, verdicts
 from nutdamp.views.check_tables import check_screen
+from nutdamp.views.pulses import pulse_table
+from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade_tables import apart, beats, front_parts
 from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
+
+
+DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis error")
+"""Columns of the comparison of schemes in which dots show the numbers to scale."""
 
 
 class Repeat(NamedTuple):
@@ -196,7 +202,8 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
     yield Prose(sentence(verdicts.reason(compared)))
-    yield comparison_sheet(compared)
+    table = scheme_table(compared, compared.recommended)
+    yield sheet(table.title, table, dots=DOTS)
     chosen = compared.recommended
     own = [
         (plan.scheme, note)
@@ -238,8 +245,8 @@ def _background(
     yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:
         ends = facts_of("Final state", decisions.end_facts(decided))
-        fired = (pulse_sheet(decided.plan),) if len(decided.plan.pulses) else ()
-        yield Details("Pulses and final state, all values", (*fired, ends))
+        title, fired = f"Pulses of {decided.plan.scheme}", pulse_table(decided.plan.flight, phased=True)
+        yield Details("Pulses and final state, all values", (sheet(title, fired), ends))
     yield Details("Method and symbols", tuple(method_blocks(compared)))
     yield Details("Assumptions", (Points(tuple(("", text) for text in assumptions(compared))),))
     yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, dispersed)))

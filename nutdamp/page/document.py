@@ -14,6 +14,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.views.tables import DataTable, Heading
 from nutdamp.views.text import MISSING, sentence
 
 if TYPE_CHECKING:
@@ -21,20 +22,10 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Vector
 
 
-class Column(NamedTuple):
-    """One column of a table; ``number``: flush right; ``dots``: a dot beside each number shows it to scale."""
-
-    name: str
-    unit: str = ""
-    number: bool = True
-    dots: bool = False
-
-
 class Cell(NamedTuple):
-    """One cell: its ``text``, the ``name`` of its column, and the place of its ``dot``, in % of the largest number."""
+    """Text of one cell, flush right for a ``number``, and the place of its ``dot`` in % of the largest number."""
 
     text: str
-    name: str
     number: bool
     dot: float | None = None
 
@@ -46,31 +37,32 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A table with one row for each thing compared; the first column names it; ``mark`` is the row to stand out."""
+    """A table with one row for each thing compared; the first column names it.
+
+    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale.
+    """
 
     title: str
-    columns: tuple[Column, ...]
+    columns: tuple[Heading, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
+    dots: tuple[str, ...] = ()
     kind: ClassVar[str] = "sheet"
 
     @property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """Rows of cells."""
-        names = [", ".join(filter(None, column[:2])) for column in self.columns]
-        numbers = [
-            [number_in(row[at]) if column.dots else None for row in self.rows] for at, column in enumerate(self.columns)
-        ]
-        most = [max((abs(value) for value in values if value is not None), default=0.0) for values in numbers]
-        return tuple(
-            tuple(
-                Cell(text, name, column.number, None if value is None or not largest else 100.0 * abs(value) / largest)
-                for text, name, column, value, largest in zip(
-                    row, names, self.columns, (values[index] for values in numbers), most, strict=True
-                )
-            )
-            for index, row in enumerate(self.rows)
-        )
+        columns = [self._column(at, heading) for at, heading in enumerate(self.columns)]
+        return tuple(zip(*columns, strict=True))
+
+    def _column(self, at: int, heading: Heading) -> list[Cell]:
+        texts = [row[at] for row in self.rows]
+        if heading.name not in self.dots:
+            return [Cell(text, heading.number) for text in texts]
+        numbers = [number_in(text) for text in texts]
+        most = max((abs(number) for number in numbers if number is not None), default=0.0) or 1.0
+        places = [None if number is None else 100.0 * abs(number) / most for number in numbers]
+        return [Cell(text, heading.number, place) for text, place in zip(texts, places, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,12 +268,17 @@ class Page:
         )
 
 
-def sheet_of(title: str, table: Table, dots: Iterable[str] = ()) -> Sheet:
+def sheet(title: str, table: DataTable, *, place: str = "page", dots: tuple[str, ...] = ()) -> Sheet:
+    """A declared table as a `Sheet`."""
+    return Sheet(title, table.headings(place), table.cells(place), table.mark, dots)
+
+
+def sheet_of(title: str, table: Table) -> Sheet:
     """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
     columns = []
     for column in table.columns:
         name, _, unit = plain(column.header).partition("\n")
-        columns.append(Column(name, unit, column.justify == "right", name in dots))
+        columns.append(Heading(name, unit, column.justify == "right"))
     first = columns[0]
     return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table))
 

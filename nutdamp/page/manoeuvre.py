@@ -11,18 +11,18 @@ import numpy as np
 
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, Column, FactList, Prose, Sheet
+from nutdamp.page.document import Block, FactList, Prose, Sheet
 from nutdamp.planning.decision import Decision
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
-from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import verdicts
-from nutdamp.views.glance import short
-from nutdamp.views.plan_tables import channel_text
-from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity
+from nutdamp.views.pulses import MILLISECONDS, channel_text
+from nutdamp.views.schemes import limits
+from nutdamp.views.tables import Heading
+from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, short_angle
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.checkpoints import Checkpoints
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
 CHECKED = 24
 """Largest number of rows with a range of the nutation; of more evenly spaced ones have one."""
-
-MILLISECONDS = 3
-"""Decimals of times in s where the file gives neither a step nor a tolerance of them; most of UTC."""
 
 FINEST = 6
 """Largest number of decimals of times."""
@@ -66,7 +63,7 @@ def manoeuvre_blocks(
     yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
     yield Sheet(
         "Signatures",
-        tuple(Column(name, number=False) for name in SIGNED),
+        tuple(Heading(name, number=False) for name in SIGNED),
         (("prepared", "", "", ""), ("checked", "", "", "")),
     )
 
@@ -86,7 +83,7 @@ def _uncommandable(plan: Plan) -> Iterator[str]:
 def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
     """Spin, nutation and phase at which the first row may be fired."""
     body = decision.plan.spacecraft
-    spin, nutation = f"{body.spin * RPM:.5g}", short(body.nutation)
+    spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.nutation)
     if points is None:
         why = "dispersed cases were not flown" if body.dispersions is not None else "the file gives no dispersions"
         yield "spin", f"{spin} rpm nominal"
@@ -95,7 +92,10 @@ def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tupl
         return
     spins = f"{points.spin.least * RPM:.5g} to {points.spin.most * RPM:.5g} rpm"
     yield "spin", f"{spins} (nominal {spin})"
-    yield "nutation", f"{short(points.nutation.least)} to {short(points.nutation.most)} deg (nominal {nutation})"
+    yield (
+        "nutation",
+        f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg (nominal {nutation})",
+    )
     yield "phase window", _window(body, points)
 
 
@@ -126,19 +126,19 @@ def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
     firsts = [0, *counts[:-1]]
     starts = np.array([pulses[first].loaded[0] for first in firsts])
     digits = _decimals(body)
-    columns: list[tuple[Column, list[str]]] = [
-        (Column("block" if plan.pulses.blocks else "pulse"), [str(number) for number in range(1, len(counts) + 1)]),
+    columns: list[tuple[Heading, list[str]]] = [
+        (Heading("block" if plan.pulses.blocks else "pulse"), [str(number) for number in range(1, len(counts) + 1)]),
         _when(body, starts, digits),
         _phases(flown, starts),
     ]
     columns += _block_columns(plan) if plan.pulses.blocks else _pulse_columns(plan, digits)
     _, after = flown.around_pulses()
-    least = next((bound.most for bound in requirements.required(body) if bound.part is Part.NUTATION), math.inf)
+    least, _ = limits(body)
     angles = after.nutation[np.array(counts) - 1].tolist()
-    columns.append((Column("nutation after", "deg"), [short(angle, least) for angle in angles]))
+    columns.append((Heading("nutation after", "deg"), [short_angle(angle, least) for angle in angles]))
     if points is not None:
-        columns.append((Column("hold if outside", "deg"), _ranges(points, counts, angles, least)))
-    columns.append((Column("done", number=False), ["☐"] * len(counts)))
+        columns.append((Heading("hold if outside", "deg"), _ranges(points, counts, angles, least)))
+    columns.append((Heading("done", number=False), ["☐"] * len(counts)))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet("Fire", tuple(column for column, _ in columns), rows)
 
@@ -150,19 +150,21 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
     rows = [number - 1 for number in even(len(counts), CHECKED)]
     texts = [MISSING] * len(counts)
     for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
-        texts[row] = f"{short(min(least, expected[row]), limit)} to {short(max(most, expected[row]), limit)}"
+        texts[row] = (
+            f"{short_angle(min(least, expected[row]), limit)} to {short_angle(max(most, expected[row]), limit)}"
+        )
     return texts
 
 
-def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Column, list[str]]]:
+def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Heading, list[str]]]:
     body, pulses = plan.spacecraft, plan.pulses.pulses
     return [
-        (Column("thrusters", number=False), [_thrusters(pulse, body) for pulse in pulses]),
-        (Column("on-time", "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
+        (Heading("thrusters", number=False), [_thrusters(pulse, body) for pulse in pulses]),
+        (Heading("on-time", "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
     ]
 
 
-def _block_columns(plan: Plan) -> list[tuple[Column, list[str]]]:
+def _block_columns(plan: Plan) -> list[tuple[Heading, list[str]]]:
     blocks, commands = plan.pulses.blocks, plan.spacecraft.commands
     names = {pulse.channel: _thrusters(pulse, plan.spacecraft) for pulse in plan.pulses.pulses}
 
@@ -177,12 +179,12 @@ def _block_columns(plan: Plan) -> list[tuple[Column, list[str]]]:
     ]
     counts = "" if commands is None else " (counts)"
     return [
-        (Column("thrusters", number=False), [names.get(block.channel, block.channel) for block in blocks]),
-        (Column("first Sun pulse"), [str(block.first) for block in blocks]),
-        (Column("delay", f"s{counts}"), delays),
-        (Column("on-time", f"s{counts}"), widths),
-        (Column("pulses"), [str(block.count) for block in blocks]),
-        (Column("every", "spin"), [str(block.every) for block in blocks]),
+        (Heading("thrusters", number=False), [names.get(block.channel, block.channel) for block in blocks]),
+        (Heading("first Sun pulse"), [str(block.first) for block in blocks]),
+        (Heading("delay", f"s{counts}"), delays),
+        (Heading("on-time", f"s{counts}"), widths),
+        (Heading("pulses"), [str(block.count) for block in blocks]),
+        (Heading("every", "spin"), [str(block.every) for block in blocks]),
     ]
 
 
@@ -196,23 +198,23 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
     return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
 
 
-def _when(body: Spacecraft, starts: Vector, digits: int) -> tuple[Column, list[str]]:
+def _when(body: Spacecraft, starts: Vector, digits: int) -> tuple[Heading, list[str]]:
     """Column of the commanded starts: UTC where there is an epoch, else from t = 0."""
     dates = [body.utc(start, min(digits, MILLISECONDS)) for start in starts.tolist()]
     known = [date for date in dates if date is not None]
     if len(known) == len(dates):
-        return Column("start", "UTC", number=False), known
-    return Column("start", "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
+        return Heading("start", "UTC", number=False), known
+    return Heading("start", "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
 
 
-def _phases(flown: Flight, starts: Vector) -> tuple[Column, list[str]]:
+def _phases(flown: Flight, starts: Vector) -> tuple[Heading, list[str]]:
     """Column of the Sun phase at the starts, or of the spin phase without a Sun sensor, to 0.1 deg."""
     name, phases = (
         ("Sun phase", -to_sun_pulse(flown, starts))
         if _senses(flown.spacecraft)
         else ("spin phase", spin_phases(flown, starts))
     )
-    return Column(name, "deg"), [fixed(math.degrees(phase) % 360.0, 1, 360.0) for phase in phases.tolist()]
+    return Heading(name, "deg"), [fixed(math.degrees(phase) % 360.0, 1, 360.0) for phase in phases.tolist()]
 
 
 def _senses(body: Spacecraft) -> bool:

@@ -175,7 +175,7 @@ def test_the_top_of_the_page_has_the_words_of_the_screen(run: Run, tmp_path: Pat
     for line in required:
         label, dispersed, nominal, limit, word = re.split(r"  +", line)
         assert margins[label][:3] + margins[label][4:] == [nominal, dispersed, limit, word]
-    rows = sheet(shown, "What each scheme costs")
+    rows = sheet(shown, "Cost and residuals")
     best = max(rows, key=lambda row: number_in(row["cases that comply %"]) or 0.0)["scheme"]
     (chosen,) = (one.text for one in shown.all("li") if one.attributes.get("class") == "mark")
     assert chosen.startswith(best)
@@ -198,11 +198,11 @@ def test_a_turn_is_compared_with_what_the_symbols_explain() -> None:
     body = nutdamp.example().with_(goal={"tilt": "10 deg", "azimuth": "45 deg"}, limits={"horizon": "100 s"})
     shown = tree(plain_page(compare(body, ["rhumb-line"], samples=0)))
     assert shown.all("h1")[0].text == "Sounder-1 · damp 5° nutation, turn by 10°"
-    row, *_ = sheet(shown, "What each scheme costs")
+    row, *_ = sheet(shown, "Cost and residuals")
     for name in ("A|ω0|", "C|ω3|β"):
         whole, _, said = facts(shown, "Symbols")[name].partition(" N m s, ")
         share = float(row["impulse N m s"]) / float(whole)
-        assert share == pytest.approx(float(row[f"impulse × {name}"]), rel=1e-3)
+        assert share == pytest.approx(float(row[f"impulse over {name}"]), rel=1e-3)
         assert said.endswith("no schedule that does so takes less")
     late = plain_page(compare(body.with_(limits={"horizon": "9 s"}), ["rhumb-line"]))
     assert (late.state, late.headline[0]) == ("missed", "NO PLAN")
