@@ -24,7 +24,7 @@ from nutdamp.page.document import (
     Details,
     FactList,
     Listing,
-    Margin,
+    RequirementBar,
     Page,
     PageSection,
     Points,
@@ -168,9 +168,9 @@ def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
         yield "tolerances not checked: the file gives no dispersions"
 
 
-def _margin(row: glance.RequirementRow) -> Margin:
+def _margin(row: glance.RequirementRow) -> RequirementBar:
     texts = (row.label, row.nominal, row.dispersed, row.limit, f"margin {row.margin}", row.verdict.plain)
-    return Margin(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
+    return RequirementBar(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
 
 
 def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
@@ -240,7 +240,7 @@ def _verification(chosen: Plan) -> Iterator[Block]:
 def _background(
     compared: Comparison, decided: Decision | None, dispersed: Results | None, repeat: Repeat
 ) -> Iterator[Block]:
-    """What is looked up only: spacecraft, pulses, method, assumptions, input."""
+    """Reference data: spacecraft, pulses, method, assumptions, input."""
     body = compared.spacecraft
     yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:

@@ -209,7 +209,7 @@ UNCONTROLLED = Control()
 """Configuration control of a page without any entry."""
 
 
-class Margin(NamedTuple):
+class RequirementBar(NamedTuple):
     """One requirement as texts and as a bar: shares of its limit, of the nominal value and of the cases, in %."""
 
     texts: tuple[str, ...]
@@ -241,7 +241,7 @@ class Page:
     met: bool | None
     headline: tuple[str, str]
     verdict: str
-    margins: tuple[Margin, ...]
+    margins: tuple[RequirementBar, ...]
     facts: FactList | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]

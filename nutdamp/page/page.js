@@ -3,7 +3,7 @@
 for (const box of document.querySelectorAll(".wide")) {
   new ResizeObserver(() => {
     const scrolls = box.scrollWidth > box.clientWidth + 1;
-    for (const [name, value] of [["tabindex", "0"], ["role", "region"], ["aria-label", box.dataset.title]]) {
+    for (const [name, value] of [["tabindex", "0"], ["role", "group"], ["aria-label", box.dataset.title]]) {
       if (scrolls) box.setAttribute(name, value);
       else box.removeAttribute(name);
     }
