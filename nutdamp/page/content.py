@@ -7,6 +7,7 @@ import math
 import platform
 from collections.abc import Iterator, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
@@ -24,11 +25,11 @@ from nutdamp.page.document import (
     Details,
     FactList,
     Listing,
-    RequirementBar,
     Page,
     PageSection,
     Points,
     Prose,
+    RequirementBar,
     blocks_of,
     facts_of,
     plain,
@@ -253,7 +254,8 @@ def _background(
 
 
 def _file_line(repeat: Repeat) -> str:
-    return f"{printable(repeat.name)}, SHA-256 {repeat.digest}" if repeat.text else ""
+    """Name and digest of the input file; empty without one."""
+    return f"{printable(Path(repeat.name).name)}, SHA-256 {repeat.digest}" if repeat.text else ""
 
 
 def _repeat(repeat: Repeat, dispersed: Results | None) -> Iterator[Block]:
