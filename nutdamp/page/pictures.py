@@ -13,7 +13,6 @@ from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft import requirements
-from nutdamp.views.tolerance_tables import budget_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,20 +58,20 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 
 
 def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
-    """Distribution of the cases of a study, and effect of each tolerance; raises MissingExtra."""
-    limited = bool(requirements.required(dispersed.study.model.spacecraft))
-    biased = any(row.bias for row in budget_rows(dispersed.study))
+    """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
+    body = dispersed.study.model.spacecraft
+    bounded = any(bound.part is requirements.aim(body) for bound in requirements.required(body))
     drawn = (
         (
             "cases",
             "How many cases leave how much nutation, and how far H has moved.",
-            "Histograms and distribution functions of nutation and of the end of H",
+            "Distribution of nutation and of the end of H",
         ),
         (
-            "budget",
-            f"One sigma of each input{', or its bias (hatched),' * biased} alone."
-            + " What is required holds for all inputs together." * limited,
-            "Tornado of the tolerance budget",
+            "momentum",
+            "Where H ends in each case, with the ellipse that holds as many cases as must comply"
+            + (", and what is required of it." if bounded else "."),
+            "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
         ),
     )
     return tuple(
