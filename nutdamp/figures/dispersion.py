@@ -140,7 +140,8 @@ def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: 
         axes.locator_params(axis="x", nbins=6)
     counts = distribution.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
     bars = HIGHEST * counts / max(counts.max(), 1.0)
-    axes.stairs(bars, np.degrees(edges), fill=True, color=MOTION, alpha=0.35, label="histogram, scaled")
+    look: dict[str, Any] = {"facecolor": (MOTION, 0.3), "edgecolor": MOTION, "linewidth": 0.5}
+    axes.stairs(bars, np.degrees(edges), fill=True, label="histogram, scaled", **look)
     shares = np.append(np.linspace(0.0, 0.99, STEPS), 1.0 - np.geomspace(0.01, 1e-6, STEPS))
     values = np.degrees(np.append(distribution.quantiles(shares), high))
     axes.plot(values, 100.0 * np.append(shares, 1.0), color=MOTION, linewidth=1.6, label="cases within")

@@ -113,9 +113,9 @@ def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
     style.square(inset, small, margin=0.25)
     inset.locator_params(nbins=3)
     inset.tick_params(labelsize=style.SMALL)
-    much = 0.5 * float(np.ptp(axes.get_ylim())) / (0.5 * float(np.ptp(inset.get_ylim())))
-    inset.set_title(f"H after each firing (× {much * INSET[3]:.2g})", **style.NOTE)
-    axes.indicate_inset_zoom(inset, edgecolor=INK, linewidth=THIN, alpha=1.0)
+    much = min(INSET[2] * ROOM, INSET[3]) * float(np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim()))
+    inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
+    axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:

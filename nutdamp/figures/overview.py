@@ -11,7 +11,7 @@ from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, model_name
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft import requirements
-from nutdamp.views.end_tables import direction_text
+from nutdamp.views.end_tables import angle_names, angle_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,9 +50,9 @@ def title(flight: Flight) -> str:
     swings = "" if body.inertia.symmetric else "at most "  # between two angles, H standing still
     goal, turn = body.goal.axis, ""
     if goal is not None:
-        turn = (
-            f"H turned {style.angle(body.to_turn)} to the target, {direction_text(body, goal).replace(' deg', '°')}\n"
-        )
+        names, texts = angle_names(body), angle_texts(body, goal)
+        target = ", ".join(f"{name} {text.partition(' ')[0]}°" for name, text in zip(names, texts, strict=True))
+        turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
     return f"{how}, {fired}\n{turn}{result}, {style.part_name(requirements.aim(body))} {style.angle(left.axis_error)}"
 

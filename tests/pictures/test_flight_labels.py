@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from support.builders import aimed, spinner
 from support.cases import deep, spread, weekly
 from support.colours import check_colours, contrast, pages
 from support.layout import check_layout, texts
-from support.shown import BODY, CASES, NAMES, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
+from support.shown import BODY, CASES, NAMES, STEERED, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
 
 from nutdamp.figures import geometry, labels, overview, style
 from nutdamp.figures.motion import together
@@ -88,10 +89,11 @@ def test_labels_of_firings_have_room(name: str, case: str) -> None:
 
 
 def test_steering_angles_are_those_of_the_table_and_say_from_where() -> None:
-    axes = drawn("history", "steered").axes[1]
+    pulses = flown("steered")[0].schedule.pulses[::2]
+    axes = flight_picture("history", STEERED, Schedule(pulses)).axes[1]
     assert "from body axis +1" in axes.get_title("right")
     angles = [float(said[1]) for note in axes.texts if (said := re.search(r"at ([\d.]+)°", note.get_text()))]
-    impulses = [pulse.impulse for pulse in flown("steered")[0].schedule]
+    impulses = [pulse.impulse for pulse in pulses]
     assert angles == [round(math.degrees(math.atan2(one[1], one[0])) % 360.0, 2) for one in impulses]
 
 

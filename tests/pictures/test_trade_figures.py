@@ -147,7 +147,7 @@ def test_the_envelope_of_the_primer_is_nowhere_below_zero_but_where_a_channel_is
     envelope, fired = line(axes, "least 1 − q of all channels"), line(axes, "firings of the plan")
     assert made.pulses.end < envelope[-1, 0] <= 2.0 * max(made.pulses.end, made.spacecraft.body_period)
     assert sorted(fired[:, 0]) == pytest.approx([pulse.t for pulse in made.pulses])
-    assert (envelope[:, 1].min() < -primer.ROUNDING) is long
+    assert bool(envelope[:, 1].min() < -primer.ROUNDING) is long
     assert ("is taken off the bound" in axes.get_title("left")) is long
     assert np.interp(fired[:, 0], *envelope.T) == pytest.approx(fired[:, 1], abs=1e-2)
 
