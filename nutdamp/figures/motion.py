@@ -86,8 +86,9 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     if small is None:
         labels.add(axes, "H", places[0], TURNED, role="vital")
     else:
+        ticks = [tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half]
         axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
-        axes.set_xticks([tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half])
+        axes.set_xticks(ticks)
         _inset(axes, flight, track, small)
     sky = geometry.sky_names(flight)
     axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")

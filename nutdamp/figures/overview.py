@@ -46,12 +46,12 @@ def title(flight: Flight) -> str:
     """Heading of every sheet after the spacecraft's name: scheme, model and result."""
     left, count, body = flight.residual, len(flight.schedule), flight.spacecraft
     how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
-    fired = f"firings: {count}, the last until {style.number(flight.schedule.end)} s" if count else "no firing"
+    fired = f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
     swings = "" if body.inertia.symmetric else "at most "  # between two angles, H standing still
     goal, turn = body.goal.axis, ""
     if goal is not None:
-        names, texts = angle_names(body), angle_texts(body, goal)
-        target = ", ".join(f"{name} {text.partition(' ')[0]}°" for name, text in zip(names, texts, strict=True))
+        angles = zip(angle_names(body), angle_texts(body, goal), strict=True)
+        target = ", ".join(f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles)
         turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
     result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
     return f"{how}, {fired}\n{turn}{result}, {style.part_name(requirements.aim(body))} {style.angle(left.axis_error)}"
