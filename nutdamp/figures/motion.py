@@ -36,7 +36,7 @@ MANY = 12
 SPARSE = 40
 """Number of firings up to which each has a dot."""
 
-ROOM, INSET = 1.72, (0.655, 0.17, 0.335, 0.66)
+ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 """Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
 
 

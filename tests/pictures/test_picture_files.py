@@ -107,7 +107,7 @@ def test_inline_svg_stands_in_any_page() -> None:
     assert not re.search(r'\sd="[^"]*\.\d{3}', shown[0])
     for content in (shown[0], image.rendered(drawn("history", "wide pulses"), "a.svg").decode()):
         words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
-        assert "must not fire" not in words
+        assert "θ, ° (log)" in words
         assert any(word.startswith("1: ") for word in words)
         assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
 
