@@ -259,10 +259,15 @@ def explain_command(topic: tuple[str, ...]) -> None:
         _read(explain_tables.topic_screen(topics.explained(requested)))
 
 
+def on_keyboard() -> bool:
+    """True where someone can leave a pager."""
+    return sys.stdin.isatty()
+
+
 def _read(screen: RenderableType) -> None:
     """Show a screen; where it is longer than the terminal, in a pager."""
     shown = console()
-    if not (shown.is_terminal and sys.stdin.isatty()):
+    if not (shown.is_terminal and on_keyboard()):
         show(screen)
         return
     with shown.capture() as captured:

@@ -78,7 +78,8 @@ class _Pairs:
         self.rows = rows
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        if options.max_width < NARROW:
+        longest = max(len(name) for name, _ in self.rows)
+        if options.max_width < NARROW or longest > 0.45 * options.max_width:
             for name, text in self.rows:
                 yield Text(name, style="dim", overflow="fold")
                 yield Padding(Text(text, overflow="fold"), (0, 0, 0, 2))

@@ -2,8 +2,8 @@
 
 A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the pages of `ENTRIES` each
 ``## name`` begins a topic of its own, again with a line of summary, and ``### title`` a part of it; on the others
-``## title`` begins a part. Blocks are what the web shows: paragraphs, tables, code, and lists, where ``- **name**: text``
-is a row. The units of files and options come from the table that reads them.
+``## title`` begins a part. Blocks are what the web shows: paragraphs, tables, code, and lists, in which
+``- **name**: text`` is a row. The units of files and options come from the table that reads them.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ ENTRIES = ("schemes", "motion", "equations")
 def page(name: str) -> Topic:
     """The page of that name; of a page of `ENTRIES` its introduction and the names of its topics."""
     first, *sections = _sections(_text(name), "## ")
-    _, _, body = first.partition("\n")
+    _, _, body = first.lstrip("\n").partition("\n")
     intro = _topic(f"{name}\n{body}", "### ")
     if name in ENTRIES:
         rows = TopicRows(tuple((topic.name, topic.summary) for topic in entries(name)))
@@ -196,7 +196,8 @@ def units_topic() -> Topic:
                     "or one that is not listed, is an error that names those allowed; Hz is for sampling rates "
                     "alone, and revolutions are no unit here, since nobody can tell whether they count turns or "
                     "radians.",
-                    "Reports show degrees, CSV and JSON name the unit in the column or key, such as t_s, nutation_deg.",
+                    "A share is a plain number or has %. Screens show degrees, s, N m s, g or kg of propellant, the spin "
+                    "in rpm and rad/s; CSV and JSON name the unit in the column or key, such as t_s, nutation_deg.",
                 ),
             ),
             TopicPart("See also", ("explain file",)),

@@ -49,7 +49,9 @@ A number that is unlikely in SI, such as a position of 800, is accepted with a w
 
 def pages() -> dict[str, str]:
     """The text of each such page."""
-    file = markdown("The spacecraft file", "every key of the spacecraft file; file.thrusters, file.limits.tick", file_topic())
+    file = markdown(
+        "The spacecraft file", "every key of the spacecraft file; file.thrusters, file.limits.tick", file_topic()
+    )
     title, summary, rest = file.split("\n\n", 2)
     return {
         "file": "\n\n".join([title, summary, BEGIN, rest]),
