@@ -59,7 +59,7 @@ USAGE = {
     "targets": [*(f"{command} --scheme {scheme}" for scheme in ("half-cone", "rhumb-line")
                   for command in ("plan", "simulate", "verify", "export --format json", "report")),
                 "plan --scheme half-cone --scheme rhumb-line"],
-    "topics": [f"explain {topic}" for topic in ("tow-pulse", "nutaton", "unit", "28", "K4", "file.thruster",
+    "topics": [f"explain {topic}" for topic in ("tow-pulse", "nutaton", "unitz", "28", "K4", "file.thruster",
                                                 "file.horizon", "file.qqq.zzz", "weather")],
     "examples": ["init --from lunar-prospecter", "init --from zzz"],
 }  # fmt: skip
