@@ -20,11 +20,7 @@ from support.places import case
 from support.process import Run
 
 from nutdamp.files.reader import example_text, read_spacecraft
-from nutdamp.page.content import Repeat, report_page
-from nutdamp.page.html import page_html
 from nutdamp.page.scales import LEAD
-from nutdamp.planning.decision import compare
-from nutdamp.schemes.catalogue import CLASSIC
 
 pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
 
@@ -34,22 +30,6 @@ EXAMPLE = example_text()
 TARGET = case("far-target.yaml").read_text(encoding="utf-8")
 
 Browse = Callable[..., Any]
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The page of a spacecraft file, made once."""
-    folder = tmp_path_factory.mktemp("moving")
-    known: dict[str, Path] = {}
-
-    def page(text: str) -> Path:
-        if text not in known:
-            made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""))
-            known[text] = folder / f"{len(known)}.html"
-            known[text].write_text(page_html(made), encoding="utf-8")
-        return known[text]
-
-    return page
 
 
 def part(page: Any, name: str) -> Any:
