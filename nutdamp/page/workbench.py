@@ -69,11 +69,16 @@ def workbench_of(flown: Flight) -> Workbench:
     names = [(Part.NUTATION, "nutation"), (Part.SHIFT, "momentum shift")]
     if body.goal.axis is not None:
         names.append((Part.DISTANCE, "axis error"))
-    rows = [EndRow(part.value, name, f"≤ {most(limits[part].most).removesuffix(' deg')}°" if part in limits else "") for part, name in names]
+    rows = [EndRow(part.value, name, _bound(limits[part].most) if part in limits else "") for part, name in names]
     if Part.SPIN in limits:
         rows.append(EndRow("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
     pulses = (f"{number}: {channel_text(pulse, body)}" for number, pulse in enumerate(flown.schedule, start=1))
     return Workbench(tuple(rows), tuple(pulses))
+
+
+def _bound(angle: float) -> str:
+    """An upper bound given in rad, with the sign of degrees."""
+    return f"≤ {most(angle).removesuffix(' deg')}°"
 
 
 def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:

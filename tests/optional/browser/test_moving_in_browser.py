@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Callable
 from itertools import accumulate
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -204,7 +203,7 @@ def test_no_mark_of_the_motion_lies_over_a_name_on_the_globe(browse: Browse, wri
 
 @pytest.mark.parametrize(("key", "other"), [("ArrowLeft", "ArrowRight"), ("ArrowUp", "ArrowDown")])
 def test_arrow_keys_turn_the_globe_and_home_turns_it_back(browse: Browse, written: Any, key: str, other: str) -> None:
-    with browse(written(EXAMPLE)) as page:
+    with browse(written(TARGET)) as page:
         globe = part(page, "globe")
         globe.focus()
         drawn = "(svg) => svg.querySelector('.grid path').getAttribute('d')"

@@ -108,9 +108,9 @@ def enter(page: Any, number: int, start: float, on_time: float) -> None:
     """Type start and on-time of a pulse; that of an ideal impulse cannot be changed."""
     if part(page, "pulse").is_enabled():
         part(page, "pulse").select_option(index=number)
-    part(page, "begin").fill(repr(start))
+    part(page, "begin").fill(str(start))
     if part(page, "width").is_enabled():
-        part(page, "width").fill(repr(on_time))
+        part(page, "width").fill(str(on_time))
 
 
 @spread("name", FILES, quick=3)
@@ -297,7 +297,7 @@ def test_the_copied_schedule_flies_to_the_same_end(
     done = run(*[names.get(word, word) for word in words[1:]], "-q", "--json", "-")
     assert done.returncode in (0, 4), done.stderr
     assert "contradicts" not in done.stderr
-    ended = json.loads(done.stdout)["impulse_sum"]
+    ended = json.loads(done.stdout)["residual"]
     for key, value in left.items():
         assert math.degrees(value) == pytest.approx(ended[f"{key}_deg"], rel=0.0, abs=1e-9)
 
@@ -335,7 +335,10 @@ def test_the_cones_roll_on_each_other(browse: Browse, written: Any) -> None:
             for row in (0, last // 5, last // 2):
                 part(page, "slider").fill(str(row))
                 body, space = (
-                    [float(part(page, "cones").locator(f"circle.{name}").get_attribute(key)) for key in ("cx", "cy", "r")]
+                    [
+                        float(part(page, "cones").locator(f"circle.{name}").get_attribute(key))
+                        for key in ("cx", "cy", "r")
+                    ]
                     for name in ("body", "space")
                 )
                 between = math.dist(body[:2], space[:2])
