@@ -91,5 +91,5 @@ const motion = (() => {
     const lean = 0.5 * (cones(other, start).nutation - cones(body, start).nutation);
     return [other, framed ? start : { ...start, turn: product([Math.cos(lean), 0, Math.sin(lean), 0], start.turn) }];
   };
-  return { angle, arc, axis, changed, cones, dot, fly, momentum, residual, widthFactor };
+  return { angle, arc, axis, changed, cones, dot, fly, momentum, residual };
 })();

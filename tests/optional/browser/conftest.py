@@ -10,12 +10,6 @@ from typing import Any
 
 import pytest
 
-from nutdamp.files.reader import read_spacecraft
-from nutdamp.page.content import Repeat, report_page
-from nutdamp.page.html import page_html
-from nutdamp.planning.decision import compare
-from nutdamp.schemes.catalogue import CLASSIC
-
 
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
@@ -59,19 +53,3 @@ def browse(chromium: Any) -> Callable[..., Any]:
         assert said == []
 
     return opened
-
-
-@pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The page of a spacecraft file, made once."""
-    folder = tmp_path_factory.mktemp("moving")
-    known: dict[str, Path] = {}
-
-    def page(text: str) -> Path:
-        if text not in known:
-            made = report_page(compare(read_spacecraft(text, "a.yaml"), CLASSIC), Repeat("", "", ""))
-            known[text] = folder / f"{len(known)}.html"
-            known[text].write_text(page_html(made), encoding="utf-8")
-        return known[text]
-
-    return page

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from support import places
 from support.cases import spread
+from support.pages import plain_page
 from support.places import case
 from support.process import Run
 from support.shown import compared_text
@@ -24,7 +25,11 @@ from support.shown import compared_text
 from nutdamp.files.reader import example_text
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
+from nutdamp.page.document import Moving, PageSection
+from nutdamp.page.html import page_html
+from nutdamp.page.moving import moving, moving_of
 from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Goal
 from nutdamp.spacecraft.schedule import Schedule
 
 pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
@@ -66,6 +71,26 @@ def chosen(text: str) -> Plan:
     return plan
 
 
+@pytest.fixture(scope="module")
+def paged(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Moving], Path]:
+    """The file of a page with nothing but a moving view, which is quickly made."""
+    folder, bare = tmp_path_factory.mktemp("workbench"), plain_page(compared_text(EXAMPLE))
+
+    def page(view: Moving) -> Path:
+        made = replace(bare, sections=(PageSection("motion", "Motion", (view,)),))
+        path = folder / f"{len(list(folder.iterdir()))}.html"
+        path.write_text(page_html(made), encoding="utf-8")
+        return path
+
+    return page
+
+
+@pytest.fixture(scope="module")
+def written(paged: Callable[[Moving], Path]) -> Callable[[str], Path]:
+    """The page of the recommended plan of a spacecraft file, made once."""
+    return cache(lambda text: paged(moving_of(chosen(text))))
+
+
 def changed(plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0) -> Flight:
     """The flight by impulses with other times, C/A and thrust; the latter in per cent."""
     body, factor, pulses = plan.spacecraft, 1.0 + thrust / 100.0, []
@@ -100,6 +125,9 @@ def expect(page: Any, flight: Flight) -> None:
     values, left = shown(page), flight.residual
     assert {"nutation", "momentum_shift"} <= set(values)
     assert ("axis_error" in values) == (flight.spacecraft.goal.axis is not None)
+    if flight.spacecraft.goal.spin is not None:
+        error = abs(flight.settled.spin - flight.spacecraft.goal.spin)
+        assert values.pop("spin") == pytest.approx(error, rel=0.0, abs=1e-12)
     for key, value in values.items():
         assert math.degrees(value) == pytest.approx(math.degrees(getattr(left, key)), rel=0.0, abs=1e-9), key
 
@@ -166,6 +194,17 @@ def test_a_changed_motion_is_drawn_as_it_goes_by_impulses(browse: Browse, writte
         part(page, "reset").click()
         settle(page)
         assert part(page, "sky-curves").locator("path.axis").get_attribute("d") == before
+
+
+def test_the_spin_has_its_limit_too(browse: Browse, paged: Callable[[Moving], Path]) -> None:
+    plan = chosen(FILES["single-thruster"])  # its pulses change the spin
+    spin = propagation.by_impulses(plan.spacecraft, plan.pulses).settled.spin
+    for goal, verdict in ((1.0005 * spin, "met"), (1.002 * spin, "NOT met")):
+        body = replace(plan.spacecraft, goal=Goal(spin=goal))
+        view = moving(propagation.flown(body, plan.pulses, 40.0), 40.0, plan.scheme)
+        with browse(paged(view)) as page:
+            expect(page, propagation.by_impulses(body, plan.pulses))
+            assert part(page, "verdict-spin").text_content() == verdict
 
 
 def place(page: Any, index: int, grip: str) -> tuple[float, float]:
@@ -262,7 +301,7 @@ def test_on_times_and_gaps_have_limits_too(browse: Browse, written: Any) -> None
             enter(page, 0, 0.5, on_time)
             settle(page)
             assert f"pulse 1: {text}" in part(page, "broken").text_content()
-        enter(page, 0, second.start + 0.1, 0.5)
+        enter(page, 0, second.start + 1.0, 0.5)
         settle(page)
         assert "pulse 1: overlaps the firing before it" in part(page, "broken").text_content()
     with browse(written(LIMITED)) as page:
