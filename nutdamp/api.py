@@ -138,7 +138,7 @@ def expected(spacecraft: Spacecraft) -> Spacecraft:
 
 @dataclass(frozen=True, eq=False)
 class Trade:
-    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each shift of H allowed."""
+    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift allowed."""
 
     spacecraft: Spacecraft
     fronts: tuple[tradeoff.Front, ...]

@@ -102,12 +102,12 @@ def import_command(given: tuple[str, ...], output: str, schedule: str | None, qu
     expect_outputs(file, output=output, schedule=schedule)
 
     from nutdamp.files.ccsds.read import contradictions, imported, read_apm
-    from nutdamp.files.schedules import pulses_csv
     from nutdamp.flight.propagation import flown
+    from nutdamp.views.pulses import pulse_table
 
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
-    deliver([(output, lambda: text), (schedule, lambda: pulses_csv(flown(body, pulses)))])
+    deliver([(output, lambda: text), (schedule, lambda: pulse_table(flown(body, pulses)).csv())])
     remark = remarks(quiet)
     for entry in contents.remarks:
         remark(f"{file}: {entry}")

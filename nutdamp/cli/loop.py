@@ -68,10 +68,10 @@ def command(
 
     from nutdamp.cli.job import working
     from nutdamp.control_loop.evaluation import loop_of
-    from nutdamp.files.schedules import pulses_csv
     from nutdamp.files.tabular import write_track
     from nutdamp.views.loop_json import loop_json
     from nutdamp.views.loop_tables import loop_screen, stopped, warnings
+    from nutdamp.views.pulses import pulse_table
 
     with working("flying", quiet=quiet):
         plan = loop_of(body, until, seed=seed, case=None if case is None else case - 1)
@@ -79,7 +79,7 @@ def command(
     if job.silent:
         job.warn(warnings(body))
     outputs: list[Output] = [
-        (csv, lambda: pulses_csv(run.flight)),
+        (csv, lambda: pulse_table(run.flight).csv()),
         (track, lambda: partial(write_track, run.flight.pieces(samples, run.until), run.flight.spacecraft.inertia)),
         (json, lambda: loop_json(plan)),
         (plot, partial(_picture, plan)),

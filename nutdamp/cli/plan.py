@@ -99,7 +99,7 @@ def command(
 
     from nutdamp.planning.decision import decide
     from nutdamp.views import verdicts
-    from nutdamp.views.schemes_csv import schemes_csv
+    from nutdamp.views.schemes import scheme_table
 
     compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
     dispersed = robust_of(job, compared, options) if robust else None
@@ -112,7 +112,7 @@ def command(
         job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
     outputs: list[Output] = [
         (json, partial(_data, compared, decided, dispersed)),
-        (table, partial(schemes_csv, compared, decided)),
+        (table, lambda: scheme_table(compared, chosen).csv()),
         (all_plans, partial(_schemes_picture, compared, decided)),
         *_outputs_of_proof(proof, certificate, curve),
         *_outputs_of(chosen, csv, one_plan, figure),
@@ -138,9 +138,9 @@ def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: 
     """The files of the plan to fly, if there is one."""
     if chosen is None:
         return []
-    from nutdamp.files.schedules import pulses_csv
+    from nutdamp.views.pulses import pulse_table
 
-    return [(csv, partial(pulses_csv, chosen.flight)), (plot, partial(_picture, chosen, figure))]
+    return [(csv, lambda: pulse_table(chosen.flight).csv()), (plot, partial(_picture, chosen, figure))]
 
 
 def _outputs_of_blocks(
@@ -158,9 +158,9 @@ def _outputs_of_blocks(
         raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
     if source is not chosen:
         remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
-    from nutdamp.files.schedules import blocks_csv
+    from nutdamp.views.pulses import block_table
 
-    return [(path, partial(blocks_csv, source.flight))]
+    return [(path, lambda: block_table(source.flight).csv())]
 
 
 def _pictured(figure: str) -> tuple[bool, bool, bool]:

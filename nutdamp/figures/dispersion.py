@@ -81,7 +81,7 @@ def overview(results: Results) -> Figure:
 
 
 def cases(results: Results) -> Figure:
-    """Histogram and distribution function of nutation and shift of H, with their requirements."""
+    """Histogram and distribution function of nutation and momentum shift, with their requirements."""
     figure = style.sheet(7.4, 5.6)
     _cases(figure, results)
     return figure
@@ -95,7 +95,7 @@ def momentum(results: Results) -> Figure:
 
 
 def budget(results: Results) -> Figure:
-    """Effect of each tolerance on nutation and shift of H, side by side."""
+    """Effect of each tolerance on nutation and momentum shift, side by side."""
     figure = style.sheet(8.0, 1.7 + 0.22 * max(len(budget_rows(results.study)), FEW))
     _budget(figure, results)
     return figure
@@ -194,7 +194,7 @@ def _mark(axes: Axes, reached: float, limit: float | None, probability: float) -
 def momentum_cases(results: Results) -> Vector:
     """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial direction.
 
-    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the shift of H.
+    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the momentum shift.
     """
     model = results.study.model
     vectors = results.early[VECTORS[requirements.aim(model.spacecraft).value], : min(results.done, EARLY)].T
@@ -227,7 +227,7 @@ def _momentum(figure: Figure | SubFigure, results: Results) -> None:
     aim = requirements.aim(body)
     points, limit = momentum_cases(results), _limit(results, aim)
     centre = "H(0)" if aim is Part.SHIFT else "the target"
-    # A case has an H(0) of its own: the shift of H is counted from there, so that it is the centre in each.
+    # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the centre in each.
     about = "the H(0) of each case" if aim is Part.SHIFT else centre
     sky = geometry.sky_names(results.study.nominal, centre)
     title = f"Where H ends, about {about}\n{sky.view}"

@@ -18,7 +18,7 @@ from nutdamp.planning.recommendation import Standing, by_propellant
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import NEGLIGIBLE, Part
-from nutdamp.views.plan_tables import flown_by
+from nutdamp.views.schemes import flown_by
 from nutdamp.views.text import digits, in_degrees
 from nutdamp.views.verdicts import percent
 

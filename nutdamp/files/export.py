@@ -153,7 +153,7 @@ def main():
     nutation, body_cone = largest_cones(left, sense)
     print("nutation left ", shown(nutation))
     print("body cone     ", shown(body_cone))
-    print("shift of H    ", shown(shift))
+    print("momentum shift", shown(shift))
 
 
 def largest_cones(rates, sense):

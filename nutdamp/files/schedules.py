@@ -12,16 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import nearest, printable
-from nutdamp.files.tabular import Cells, Table, csv_text, number
-from nutdamp.flight.propagation import Flight
+from nutdamp.files.tabular import Cells, Table
 from nutdamp.flight.propellant import Supply
 from nutdamp.planning.decision import broken_limits
 from nutdamp.planning.plan import Plan
@@ -56,43 +53,6 @@ IMPULSE = PULSES_HEADER[8:11]
 TORQUE = PULSES_HEADER[5:8]
 
 
-def pulses_array(flown: Flight) -> NDArray[np.void]:
-    """The schedule of a flown flight, one row a pulse, fields as in `HEADER`; vectors in the axes of the file.
-
-    What is not known is NaN: the torque of an ideal impulse, a propellant. Through valves the fields `EFFECTIVE`
-    follow; with an epoch, a last field ``utc`` has the date and time of each start.
-    """
-    before, after = flown.around_pulses()
-    body = flown.spacecraft
-    dated, valves = body.utc(0.0) is not None, flown.schedule.through_valves
-    header = (*PULSES_HEADER, *(EFFECTIVE if valves else ()), *((UTC,) if dated else ()))
-    rows = [
-        (
-            index + 1,
-            *(pulse.t, *pulse.loaded),
-            pulse.channel,
-            *(np.full(3, math.nan) if pulse.torque is None else body.inertia.in_file(pulse.torque)),
-            *body.inertia.in_file(pulse.impulse),
-            math.nan if pulse.propellant is None else pulse.propellant,
-            math.degrees(before.nutation[index]),
-            math.degrees(after.nutation[index]),
-            *((pulse.start, pulse.on_time) if valves else ()),
-            *([body.utc(pulse.loaded[0]) or ""] if dated else []),
-        )
-        for index, pulse in enumerate(flown.schedule)
-    ]
-    longest = max((len(pulse.channel) for pulse in flown.schedule), default=1)
-    kinds = {"pulse": "i8", "channel": f"U{longest}", UTC: "U30"}
-    return np.array(rows, dtype=[(name, kinds.get(name, "f8")) for name in header])
-
-
-def pulses_csv(flown: Flight) -> str:
-    """The rows of `pulses_array` as CSV; unknown values are empty."""
-    table = pulses_array(flown)
-    texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in table.tolist())
-    return csv_text(table.dtype.names or PULSES_HEADER, texts)
-
-
 BLOCKS_HEADER = (
     "block",
     "channel",
@@ -117,38 +77,6 @@ MOST_FIRED = 5_000
 
 LATEST = 100_000
 """Number of the last Sun pulse that may fire a block."""
-
-
-def blocks_csv(flown: Flight) -> str:
-    """The blocks of a flown schedule, one row each; unknown values are empty."""
-    body, commands = flown.spacecraft, flown.spacecraft.commands
-    _, after = flown.around_pulses()
-    pulses, rows = flown.schedule.pulses, []
-    lasts = list(accumulate(block.count for block in flown.schedule.blocks))
-    for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True), start=1):
-        rows.append(
-            [
-                str(index),
-                block.channel,
-                str(block.first),
-                body.utc(pulses[last - block.count].loaded[0]) or "",
-                number(block.delay),
-                "" if commands is None else str(commands.delay_counts(block.delay)),
-                _shown(math.degrees(block.delay * abs(body.spin))),
-                number(block.width),
-                "" if commands is None else str(commands.width_counts(block.width)),
-                str(block.count),
-                str(block.every),
-                _shown(math.fsum(pulse.magnitude for pulse in pulses[last - block.count : last])),
-                number(math.degrees(float(after.nutation[last - 1]))),
-            ]
-        )
-    return csv_text(BLOCKS_HEADER, rows)
-
-
-def _shown(value: float) -> str:
-    """A number for people, without the noise of its last digits."""
-    return number(float(f"{value:.9g}"))
 
 
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:

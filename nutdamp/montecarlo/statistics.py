@@ -148,7 +148,7 @@ def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
 def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
     """Write quantities that are linear for small dispersions into ``out`` (10, n); `VECTORS` names the rows.
 
-    Nutation is the length of the transverse momentum over the axial one, the shift of H that of the change of its
+    Nutation is the length of the transverse momentum over the axial one, the momentum shift that of the change of its
     direction, the axis error that of its direction's distance from the target: lengths of vectors that are zero, or
     nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
     """

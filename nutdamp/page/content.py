@@ -28,13 +28,14 @@ from nutdamp.page.document import (
     Prose,
     Remarks,
     blocks_of,
+    sheet,
     sheet_of,
 )
 from nutdamp.page.manoeuvre import manoeuvre_section
 from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
-from nutdamp.page.sheets import aspects_sheet, comparison_sheet, pulse_sheet
+from nutdamp.page.sheets import aspects_sheet
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
 from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Gain, Standing
@@ -43,6 +44,8 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, verdicts
 from nutdamp.views.end_tables import bounds_text, direction_text, lasting, spin_text, target_text
+from nutdamp.views.pulses import pulse_table
+from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees, sentence
 from nutdamp.views.trade_tables import apart, beats, front_parts, outdone
 from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
@@ -176,7 +179,8 @@ def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
-    blocks: list[Block] = [comparison_sheet(compared), *hints, *map(Prose, _reading(compared))]
+    table = scheme_table(compared, compared.recommended)
+    blocks: list[Block] = [sheet(table.title, table), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
     if decided is not None and len(compared) > 1:
@@ -230,7 +234,9 @@ def _schedule(chosen: Plan) -> PageSection:
         "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse"
         f"{', the largest of the free motion then' * (not chosen.spacecraft.inertia.symmetric)}."
     )
-    return PageSection("schedule", title, (pulse_sheet(chosen), note, *ends))
+    return PageSection(
+        "schedule", title, (sheet(f"Pulses of {chosen.scheme}", pulse_table(chosen.flight, phased=True)), note, *ends)
+    )
 
 
 def _verification(chosen: Plan) -> PageSection:

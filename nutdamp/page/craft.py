@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, Column, FactList, Prose, Sheet, facts_of, sheet_of
+from nutdamp.page.document import Block, FactList, Prose, Sheet, facts_of, sheet_of
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Thruster
@@ -17,6 +17,7 @@ from nutdamp.views import survey
 from nutdamp.views.check_tables import channel_table, disturbance_table, sun_pulse_facts, thrust_changes, valve_table
 from nutdamp.views.end_tables import FRAME_N, angle_names, angle_texts
 from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.tables import Heading
 from nutdamp.views.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, vector
 from nutdamp.views.verdicts import exact_percent
 
@@ -94,8 +95,8 @@ def thruster_sheet(body: Spacecraft) -> Sheet:
     """One row a thruster that can fire: its place, force, torque, specific impulse and on-times."""
     thrusters = {thruster.name: thruster for channel in body.channels for thruster in channel.thrusters}
     names = ("position", "m"), ("force", "N"), ("torque", "N m")
-    columns = [Column("thruster", number=False), *(Column(name, unit, number=False) for name, unit in names)]
-    columns += [Column("isp", "s"), Column("on-time", number=False), Column("channels", number=False)]
+    columns = [Heading("thruster", number=False), *(Heading(name, unit, number=False) for name, unit in names)]
+    columns += [Heading("isp", "s"), Heading("on-time", number=False), Heading("channels", number=False)]
     rows = tuple((*_thruster(thruster, body), _channels(thruster, body)) for thruster in thrusters.values())
     return Sheet("Thrusters of the channels, in the axes of the file", tuple(columns), rows)
 
@@ -143,11 +144,11 @@ def ends_sheet(flown: Flight) -> Sheet:
         now = body.tilt, float(attitude.angle_between(final.axis, final.momentum))
         rows.append(("nutation at that time", *map(degrees, now), MISSING))
         rows.append(("largest nutation from then on, without pulses", *map(degrees, largest), MISSING))
-    heads: tuple[Column, ...] = (Column("quantity", number=False), Column("t = 0"), Column("after the last pulse"))
+    heads: tuple[Heading, ...] = (Heading("quantity", number=False), Heading("t = 0"), Heading("after the last pulse"))
     if target is None and body.goal.spin is None:
         rows = [row[:-1] for row in rows]
     else:
-        heads = (*heads, Column("target"))
+        heads = (*heads, Heading("target"))
     return Sheet("Where it points", heads, tuple(rows), sortable=False, stacked=True)
 
 

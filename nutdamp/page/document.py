@@ -10,18 +10,12 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.views.tables import DataTable, Heading
+
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
     from nutdamp.page.workbench import Workbench
     from nutdamp.spacecraft.model import Vector
-
-
-class Column(NamedTuple):
-    """One column of a table; ``number``: flush right, and sorted by value."""
-
-    name: str
-    unit: str = ""
-    number: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +27,7 @@ class Sheet:
     """
 
     title: str
-    columns: tuple[Column, ...]
+    columns: tuple[Heading, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
     sortable: bool = True
@@ -211,6 +205,11 @@ class Page:
         return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
 
 
+def sheet(title: str, table: DataTable, place: str = "page") -> Sheet:
+    """A declared table as a `Sheet`."""
+    return Sheet(title, table.headings(place), table.cells(place), table.mark)
+
+
 def sheet_of(title: str, table: Table) -> Sheet:
     """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
 
@@ -219,7 +218,7 @@ def sheet_of(title: str, table: Table) -> Sheet:
     columns = []
     for column in table.columns:
         name, _, unit = plain(column.header).partition("\n")
-        columns.append(Column(name, unit, column.justify == "right"))
+        columns.append(Heading(name, unit, column.justify == "right"))
     first = columns[0]
     headed = (first._replace(name=first.name or "quantity"), *columns[1:])
     return Sheet(title, headed, _rows(table), sortable=bool(first.name))

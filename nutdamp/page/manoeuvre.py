@@ -11,7 +11,7 @@ import numpy as np
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, Column, FactList, PageSection, Prose, Sheet, sheet_of
+from nutdamp.page.document import Block, FactList, PageSection, Prose, Sheet, sheet
 from nutdamp.page.sheets import on_times
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
@@ -23,8 +23,8 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import verdicts
-from nutdamp.views.block_tables import blocks_table
-from nutdamp.views.plan_tables import MILLISECONDS, channel_text
+from nutdamp.views.pulses import MILLISECONDS, block_table, channel_text
+from nutdamp.views.tables import Heading
 from nutdamp.views.text import MISSING, RPM, digits, in_degrees, longitude
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
         yield Prose("No pulse is needed.")
         return
     if plan.pulses.blocks:
-        yield sheet_of("Command blocks to load", blocks_table(flown, named=True))
+        yield sheet("Command blocks to load", block_table(flown))
     yield _firing(flown)
     if body.commands is not None and not plan.pulses.blocks:
         yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
@@ -98,19 +98,19 @@ def _firing(flown: Flight) -> Sheet:
     """One row a pulse: time, phases, duration, channel."""
     body, pulses = flown.spacecraft, flown.schedule.pulses
     starts = np.array([pulse.loaded[0] for pulse in pulses])
-    columns: list[tuple[Column, list[str]]] = [
-        (Column("pulse"), [str(index + 1) for index in range(len(pulses))]),
+    columns: list[tuple[Heading, list[str]]] = [
+        (Heading("pulse"), [str(index + 1) for index in range(len(pulses))]),
         *_when(body, starts),
-        (Column("spin phase", "deg"), _angles(spin_phases(flown, starts))),
+        (Heading("spin phase", "deg"), _angles(spin_phases(flown, starts))),
     ]
     if _senses(body):
-        columns.append((Column("Sun phase", "deg"), _angles(-to_sun_pulse(flown, starts))))
+        columns.append((Heading("Sun phase", "deg"), _angles(-to_sun_pulse(flown, starts))))
     columns += [
         on_times(flown.schedule),
-        (Column("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
+        (Heading("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
     ]
     if flown.schedule.idealised:
-        columns.append((Column("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]))
+        columns.append((Heading("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]))
     wide = len(columns) > FITTING or any(pulse.channel == STEERABLE for pulse in pulses)
     return _sheet("Pulses to fire", columns, stacked=wide)
 
@@ -137,17 +137,17 @@ def _signature(flown: Flight) -> Sheet:
     in_body = [rigid_body.body_period(*shape, spin) for spin in spins.tolist()]
     turns = np.isfinite(in_body) & (np.degrees(across) >= STILL)
     periods = [digits(time, 4) if there else MISSING for time, there in zip(in_body, turns, strict=True)]
-    columns: list[tuple[Column, list[str]]] = [
-        (Column("coast", number=False), names),
+    columns: list[tuple[Heading, list[str]]] = [
+        (Heading("coast", number=False), names),
         *_when(body, states("t")),
-        (Column("gyro, axis 3", "rpm"), _rpm(spins)),
-        (Column("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
-        (Column("period of that rate", "s"), periods),
-        (Column("nutation", "deg"), _plain(nutation)),
-        (Column("nutation period", "s"), [digits(time, 4) for time in inertial]),
+        (Heading("gyro, axis 3", "rpm"), _rpm(spins)),
+        (Heading("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
+        (Heading("period of that rate", "s"), periods),
+        (Heading("nutation", "deg"), _plain(nutation)),
+        (Heading("nutation period", "s"), [digits(time, 4) for time in inertial]),
     ]
     if body.sun is not None:
-        columns.append((Column("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
+        columns.append((Heading("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
     return _sheet(f"What gyros{' and Sun sensor' * (body.sun is not None)} should show", columns, stacked=True)
 
 
@@ -165,24 +165,24 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
     stricter = required is not None and required < float(limits[-1])
     if stricter:
         limits[-1] = required
-    columns: list[tuple[Column, list[str]]] = [
-        (Column("after pulse"), list(map(str, counts))),
+    columns: list[tuple[Heading, list[str]]] = [
+        (Heading("after pulse"), list(map(str, counts))),
         *_when(body, after.t[rows]),
-        (Column("nutation, nominal", "deg"), _plain(after.nutation[rows])),
-        (Column("nutation: abort above", "deg"), _plain(limits)),
+        (Heading("nutation, nominal", "deg"), _plain(after.nutation[rows])),
+        (Heading("nutation: abort above", "deg"), _plain(limits)),
     ]
     if body.sun is not None:
         nominal = attitude.angle_between(after.momentum[rows], body.sun)
         ranges = np.array([criterion.sun_angle for criterion in criteria if criterion.sun_angle is not None])
-        columns.append((Column("Sun angle, nominal", "deg"), _plain(nominal)))
+        columns.append((Heading("Sun angle, nominal", "deg"), _plain(nominal)))
         columns += [
-            (Column(f"Sun angle: abort {side}", "deg"), _plain(ranges[:, index]))
+            (Heading(f"Sun angle: abort {side}", "deg"), _plain(ranges[:, index]))
             for index, side in enumerate(("below", "above"))
         ]
     spins = np.array([criterion.spin for criterion in criteria])
-    columns.append((Column("spin, nominal", "rpm"), _rpm(after.rates[rows, 2])))
+    columns.append((Heading("spin, nominal", "rpm"), _rpm(after.rates[rows, 2])))
     columns += [
-        (Column(f"spin: abort {side}", "rpm"), _rpm(spins[:, index])) for index, side in enumerate(("below", "above"))
+        (Heading(f"spin: abort {side}", "rpm"), _rpm(spins[:, index])) for index, side in enumerate(("below", "above"))
     ]
     yield _sheet("Abort criteria", columns, stacked=True)
     share = verdicts.exact_percent(probability)
@@ -209,11 +209,11 @@ def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
         yield Prose(f"There are criteria after {CHECKED} pulses at most: the first, the last and some evenly between.")
 
 
-def _when(body: Spacecraft, times: Vector) -> list[tuple[Column, list[str]]]:
+def _when(body: Spacecraft, times: Vector) -> list[tuple[Heading, list[str]]]:
     """Columns of times from t = 0, and of dates where there is an epoch."""
     dates = [body.utc(time, MILLISECONDS) for time in times.tolist()]
-    columns = [(Column("time", "s"), [f"{time:.4f}" for time in times.tolist()])]
-    return [*columns, (Column("UTC", number=False), [date or MISSING for date in dates])] if any(dates) else columns
+    columns = [(Heading("time", "s"), [f"{time:.4f}" for time in times.tolist()])]
+    return [*columns, (Heading("UTC", number=False), [date or MISSING for date in dates])] if any(dates) else columns
 
 
 def _angles(phases: Vector) -> list[str]:
@@ -233,6 +233,6 @@ def _small(value: float) -> str:
     return digits(value, 4) if abs(value) >= STILL else "0"
 
 
-def _sheet(title: str, columns: list[tuple[Column, list[str]]], *, stacked: bool = False) -> Sheet:
+def _sheet(title: str, columns: list[tuple[Heading, list[str]]], *, stacked: bool = False) -> Sheet:
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
     return Sheet(title, tuple(column for column, _ in columns), rows, sortable=False, stacked=stacked)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by, tolerated
 from nutdamp.flight.verification import AGREE, Verification
-from nutdamp.page.document import Block, Column, FactList, Listing, Points, Prose, Sheet
+from nutdamp.page.document import Block, FactList, Listing, Points, Prose, Sheet
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
@@ -16,7 +16,8 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part, left_of
 from nutdamp.views import guide
 from nutdamp.views.guide import Formula, Topic, TopicRows
-from nutdamp.views.plan_tables import beyond_floors
+from nutdamp.views.schemes import beyond_floors
+from nutdamp.views.tables import Heading
 from nutdamp.views.text import MISSING, degrees, quantity
 
 EQUATIONS = ("1", "17", "18", "19")
@@ -115,7 +116,7 @@ def checks_sheet(plan: Plan, verification: Verification) -> Sheet:
         differs = f"differs from what is flown by at most{share}"
         rows.append((f"impulse sum (17): {part.label}", differs, allowed, shown, verdict))
     heads = ("check", "criterion", "threshold", "found", "verdict")
-    return Sheet("Checks and their thresholds", tuple(Column(head, number=False) for head in heads), tuple(rows))
+    return Sheet("Checks and their thresholds", tuple(Heading(head, number=False) for head in heads), tuple(rows))
 
 
 def _size(difference: float) -> str:

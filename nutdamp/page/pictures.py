@@ -90,7 +90,7 @@ def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Pictur
         schemes.schemes_figure(compared, decided),
         "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, its row says "
         "so, whatever it costs. Values below the range of an axis are drawn at its left edge.",
-        "Dot plots of cost, end, nutation and shift of H by scheme",
+        "Dot plots of cost, end, nutation and momentum shift by scheme",
     )
 
 
@@ -119,13 +119,13 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
             "cases",
             "How many cases leave how much nutation, and how far H has moved, with what is required: "
             "histograms, and the share of cases beyond each value.",
-            "Histograms and distribution functions of nutation and shift of H",
+            "Histograms and distribution functions of nutation and momentum shift",
         ),
         (
             "momentum",
             "Where H ends in each case, with the ellipse that holds as many cases as must comply"
             + (", and what is required of it." if bounded else ".")
-            + " The shift of H is counted from where H was at t = 0 in that case." * (body.goal.axis is None),
+            + " The momentum shift is counted from where H was at t = 0 in that case." * (body.goal.axis is None),
             "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
         ),
         (

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from nutdamp import units
 from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
-from nutdamp.files.schedules import pulses_array, pulses_csv
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison, Decision, decide, infeasibility, remarks
@@ -18,7 +17,8 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, verdicts
 from nutdamp.views.decision_json import decision_json
 from nutdamp.views.plan_json import comparison_json, plan_json, spacecraft_json
-from nutdamp.views.schemes_csv import schemes_array, schemes_csv
+from nutdamp.views.pulses import pulse_table
+from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees
 
 if TYPE_CHECKING:
@@ -51,12 +51,12 @@ def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str,
 
 @results.table.register
 def _(plan: Plan) -> results.Table:
-    return pulses_array(plan.flight)
+    return pulse_table(plan.flight).array()
 
 
 @results.table.register
 def _(compared: Comparison) -> results.Table:
-    return schemes_array(compared, decide(compared))
+    return scheme_table(compared, compared.recommended).array()
 
 
 @results.table.register
@@ -66,12 +66,12 @@ def _(flight: Flight) -> results.Table:
 
 @results.write_csv.register
 def _(plan: Plan, path: str | PathLike[str]) -> None:
-    write_whole(units.path("path", path), pulses_csv(feasible(plan).flight))
+    write_whole(units.path("path", path), pulse_table(feasible(plan).flight).csv())
 
 
 @results.write_csv.register
 def _(compared: Comparison, path: str | PathLike[str]) -> None:
-    write_whole(units.path("path", path), schemes_csv(compared, decide(compared)))
+    write_whole(units.path("path", path), scheme_table(compared, compared.recommended).csv())
 
 
 @results.write_csv.register
@@ -133,7 +133,7 @@ def _(plan: Plan) -> str:
 @results.line.register
 def _(flight: Flight) -> str:
     left = flight.residual
-    ended = f"nutation left {degrees(left.nutation)}, shift of H {degrees(left.momentum_shift)}"
+    ended = f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
     return f"<Flight of {_summary(flight)}: {ended}>"
 
 
@@ -153,12 +153,11 @@ def _(spacecraft: Spacecraft) -> str | None:
 
 @results.html.register
 def _(plan: Plan) -> str | None:
-    from nutdamp.page.document import Prose
-    from nutdamp.page.sheets import pulse_sheet
+    from nutdamp.page.document import Prose, sheet
 
     if not plan.feasible:
         return _block(Prose(repr(plan)[1:-1]))
-    return _beside(_block(pulse_sheet(plan)), plan)
+    return _beside(_block(sheet(f"Pulses of {plan.scheme}", pulse_table(plan.flight, phased=True))), plan)
 
 
 @results.html.register
@@ -170,9 +169,10 @@ def _(flight: Flight) -> str | None:
 
 @results.html.register
 def _(compared: Comparison) -> str | None:
-    from nutdamp.page.sheets import comparison_sheet
+    from nutdamp.page.document import sheet
 
-    return _beside(_block(comparison_sheet(compared)), compared.recommended)
+    table = scheme_table(compared, compared.recommended)
+    return _beside(_block(sheet(table.title, table)), compared.recommended)
 
 
 def _beside(table: str | None, result: Plan | Flight | None) -> str | None:

@@ -287,7 +287,7 @@ class Plan(results.Data, results.Tabled):
         """True if the flown residual keeps the requirement of the file, the spin of the goal, and all cones.
 
         None where none of these is given, and without a schedule; kept cones alone meet nothing. With a target axis the
-        shift of H counts from there.
+        momentum shift counts from there.
         """
         if self.left is None:
             return None

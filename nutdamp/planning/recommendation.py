@@ -25,7 +25,7 @@ SAME_SPEED = 1e-5
 """m/s by which ΔV may differ and be equal."""
 
 STEADIER_SHIFT = 0.2
-"""Share of the recommended plan's shift of H below which another plan keeps H so much better..."""
+"""Share of the recommended plan's momentum shift below which another plan keeps H so much better..."""
 
 STEADIER_COST = 1.1
 """Largest cost ratio at which that is worth a note."""
@@ -199,7 +199,8 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
     """Plan of least propellant (impulse where one is unknown), and the deciding ground.
 
     Costs within `SAME_COST` are equal: then the ``usual`` one, if it is among them, else that with fewer pulses, less
-    ΔV, less shift of H (distance from the target axis), the earlier end; the first of these that leaves one decides.
+    ΔV, less momentum shift (distance from the target axis), the earlier end; the first of these that leaves one
+    decides.
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY

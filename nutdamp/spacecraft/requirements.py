@@ -41,7 +41,7 @@ class Part(Enum):
     @property
     def label(self) -> str:
         """Name in texts."""
-        names = {Part.SHIFT: "shift of H", Part.DISTANCE: "error of H", Part.SPIN: "spin error"}
+        names = {Part.SHIFT: "momentum shift", Part.DISTANCE: "axis error", Part.SPIN: "spin error"}
         return names.get(self, "nutation")
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-NAMES = ("nutation, deg", "shift of H, deg", "error of H, deg", "spin change, mrad/s", "propellant, g")
+NAMES = ("nutation, deg", "momentum shift, deg", "axis error, deg", "spin change, mrad/s", "propellant, g")
 NOTHING = 1e-9
 """Values, in these units, below which a number is rounding."""
 SCALES = (180.0 / math.pi, 180.0 / math.pi, 180.0 / math.pi, 1e3, 1e3)
@@ -97,7 +97,7 @@ def _tails(distribution: Distribution, shares: Array) -> Iterator[tuple[str, lis
 def angles_note(body: Spacecraft) -> Text:
     """Note on the reference of the angles of H in dispersed cases."""
     aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
-    note = f"Shift of H: from H at t = 0 of the same case; error of H: from {aim}."
+    note = f"Momentum shift: from H at t = 0 of the same case; axis error: from {aim}."
     return Text(f"{note} The spin axis swings about H by the nutation.", style="dim")
 
 
@@ -159,8 +159,8 @@ def _worst(results: Results, count: int) -> list[RenderableType]:
     table = columns(
         "case",
         "nutation\ndeg",
-        "shift of H\ndeg",
-        "error of H\ndeg",
+        "momentum shift\ndeg",
+        "axis error\ndeg",
         *bounded_heads(study.model.spacecraft.keep),
         "what counts most, in sigmas",
         text=("what counts most, in sigmas",),

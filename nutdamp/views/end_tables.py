@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+from rich.console import Group, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.views.layout import facts
-from nutdamp.views.text import RPM, degrees, longitude, moment, most, pointing, quantity
+from nutdamp.views.pulses import block_table
+from nutdamp.views.text import RPM, degrees, longitude, mass, moment, most, pointing, quantity
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
 """Frame of the two angles of a direction without an attitude in the file."""
@@ -105,3 +109,40 @@ def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:
         yield f"≥ {most(keep.least)}", aspect.least, aspect.least - keep.least
     if keep.most < math.pi:
         yield f"≤ {most(keep.most)}", aspect.largest, keep.most - aspect.largest
+
+
+def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
+    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
+    table = block_table(flown)
+    return Group(Text(table.title, style="bold"), table.screen("screen"), Text(), _effects(flown, velocity))
+
+
+def _effects(flown: Flight, velocity: Vector | None) -> Table:
+    body, schedule, final = flown.spacecraft, flown.schedule, flown.final
+    before, after = flown.around_pulses()
+    table = facts()
+    for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
+        start = pulse.loaded[0]
+        dated = body.utc(start, 3)
+        table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
+    for name, before_, after_ in zip(
+        angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
+    ):
+        table.add_row(f"H: {name}", f"{before_} to {after_}")
+    table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
+    table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
+    largest = float(max(before.nutation.max(), after.nutation.max()))
+    table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
+    used = schedule.propellant
+    tank = body.tank
+    left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
+    weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
+    table.add_row("propellant", f"{mass(used)}{left}{weighs}")
+    if velocity is not None:
+        table.add_row("|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s"))
+    return table
+
+
+def _sun_angle(body: Spacecraft, direction: Vector) -> str:
+    assert body.sun is not None
+    return degrees(float(attitude.angle_between(direction, body.sun)))

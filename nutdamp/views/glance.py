@@ -18,14 +18,15 @@ from nutdamp.flight.end_state import at_start
 from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK, Spacecraft
+from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, limit, notes, size, verdict
 from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text, cone_margins, lasting
-from nutdamp.views.layout import FittedColumns, columns, facts
-from nutdamp.views.plan_tables import SHORT_NAMES, channel_text
-from nutdamp.views.text import MISSING, RPM, degrees, mass, quantity
+from nutdamp.views.layout import FittedColumns, facts
+from nutdamp.views.pulses import block_table, pulse_table
+from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
+from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
 
 WIDTH, LINES = 80, 24
 """Columns and lines of the screen."""
@@ -41,12 +42,6 @@ TIGHTEST = 2
 NOTES = 3
 """Notes that are shown, at most."""
 
-FINE = 0.01
-"""Share of a limit below which what is left of it is shown as 0."""
-
-COARSE = 5e-4
-"""Degrees below which an angle without a limit is shown as 0."""
-
 NEXT = "--plot plan.png · nutdamp report"
 """Next steps at the end of the last line."""
 
@@ -60,7 +55,7 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
     ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases.
     """
     body = compared.spacecraft
-    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short(body.widest.nutation)} deg"
+    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
     if decision is None:
@@ -108,14 +103,6 @@ def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
 
-def short(angle: float | None, largest: float = math.inf) -> str:
-    """An angle given in rad, in degrees to three figures; "0" where it does not matter beside a ``largest`` (rad)."""
-    if angle is None or math.isnan(angle):
-        return MISSING
-    least = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
-    return "0" if abs(math.degrees(angle)) < least else f"{math.degrees(angle):.3g}"
-
-
 def _requirements(decision: Decision) -> list[tuple[float, bool, tuple[str | Text, ...]]]:
     """Rows of what is required, each with the share of the limit that is left and whether it is met."""
     rows: list[tuple[float, bool, tuple[str | Text, ...]]] = []
@@ -148,33 +135,26 @@ def _left(bound: Bound, value: float | None) -> str:
     """Residual of a part, with as many digits as it takes to stand on its side of the limit."""
     if bound.part is Part.SPIN or value is None or math.isnan(value):
         return size(bound, value)
-    text, figures, shown = short(value, bound.most), 3, float(f"{math.degrees(bound.most):.4g}")
+    text, figures, shown = short_angle(value, bound.most), 3, float(f"{math.degrees(bound.most):.4g}")
     while (float(text) > shown) != (value > bound.most) and figures < DIGITS:
         figures += 1
         text = f"{math.degrees(value):.{figures}g}"
     return f"{text} deg"
 
 
-def _limits(body: Spacecraft) -> tuple[float, float]:
-    """Limits, rad, of the nutation and of the end of H, infinite where there are none."""
-    most = {bound.part: bound.most for bound in requirements.required(body)}
-    ends = [most[part] for part in (Part.SHIFT, Part.DISTANCE) if part in most]
-    return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
-
-
 def _ends(decision: Decision) -> RenderableType:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
-    table, formula, (least, turn) = facts(), plan.residual, _limits(body)
-    angles = [f"nutation {short(left.nutation, least)}", f"body cone {short(left.body_cone, least)}"]
-    angles += [f"space cone {short(left.space_cone, least)}"]
+    table, formula, (least, turn) = facts(), plan.residual, limits(body)
+    angles = [f"nutation {short_angle(left.nutation, least)}", f"body cone {short_angle(left.body_cone, least)}"]
+    angles += [f"space cone {short_angle(left.space_cone, least)}"]
     if formula is not None:
-        angles[0] += f" (17: {short(formula.nutation, least)})"
+        angles[0] += f" (17: {short_angle(formula.nutation, least)})"
     table.add_row("ends, deg", "  ".join(angles))
     first, second = angle_texts(body, decision.final.axis)
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
-    turned = f"turned by {short(left.momentum_shift, turn)} deg"
-    turned = turned if body.goal.axis is None else f"{short(left.axis_error, turn)} deg off target"
+    turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
+    turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
     spun = abs(decision.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
     spin = f"; spin {decision.final.spin * RPM:.5g} rpm" * spun
     table.add_row("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}")
@@ -185,62 +165,17 @@ def _ends(decision: Decision) -> RenderableType:
 
 def _fired(plan: Plan, first: int) -> RenderableType:
     """The blocks or pulses to fire, of many the ``first`` ones and the last."""
-    flown = plan.flight
-    (_, after), (least, _) = flown.around_pulses(), _limits(plan.spacecraft)
-    rows: list[list[str]]
-    heads: tuple[str, ...]
     if plan.pulses.blocks:
-        rows = [
-            [str(number), block.channel, str(block.first), f"{block.delay:.6g}", f"{block.width:.6g}",
-             str(block.count), str(block.every)]
-            for number, block in enumerate(plan.pulses.blocks, 1)
-        ]  # fmt: skip
-        heads = ("block", "channel", "first Sun pulse", "delay s", "width s", "pulses", "every")
-    else:
-        rows = [
-            [str(number), f"{pulse.loaded[0]:.4f}", f"{pulse.loaded[1]:.4f}" if pulse.loaded[1] else "ideal",
-             channel_text(pulse, plan.spacecraft), short(left, least)]
-            for number, (pulse, left) in enumerate(zip(plan.pulses, after.nutation.tolist(), strict=True), 1)
-        ]  # fmt: skip
-        heads = ("pulse", "start s", "on-time s", "channel", "nutation after, deg")
-    table = columns(*heads, text=("channel",))
-    whole = len(rows) <= ROWS - FIRST + first
-    for row in rows if whole else rows[:first]:
-        table.add_row(*row)
-    if not whole:
-        between = [""] * len(heads)
-        between[0], between[heads.index("channel")] = "…", f"{len(rows) - first - 1} more"
-        table.add_row(*between)
-        table.add_row(*rows[-1])
-    return table
+        return block_table(plan.flight).screen("screen", first=first)
+    least, _ = limits(plan.spacecraft)
+    shown = pulse_table(plan.flight, least=least)
+    return shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS - FIRST + first else None)
 
 
 def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     """One line a scheme; the one to fly is marked."""
-    body = compared.spacecraft
-    propellant = any(plan.pulses.propellant is not None for plan in compared.plans if plan.feasible)
-    least, turn = _limits(body)
-    shift = (Part.SHIFT if body.goal.axis is None else Part.DISTANCE).label
-    heads = ["scheme", "pulses", "end s", "propellant g" if propellant else "impulse N m s", "nutation", shift]
-    heads += ["cases"] * bool(compared.shares)
-    table = columns(*heads, "verdict", text=("verdict",))
-    table.whole = ("verdict",)
-    for plan in compared.plans:
-        name = Text(plan.scheme, style="bold" if plan.scheme == chosen else "")
-        if not plan.feasible:
-            table.add_row(name, *[""] * (len(heads) - 1), "infeasible" if plan.failure is None else "error")
-            continue
-        flown, pulses = plan.flown, plan.pulses
-        used = MISSING if pulses.propellant is None else f"{1e3 * pulses.propellant:.4g}"
-        spent = used if propellant else f"{pulses.total_impulse:.4g}"
-        nutation = None if flown is None else flown.nutation
-        turned = None if flown is None else flown.momentum_shift if body.goal.axis is None else flown.axis_error
-        cells = [str(len(pulses)), f"{pulses.end:.4g}", spent, short(nutation, least), short(turned, turn)]
-        if compared.shares:
-            cells.append(verdicts.share_text(compared.shares.get(plan)).removesuffix(" %"))
-        met = compared.meets(plan)
-        table.add_row(name, *cells, coloured(verdicts.VERDICT[met] + ", timed" * (not plan.commandable), met))
-    return table
+    plan = next((plan for plan in compared.plans if plan.scheme == chosen), None)
+    return scheme_table(compared, plan).screen("screen", between=" ")
 
 
 def _infeasible(compared: Comparison) -> Iterator[str]:

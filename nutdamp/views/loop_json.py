@@ -7,7 +7,8 @@ from typing import Any
 
 from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
 from nutdamp.control_loop.stability import Margin
-from nutdamp.views.plan_json import final_json, heading, pulses_json, requirement_json, residual_json, target_json
+from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
+from nutdamp.views.pulses import pulse_table
 
 
 def loop_json(plan: LoopPlan) -> dict[str, Any]:
@@ -27,7 +28,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "quiet_s": list(run.quiet),
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
-        "pulses": [{**pulse, **more} for pulse, more in zip(pulses_json(run.flight), seen, strict=True)],
+        "pulses": [{**pulse, **more} for pulse, more in zip(pulse_table(run.flight).json("flown"), seen, strict=True)],
         "total_impulse_Nms": plan.total_impulse,
         "propellant_kg": plan.propellant,
         "end_s": plan.end,

@@ -14,7 +14,7 @@ from nutdamp.planning.decision import Comparison, infeasibility, remarks
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import Pulse
+from nutdamp.views.pulses import commanded
 
 RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
 """Angles of a `Residual`."""
@@ -92,7 +92,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "why": infeasibility(plan) or None,
         "meets_requirement": plan.meets_requirement,
         "requirement": requirement_json(plan),
-        "pulses": [pulse_json(pulse, body) for pulse in plan.pulses],
+        "pulses": commanded(plan.pulses, body).json(),
         "total_impulse_Nms": None if schedule is None else schedule.total_impulse,
         "least_impulse_Nms": None if schedule is None else body.least_impulse,
         "propellant_kg": None if schedule is None else schedule.propellant,
@@ -118,27 +118,6 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
             left, most = scale * part.left, scale * part.bound.most
             parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
     return parts or None
-
-
-def pulse_json(pulse: Pulse, body: Spacecraft) -> dict[str, Any]:
-    """One pulse of ``body``; with an epoch ``utc`` is its start.
-
-    Through a valve start and on-time are those of the command, and the effective ones are there too.
-    """
-    start, on_time = pulse.loaded
-    utc = body.utc(start)
-    effective = {"effective_start_s": pulse.start, "effective_on_time_s": pulse.on_time}
-    return {
-        "t_s": pulse.t,
-        "start_s": start,
-        **({} if utc is None else {"utc": utc}),
-        "on_time_s": on_time,
-        **(effective if pulse.through_valve else {}),
-        "channel": pulse.channel,
-        "torque_Nm": None if pulse.torque is None else body.inertia.in_file(pulse.torque).tolist(),
-        "impulse_Nms": body.inertia.in_file(pulse.impulse).tolist(),
-        "propellant_kg": pulse.propellant,
-    }
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
@@ -189,19 +168,3 @@ def direction_json(body: Spacecraft, direction: Vector) -> dict[str, float | Non
 def residual_json(residual: Residual | None) -> dict[str, float | None]:
     """Cone angles and shifts in degrees; nulls where there is no schedule."""
     return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
-
-
-def pulses_json(flown: Flight) -> list[dict[str, Any]]:
-    """The pulses of a flight with the cone angles before and after each."""
-    before, after = flown.around_pulses()
-    return [
-        {
-            **pulse_json(pulse, flown.spacecraft),
-            **{
-                f"{cone}_{when}_deg": math.degrees(getattr(track, cone)[index])
-                for when, track in (("before", before), ("after", after))
-                for cone in ("nutation", "body_cone", "space_cone")
-            },
-        }
-        for index, pulse in enumerate(flown.schedule)
-    ]

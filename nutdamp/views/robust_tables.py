@@ -13,7 +13,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.views import robust_verdicts, verdicts
 from nutdamp.views.decisions import KEPT, figures, requirement
 from nutdamp.views.layout import columns
-from nutdamp.views.plan_tables import derived_table, pulse_table
+from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.pulses import pulse_table
 from nutdamp.views.text import in_degrees
 
 MOST_ROWS = 12
@@ -47,7 +48,7 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
         *(Text(), _candidates(robust), *reasons),
     ]
     if len(decided.plan.pulses):
-        parts += [Text(), pulse_table(decided.plan)]
+        parts += [Text(), pulse_table(decided.plan.flight).screen("full")]
     return Group(*parts)
 
 

@@ -38,7 +38,7 @@ def robust_reason(robust: RobustComparison) -> str:
         Ground.NOMINAL: f"least {cost} within 0.1 %, and recommended without --robust",
         Ground.PULSES: f"least {cost} within 0.1 %, and fewest pulses",
         Ground.DELTA_V: f"least {cost} within 0.1 %, and least ΔV",
-        Ground.SHIFT: f"least {cost} within 0.1 %, and least shift of H",
+        Ground.SHIFT: f"least {cost} within 0.1 %, and least momentum shift",
         Ground.END: f"least {cost} within 0.1 %, and first to end",
     }
     return best if robust.ground not in then else f"{best}; {as_good}, of these {then[robust.ground]}"
@@ -89,7 +89,7 @@ def tightened(robust: RobustComparison) -> str:
 
 def left_name(spacecraft: Spacecraft) -> str:
     """Name of the residual that a plan is to minimise."""
-    return "nutation" if spacecraft.goal.axis is None else "nutation or error of H"
+    return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
 
 
 def _more(difference: float, shown: str, what: str) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -12,12 +10,12 @@ from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Extremes
 from nutdamp.planning.decision import Simulation
-from nutdamp.views.block_tables import blocks_screen, shown_pulses
 from nutdamp.views.decisions import decision_table, requirement
-from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_texts
+from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_texts, blocks_screen
 from nutdamp.views.layout import columns, facts
-from nutdamp.views.plan_tables import channel_text, header
-from nutdamp.views.text import degrees, in_degrees, longitude, moment, pointing, quantity
+from nutdamp.views.plan_tables import header
+from nutdamp.views.pulses import pulse_table, shown_rows
+from nutdamp.views.text import degrees, longitude, moment, pointing, quantity
 from nutdamp.views.verdicts import model_warnings
 
 
@@ -33,10 +31,11 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
     if flight.schedule.blocks:
         parts += [Text(), blocks_screen(flight, simulation.plan.delta_v)]
     if len(flight.schedule):
-        shown = shown_pulses(flight.schedule)
-        parts += [Text(), _pulses(flight, shown)]
-        if len(shown) < len(flight.schedule):
-            parts.append(Text(f"{len(shown)} of {len(flight.schedule)} pulses; --json writes all.", style="dim"))
+        pulses_table = pulse_table(flight)
+        shown = shown_rows(pulses_table, flight.schedule.blocks)
+        parts += [Text(), shown.screen("simulate")]
+        if len(shown.rows) < len(flight.schedule):
+            parts.append(Text(f"{len(shown.rows)} of {len(flight.schedule)} pulses; --json writes all.", style="dim"))
     parts += [Text(), _ends(impulses, flown, extremes.until)]
     if flight.spacecraft.attitude is None:
         parts.append(Text(f"{FRAME_N}.", style="dim"))
@@ -44,20 +43,6 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
     parts += [Text(), *requirement(decided), decision_table(decided)]
     parts += [Text(), _extremes(extremes, flight)]
     return Group(*parts)
-
-
-def _pulses(flight: Flight, shown: Sequence[int]) -> Table:
-    before, after = flight.around_pulses()
-    cones = ("nutation\ndeg", "body cone\ndeg", "space cone\ndeg")
-    table = columns("pulse\n", "centre\ns", "on-time\ns", "channel\n", "\n", *cones, text=("channel\n", "\n"))
-    for index in shown:
-        pulse = flight.schedule.pulses[index]
-        on_time = "ideal" if pulse.loaded[1] == 0.0 else f"{pulse.loaded[1]:.4f}"
-        what = (str(index + 1), f"{pulse.t:.4f}", on_time, channel_text(pulse, flight.spacecraft))
-        for cells, when, state in ((what, "before", before), (("",) * 4, "after", after)):
-            angles = (float(cone[index]) for cone in (state.nutation, state.body_cone, state.space_cone))
-            table.add_row(*cells, when, *map(in_degrees, angles))
-    return table
 
 
 def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
@@ -68,7 +53,7 @@ def _ends(impulses: Flight, flown: Flight, until: float) -> Table:
         ("nutation", "nutation"),
         ("body cone", "body_cone"),
         ("space cone", "space_cone"),
-        ("shift of H", "momentum_shift"),
+        ("momentum shift", "momentum_shift"),
     ]
     if body.goal.axis is not None:
         rows.append(("off the target", "axis_error"))

@@ -10,7 +10,8 @@ from nutdamp.flight.end_state import aspects
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
 from nutdamp.views.decision_json import decision_json
-from nutdamp.views.plan_json import aspects_json, final_json, heading, pulses_json, residual_json, target_json
+from nutdamp.views.plan_json import aspects_json, final_json, heading, residual_json, target_json
+from nutdamp.views.pulses import pulse_table
 
 
 def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
@@ -21,7 +22,7 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
         **heading(flight.spacecraft),
         "scheme": simulation.plan.scheme,
         "propagated": "flown" if simulation.real else "residual",
-        "pulses": pulses_json(flight),
+        "pulses": pulse_table(flight).json("flown"),
         "residual": residual_json(impulses.residual),
         "flown": residual_json(flown.residual),
         "final": final_json(flown),

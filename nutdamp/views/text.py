@@ -60,6 +60,26 @@ def in_degrees(angle: float | None) -> str:
     return digits(math.degrees(angle), 4)
 
 
+def small_angle(angle: float) -> str:
+    """An angle given in degrees, with final zeros; below 1e-9 deg it is rounding and shown as such."""
+    return in_degrees(math.radians(angle))
+
+
+FINE = 0.01
+"""Share of a limit below which what is left of it is shown as 0."""
+
+COARSE = 5e-4
+"""Degrees below which an angle without a limit is shown as 0."""
+
+
+def short_angle(angle: float | None, largest: float = math.inf) -> str:
+    """An angle given in rad, in degrees to three figures; "0" where it does not matter beside a ``largest`` (rad)."""
+    if angle is None or math.isnan(angle):
+        return MISSING
+    least = COARSE if math.isinf(largest) else min(COARSE, FINE * math.degrees(largest))
+    return "0" if abs(math.degrees(angle)) < least else f"{math.degrees(angle):.3g}"
+
+
 def most(angle: float) -> str:
     """The bound of an angle, given in rad, in degrees: as it was given, however small."""
     return f"{math.degrees(angle):.4g} deg"

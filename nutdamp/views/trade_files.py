@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from nutdamp.files.schedules import pulses_csv
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.planning.tradeoff import Front, Point, numbered
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.plan_json import heading, plan_json
+from nutdamp.views.pulses import pulse_table
 
 HEADER = (
     "point",
@@ -70,7 +70,7 @@ def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]
     """The pulses of every point: (path in ``folder``, contents)."""
     points = list(numbered(fronts))
     paths = schedule_paths(folder, len(points))
-    return [(path, pulses_csv(point.plan.flight)) for path, (_, _, point) in zip(paths, points, strict=True)]
+    return [(path, pulse_table(point.plan.flight).csv()) for path, (_, _, point) in zip(paths, points, strict=True)]
 
 
 def schedule_paths(folder: str, count: int) -> list[str]:

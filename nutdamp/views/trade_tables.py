@@ -18,7 +18,8 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.layout import columns
-from nutdamp.views.plan_tables import NOT, header
+from nutdamp.views.plan_tables import header
+from nutdamp.views.schemes import NOT
 from nutdamp.views.text import cost, degrees, duration, moment
 from nutdamp.views.verdicts import FARTHER
 
@@ -209,7 +210,7 @@ SOONER = 0.05
 
 def _table(fronts: Sequence[Front], front: Front, *, by_others: bool) -> RenderableType:
     """A row for each point; ``by_others``: with its scheme."""
-    names = ("ends at", "cost", "first-order least", "pulses", "shift of H")
+    names = ("ends at", "cost", "first-order least", "pulses", "momentum shift")
     first = next(index for index, owner, _ in numbered(fronts) if owner is front)
     schemes = ("scheme",) * by_others
     table = columns("point", *names, f"against point {first}", *schemes, text=("scheme",))

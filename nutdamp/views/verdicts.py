@@ -77,7 +77,7 @@ def reason(compared: Comparison) -> str:
         then = {
             Ground.PULSES: f"{equal}, fewest pulses",
             Ground.DELTA_V: f"{equal}, least ΔV",
-            Ground.SHIFT: f"{equal}, least shift of H",
+            Ground.SHIFT: f"{equal}, least momentum shift",
             Ground.END: f"{equal}, it ends first",
         }
         return f"{least}{then.get(recommendation.ground or Ground.COST, '')}"
@@ -96,7 +96,7 @@ def reason(compared: Comparison) -> str:
         Ground.COST: least_cost,
         Ground.PULSES: f"{least_cost}, then fewest pulses",
         Ground.DELTA_V: f"{least_cost}, then least ΔV",
-        Ground.SHIFT: f"{least_cost}, then least shift of H",
+        Ground.SHIFT: f"{least_cost}, then least momentum shift",
         Ground.END: f"{least_cost}, then it ends first",
     }
     return f"{least} {among}{then.get(recommendation.ground or Ground.LEFT, '')}"

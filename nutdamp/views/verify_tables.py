@@ -75,7 +75,7 @@ def _course(course: Conservation) -> str:
 
 def methods_table(verification: Verification) -> Table:
     """One row a way to fly the schedule: its residuals, and its difference from the flown motion."""
-    left = ("nutation\nleft, deg", "shift of H\ndeg")
+    left = ("nutation\nleft, deg", "momentum shift\ndeg")
     table = columns("method\n", *left, "axis\ndiffers, rad", "H\nrad", "rates\nrelative")
     for method in verification.methods:
         if not method.missing:
@@ -93,7 +93,7 @@ def _difference(value: float | None) -> str:
 def budget_table(spacecraft: Spacecraft, verification: Verification) -> Table:
     """One row an imperfection: residuals with it alone; then residuals without each effect that plans include."""
     aimed = spacecraft.goal.axis is not None
-    table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "shift of H\ndeg")
+    table = columns("imperfection\n", "nutation left\ndeg", "off the target\ndeg" if aimed else "momentum shift\ndeg")
     for row in verification.budget:
         table.add_row(row.name, *map(in_degrees, (row.nutation, row.axis_error)))
     return table
@@ -104,7 +104,7 @@ def budget_note(verification: Verification, *, aimed: bool) -> str:
     names = [row.name.removeprefix(WITHOUT) for row in verification.budget if row.name.startswith(WITHOUT)]
     flown = next(row for row in verification.budget if row.name == AS_FLOWN)
     single = [row for row in verification.budget if row is not flown and not row.name.startswith(WITHOUT)]
-    farther, notes = "H farther off the target" if aimed else "a larger shift of H", []
+    farther, notes = "H farther off the target" if aimed else "a larger momentum shift", []
     if len(verification.budget) == len({IDEAL, AS_FLOWN}):
         notes.append("Nothing is imperfect here: ideal impulses, no ticks, no disturbances.")
     for row in single:

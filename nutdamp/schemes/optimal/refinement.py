@@ -1,6 +1,6 @@
 """Equations of the end errors, refinement of a schedule on its flight, rounding to ticks.
 
-Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), shift of H
+Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), momentum shift
 (two, square to the target axis) and spin (one). Before anything is planned they are those of small angles; after that
 those along a flight, at its true angles.
 

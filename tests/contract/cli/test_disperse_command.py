@@ -196,7 +196,7 @@ def test_spin_that_is_only_lost_has_one_row_and_one_case_the_nominal_one_of_all(
     assert numbers[1:] == sorted(numbers[1:], reverse=True)
     assert numbers[-1] < 0.0
     for number in (["--samples", "100"], ["--case", "7"]):
-        (shift,) = row_of(run("disperse", "--scheme", "four-pulse", *number).stdout, "shift of H").values()
+        (shift,) = row_of(run("disperse", "--scheme", "four-pulse", *number).stdout, "momentum shift").values()
         assert shift[0] == 0.1684
 
 

@@ -17,7 +17,7 @@ from support.places import case as earlier
 
 from nutdamp.files.ccsds.read import ApmContents, contradictions, imported, read_apm
 from nutdamp.files.reader import read_spacecraft
-from nutdamp.files.schedules import pulses_csv, read_pulses
+from nutdamp.files.schedules import read_pulses
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
@@ -25,6 +25,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.exchange import export_text
+from nutdamp.views.pulses import pulse_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -75,7 +76,7 @@ def test_state_inertia_and_manoeuvres_come_back(case: str, take: Take) -> None:
     flown, expected = propagation.flown(back, schedule), plan.flown
     assert flown.residual.nutation == pytest.approx(known(expected).nutation, abs=1e-9)
     assert flown.residual.momentum_shift == pytest.approx(known(expected).momentum_shift, abs=1e-9)
-    Path("back.csv").write_text(pulses_csv(flown), encoding="utf-8")
+    Path("back.csv").write_text(pulse_table(flown).csv(), encoding="utf-8")
     again, warnings = read_pulses(Path("back.csv"), back)
     assert warnings == []
     assert [pulse.start for pulse in again] == pytest.approx([pulse.start for pulse in schedule], abs=1e-14)

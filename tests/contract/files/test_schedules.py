@@ -21,7 +21,7 @@ from support.spinners import FILE
 from nutdamp.cli.flown import JITTER_SEED
 from nutdamp.files import tabular
 from nutdamp.files.reader import example_text, read_spacecraft
-from nutdamp.files.schedules import BLOCKS_HEADER, pulses_csv, read_blocks, read_pulses
+from nutdamp.files.schedules import BLOCKS_HEADER, read_blocks, read_pulses
 from nutdamp.flight import propagation
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import infeasibility
@@ -29,6 +29,7 @@ from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable
 from nutdamp.spacecraft.model import Limits
 from nutdamp.spacecraft.schedule import Pulse, Schedule, overlapping
+from nutdamp.views.pulses import pulse_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -48,7 +49,7 @@ def read(write: Write) -> Read:
 @pytest.fixture
 def written() -> str:
     """The four pulses of the example as `plan --csv` writes them."""
-    return pulses_csv(planning.plan(EXAMPLE, "four-pulse").flight)
+    return pulse_table(planning.plan(EXAMPLE, "four-pulse").flight).csv()
 
 
 def edited(text: str, *numbers: int, **cells: str) -> str:

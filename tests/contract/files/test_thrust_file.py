@@ -18,7 +18,7 @@ from support.golden import check_text
 from nutdamp.files import dispersion_rules, thruster_rules
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.files.rules import Facts
-from nutdamp.files.schedules import EFFECTIVE, pulses_csv, read_pulses
+from nutdamp.files.schedules import EFFECTIVE, read_pulses
 from nutdamp.files.thruster_rules import thrusts
 from nutdamp.flight.propellant import supplied
 from nutdamp.montecarlo.inputs import reachable
@@ -28,6 +28,7 @@ from nutdamp.planning.decision import infeasibility
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+from nutdamp.views.pulses import pulse_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -181,7 +182,7 @@ def test_csv_has_commands_and_effective_times_and_is_read_back(tmp_path: Path) -
     body = read(VALVE, COLD)
     plan = planning.plan(body, "one-pulse")
     path = tmp_path / "pulses.csv"
-    path.write_text(pulses_csv(plan.flight), encoding="utf-8")
+    path.write_text(pulse_table(plan.flight).csv(), encoding="utf-8")
     again, warnings = read_pulses(path, body)
     assert warnings == []
     assert path.read_text().splitlines()[0].endswith(",".join(EFFECTIVE))

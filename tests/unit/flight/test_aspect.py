@@ -238,9 +238,9 @@ def test_no_screen_calls_the_requirement_met_where_a_cone_is_broken(run: Run) ->
         assert "it meets the requirement at the end." in said
         assert "otherwise met with nominal values" in said
         rows = [line.split() for line in shown.stdout.splitlines()]
-        assert ["requirement:", "NOT", "met"] in rows
-        assert any(row[:6] == ["from", "Star", "≥", "4", "deg", "✗"] for row in rows)
-        assert any(row[:5] == ["from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows)
+        assert ["verdict", "NOT", "met"] in rows
+        assert any(row[:7] == ["axis", "from", "Star", "≥", "4", "deg", "✗"] for row in rows)
+        assert any(row[:6] == ["axis", "from", "Star", "≤", "60", "deg"] and "✗" not in row for row in rows)
     assert "axis from Star" in run("simulate", "-", "--scheme", "none", "--until", "5s", stdin=BROKEN).stdout
 
 

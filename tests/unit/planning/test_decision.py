@@ -294,7 +294,7 @@ def test_json_and_the_table_of_schemes_say_what_the_screen_has_on_top(run: Run, 
     assert (done.returncode, *told) == (0, "four-pulse", True, None)
     assert (lines[0], lines[3]) == ("Sounder-1", f"Requirement {decision['verdict']}.")
     assert max(map(len, lines)) <= 80
-    assert any(line.startswith("shift of H   ≤ 0.2 deg") and line.endswith("met") for line in lines[:12])
+    assert any(line.startswith("momentum shift  ≤ 0.2 deg") and line.endswith("met") for line in lines[:12])
     assert shift["margin_deg"] == pytest.approx(shift["limit_deg"] - shift["nominal_deg"])
     assert decision["final"]["spin_rad_s"] == pytest.approx(math.pi)
     rows = csv_rows((tmp_path / "schemes.csv").read_text("utf-8"))

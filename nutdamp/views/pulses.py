@@ -1,0 +1,226 @@
+"""Pulses and command blocks of a schedule: one row each, on screens, pages, the manoeuvre sheet and in files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nutdamp.flight.end_state import spin_phases
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.track import Track
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
+
+MILLISECONDS = 3
+"""Digits of a second that tables show of a date."""
+
+
+class PulseRow(NamedTuple):
+    """A pulse of ``body``, counted from 0; motion just before and after all pulses; spin phase at its start, rad."""
+
+    at: int
+    pulse: Pulse
+    body: Spacecraft
+    before: Track | None = None
+    after: Track | None = None
+    phase: float = 0.0
+
+
+def channel_text(pulse: Pulse, body: Spacecraft) -> str:
+    """The channel of a pulse; a steerable one is named by the angle of its torque too."""
+    if pulse.channel != STEERABLE:
+        return pulse.channel
+    return f"{STEERABLE} {steering(body.inertia.in_file(pulse.impulse).tolist())}"
+
+
+def seconds(value: float) -> str:
+    """A time within a schedule to a tenth of a millisecond."""
+    return f"{value:.4f}"
+
+
+def on_time(value: float) -> str:
+    """An on-time; an impulse that takes none is ideal."""
+    return seconds(value) if value else "ideal"
+
+
+def clock(date: str) -> str:
+    """Month, day and time of a date in UTC, for columns with little room."""
+    return date[5:].replace("T", " ").removesuffix("Z")
+
+
+def _cone(name: str, when: str, where: str) -> Column:
+    def angle(row: PulseRow) -> float:
+        return math.degrees(getattr(getattr(row, when), name)[row.at])
+
+    return Column(f"{name}_{when}_deg", f"{name.replace('_', ' ')} {when}", "deg", angle, small_angle, where)
+
+
+def _vector(name: str, unit: str) -> Column:
+    def components(row: PulseRow) -> Any:
+        vector = getattr(row.pulse, name)
+        return None if vector is None else row.body.inertia.in_file(vector)
+
+    return Column(f"{name}#_{unit}", name, unit, components, where="csv json flown")
+
+
+def _valves(schedule: Schedule) -> bool:
+    return schedule.through_valves
+
+
+PULSES = (
+    Column("pulse", "pulse", "", lambda row: row.at + 1, where="screen full simulate page csv", kind=WHOLE),
+    Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, "csv json flown"),
+    Column(
+        "start_s",
+        "start",
+        "s",
+        lambda row: row.pulse.loaded[0],
+        seconds,
+        "screen full simulate page csv json flown",
+    ),
+    Column("", "start", "UTC", lambda row: row.body.utc(row.pulse.loaded[0], MILLISECONDS), clock, "full", kind=TEXT),
+    Column("", "start", "UTC", lambda row: row.body.utc(row.pulse.loaded[0], MILLISECONDS), where="page", kind=TEXT),
+    Column("", "spin phase", "deg", lambda row: row.phase, lambda phase: longitude(phase).removesuffix(" deg"), "page"),
+    Column(
+        "on_time_s",
+        "on-time",
+        "s",
+        lambda row: row.pulse.loaded[1],
+        on_time,
+        "screen full simulate page csv json flown",
+    ),
+    Column("", "effective on-time", "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
+    Column("", "channel", "", lambda row: channel_text(row.pulse, row.body), where="screen full simulate page",
+           kind=TEXT),
+    Column("channel", "channel", "", lambda row: row.pulse.channel, where="csv json flown", kind=TEXT),
+    _vector("torque", "Nm"),
+    _vector("impulse", "Nms"),
+    Column("propellant_kg", "propellant", "kg", lambda row: row.pulse.propellant, where="csv json flown"),
+    Column("", "impulse", "N m s", lambda row: row.pulse.magnitude, lambda size: digits(size, 4), "full page"),
+    _cone("nutation", "before", "full simulate page csv flown"),
+    _cone("nutation", "after", "full simulate page csv flown"),
+    _cone("body_cone", "before", "page flown"),
+    _cone("body_cone", "after", "simulate page flown"),
+    _cone("space_cone", "before", "page flown"),
+    _cone("space_cone", "after", "simulate page flown"),
+    Column("effective_start_s", "", "", lambda row: row.pulse.start, where="csv json flown", when=_valves),
+    Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where="csv json flown", when=_valves),
+    Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where="csv json flown", kind=TEXT),
+)  # fmt: skip
+
+
+def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
+    """The pulses as they are commanded, without the motion that they cause."""
+    rows = [PulseRow(index, pulse, body) for index, pulse in enumerate(schedule)]
+    return DataTable("Pulses", _dated(body), rows, schedule)
+
+
+def pulse_table(flown: Flight, *, phased: bool = False, least: float = math.inf) -> DataTable:
+    """The pulses of a flight with the cone angles before and after each.
+
+    ``phased``: with spin phases, for pages; ``least``: limit of the nutation, rad, for the default screen.
+    """
+    before, after = flown.around_pulses()
+    pulses, body = flown.schedule.pulses, flown.spacecraft
+    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if phased else np.zeros(len(pulses))
+    rows = [
+        PulseRow(index, pulse, body, before, after, phase)
+        for index, (pulse, phase) in enumerate(zip(pulses, phases.tolist(), strict=True))
+    ]
+    left = Column("", "nutation after", "deg", lambda row: float(row.after.nutation[row.at]),
+                  lambda angle: short_angle(angle, least), "screen")  # fmt: skip
+    return DataTable("Pulses", (*_dated(body), left), rows, flown.schedule)
+
+
+def _dated(body: Spacecraft) -> tuple[Column, ...]:
+    """The columns for a spacecraft: without an epoch there are none of dates."""
+    dated = body.utc(0.0) is not None
+    return PULSES if dated else tuple(column for column in PULSES if "UTC" not in (column.unit, column.key.upper()))
+
+
+class BlockRow(NamedTuple):
+    """A command block of ``body``, from 0: its pulses, the nutation after the last of them, rad."""
+
+    at: int
+    block: Block
+    body: Spacecraft
+    pulses: tuple[Pulse, ...]
+    nutation: float
+
+
+def _counts(name: str) -> Callable[[BlockRow], int | None]:
+    def counted(row: BlockRow) -> int | None:
+        commands = row.body.commands
+        if commands is None:
+            return None
+        return commands.delay_counts(row.block.delay) if name == "delay" else commands.width_counts(row.block.width)
+
+    return counted
+
+
+def _delay_angle(row: BlockRow) -> float:
+    return _nine(math.degrees(row.block.delay * abs(row.body.spin)))
+
+
+def _nine(value: float) -> float:
+    """A number to nine figures, without the noise of its last digits."""
+    return float(f"{value:.9g}")
+
+
+def _six(value: float) -> str:
+    return f"{value:.6g}"
+
+
+EVERYWHERE = "screen page csv"
+BLOCKS = (
+    Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
+    Column("channel", "channel", "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT),
+    Column("first_sun_pulse", "first Sun pulse", "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
+    Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
+           kind=TEXT),
+    Column("delay_s", "delay", "s", lambda row: row.block.delay, _six, EVERYWHERE),
+    Column("delay_counts", "delay", "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
+    Column("delay_deg", "delay", "deg", _delay_angle, lambda angle: f"{angle:.2f}", EVERYWHERE),
+    Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
+    Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
+    Column("count", "pulses", "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
+    Column("every", "every", "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
+    Column("impulse_Nms", "impulse", "N m s",
+           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
+    Column("nutation_after_deg", "nutation after", "deg", lambda row: math.degrees(row.nutation), small_angle,
+           "csv page"),
+)  # fmt: skip
+
+
+def block_table(flown: Flight) -> DataTable:
+    """The blocks of a flown schedule as they are loaded: times in s and in counts of the steps of the commands."""
+    _, after = flown.around_pulses()
+    pulses, body, rows = flown.schedule.pulses, flown.spacecraft, []
+    lasts = accumulate(block.count for block in flown.schedule.blocks)
+    for index, (block, last) in enumerate(zip(flown.schedule.blocks, lasts, strict=True)):
+        rows.append(BlockRow(index, block, body, pulses[last - block.count : last], float(after.nutation[last - 1])))
+    return DataTable("Command blocks", BLOCKS, rows, flown.schedule)
+
+
+EVENLY = 8
+"""Largest number of pulses of a block on a screen: the first, the last, and evenly some between."""
+
+
+def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:
+    """The pulses that a screen shows: all, but of long blocks only some."""
+    if not blocks:
+        return table
+    shown: list[int] = []
+    for last, block in zip(accumulate(block.count for block in blocks), blocks, strict=True):
+        step = max(math.ceil((block.count - 1) / (EVENLY - 1)), 1)
+        shown += sorted({*range(last - block.count, last, step), last - 1})
+    rows = [table.rows[index] for index in shown if index < len(table.rows)]  # a track may end before the last one
+    return replace(table, rows=rows)

@@ -1,0 +1,166 @@
+"""Tables declared once: each column has a name in files, a heading for people, a unit, and a value of a row.
+
+Screens, pages, CSV, JSON and arrays are made from the same declaration, so that a number that stands in several
+places is computed, named and rounded in one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.text import Text
+
+from nutdamp.files.tabular import csv_text, number, truth
+from nutdamp.views.layout import FittedColumns, columns
+from nutdamp.views.text import MISSING
+
+TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
+"""Kinds of values: text, number, whole number, and yes or no."""
+
+
+def always(_: Any) -> bool:
+    """True: the column belongs to every table of its kind."""
+    return True
+
+
+class Column(NamedTuple):
+    """One column.
+
+    ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV has in columns of
+    their own. ``value`` of a row in the unit of the key, or of the heading without a key; None where it is not known.
+    ``text``: the value as people read it. ``where``: the places that have the column, separated by blanks. ``when``:
+    tables that have it, by their source. ``met``: whether a requirement is met, where a verdict is coloured.
+    """
+
+    key: str
+    heading: str
+    unit: str
+    value: Callable[[Any], Any]
+    text: Callable[[Any], str] = str
+    where: str = ""
+    when: Callable[[Any], bool] = always
+    kind: str = REAL
+    met: Callable[[Any], bool | None] | None = None
+
+
+class Heading(NamedTuple):
+    """Heading of a column for people; ``number``: flush right, and sorted by value."""
+
+    name: str
+    unit: str = ""
+    number: bool = True
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """Rows of one result under their columns.
+
+    ``source`` decides which columns there are; ``mark`` is a row to stand out.
+    """
+
+    title: str
+    columns: Sequence[Column]
+    rows: Sequence[Any]
+    source: Any = None
+    mark: int | None = None
+
+    def at(self, place: str) -> list[Column]:
+        """Columns that a place has."""
+        return [column for column in self.columns if place in column.where.split() and column.when(self.source)]
+
+    def headings(self, place: str) -> tuple[Heading, ...]:
+        """Headings for people."""
+        return tuple(Heading(column.heading, column.unit, column.kind != TEXT) for column in self.at(place))
+
+    def cells(self, place: str) -> tuple[tuple[str, ...], ...]:
+        """Texts for people, row by row."""
+        shown = self.at(place)
+        return tuple(tuple(_text(column, row) for column in shown) for row in self.rows)
+
+    def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
+        """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones and the last."""
+        shown = self.at(place)
+        names = [f"{column.heading}{between}{column.unit}" if column.unit else column.heading for column in shown]
+        text = [name for name, column in zip(names, shown, strict=True) if column.kind == TEXT]
+        table = columns(*names, text=tuple(text))
+        table.whole = tuple(name for name, column in zip(names, shown, strict=True) if column.met)
+        cut = first is not None and len(self.rows) > first + 2
+        for index, row in enumerate(self.rows):
+            if not cut or first is None or index < first or index == len(self.rows) - 1:
+                table.add_row(*(self._cell(column, row, index, at == 0) for at, column in enumerate(shown)))
+            elif index == first:
+                more = next((at for at, column in enumerate(shown) if at and column.kind == TEXT), 1)
+                between_ = {0: "…", more: f"{len(self.rows) - first - 1} more"}
+                table.add_row(*(between_.get(at, "") for at in range(len(names))))
+        return table
+
+    def _cell(self, column: Column, row: Any, index: int, first: bool) -> Text:
+        met = None if column.met is None else column.met(row)
+        style = "" if met is None else "green" if met else "bold red"
+        return Text(_text(column, row), "bold" if first and index == self.mark else style)
+
+    def transposed(self, place: str) -> FittedColumns:
+        """A table of a screen with quantities down and rows across, named by the first column."""
+        name, *shown = self.at(place)
+        table = columns("", *(_text(name, row) for row in self.rows))
+        for column in shown:
+            heading = f"{column.heading}, {column.unit}" if column.unit else column.heading
+            cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))
+            table.add_row(Text(heading, style="dim"), *cells)
+        return table
+
+    def array(self, place: str = "csv") -> NDArray[np.void]:
+        """Fields as in CSV files; unknown values are NaN or empty."""
+        names, kinds, rows = self._fields(place)
+        longest = (max((len(row[at]) for row in rows), default=1) or 1 if kind == TEXT else 0 for at, kind in
+                   enumerate(kinds))  # fmt: skip
+        types = [f"U{size}" if kind == TEXT else kind for kind, size in zip(kinds, longest, strict=True)]
+        return np.array(rows, dtype=list(zip(names, types, strict=True)))
+
+    def csv(self, place: str = "csv") -> str:
+        """A CSV file; unknown values are empty."""
+        names, _, rows = self._fields(place)
+        texts = ([number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in rows)
+        return csv_text(names, texts)
+
+    def json(self, place: str = "json") -> list[dict[str, Any]]:
+        """A dict a row; vectors are lists, unknown values None."""
+        shown = self.at(place)
+        return [{column.key.replace("#", ""): _plain(column.value(row)) for column in shown} for row in self.rows]
+
+    def _fields(self, place: str) -> tuple[list[str], list[str], list[tuple[Any, ...]]]:
+        """Names, kinds and rows of the file, a vector in three columns."""
+        shown = self.at(place)
+        names = [name for column in shown for name in _names(column)]
+        kinds = [TEXT if column.kind == YES_NO else column.kind for column in shown for _ in _names(column)]
+        return names, kinds, [tuple(part for column in shown for part in _parts(column, row)) for row in self.rows]
+
+
+def _text(column: Column, row: Any) -> str:
+    value = column.value(row)
+    return MISSING if value is None else column.text(value)
+
+
+def _names(column: Column) -> list[str]:
+    return [column.key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in column.key else [column.key]
+
+
+def _parts(column: Column, row: Any) -> list[Any]:
+    """Cells of a file: one, or three of a vector."""
+    value = column.value(row)
+    if "#" in column.key:
+        return [math.nan] * 3 if value is None else [float(part) for part in value]
+    if column.kind == YES_NO:
+        return [truth(value)]
+    if column.kind == TEXT:
+        return [value or ""]
+    return [math.nan if value is None else value]
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

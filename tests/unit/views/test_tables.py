@@ -1,0 +1,95 @@
+"""One declaration of a table gives screens, pages, CSV, JSON and arrays that agree."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+
+import numpy as np
+import pytest
+from rich.console import Console
+from support.cases import spread
+from support.places import CONFIGS
+
+import nutdamp
+from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
+from nutdamp.views.pulses import block_table, pulse_table
+from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable
+
+TABLE = DataTable(
+    "Things",
+    (
+        Column("name", "name", "", lambda row: row[0], where="screen csv json", kind=TEXT),
+        Column("count", "count", "", lambda row: row[1], where="screen csv json", kind=WHOLE),
+        Column("axis#_m", "", "", lambda row: row[2], where="csv json"),
+        Column("size_m", "size", "mm", lambda row: row[3], lambda size: f"{1e3 * size:.1f}", "screen csv json"),
+        Column("good", "verdict", "", lambda row: row[4], lambda good: "met" if good else "NOT met", "screen csv json",
+               kind=YES_NO, met=lambda row: row[4]),
+        Column("never", "never", "", lambda row: row[99], where="screen csv", when=lambda source: source == "other"),
+        Column("page", "page", "", lambda row: row[0], where="page", kind=REAL),
+    ),
+    [("one", 1, np.array([1.0, 2.0, 3.0]), 0.5, True), ("two", 2, None, None, None), ("three", 3, None, 0.25, False)],
+    "this",
+)  # fmt: skip
+
+
+def screen(table: DataTable, first: int | None = None) -> list[list[str]]:
+    console = Console(width=80, file=io.StringIO())
+    with console.capture() as captured:
+        console.print(table.screen("screen", first=first))
+    return [line.split() for line in captured.get().splitlines()]
+
+
+def test_a_file_has_vectors_in_three_columns_and_unknown_values_empty() -> None:
+    header, *rows = csv.reader(io.StringIO(TABLE.csv()))
+    assert header == ["name", "count", "axis_1_m", "axis_2_m", "axis_3_m", "size_m", "good"]
+    assert rows[0] == ["one", "1", "1.0", "2.0", "3.0", "0.5", "true"]
+    assert rows[1] == ["two", "2", "", "", "", "", ""]
+
+
+def test_json_has_vectors_as_lists_and_unknown_values_null() -> None:
+    first, second, _ = TABLE.json()
+    assert first == {"name": "one", "count": 1, "axis_m": [1.0, 2.0, 3.0], "size_m": 0.5, "good": True}
+    assert second == {"name": "two", "count": 2, "axis_m": None, "size_m": None, "good": None}
+
+
+def test_an_array_has_the_fields_of_the_file() -> None:
+    array = TABLE.array()
+    assert array.dtype.names == ("name", "count", "axis_1_m", "axis_2_m", "axis_3_m", "size_m", "good")
+    assert array["name"].tolist() == ["one", "two", "three"]
+    assert math.isnan(array["size_m"][1])
+
+
+def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
+    heads, units, *rows = screen(TABLE)
+    assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
+    assert rows == [["one", "1", "500.0", "met"], ["two", "2", "–", "–"], ["three", "3", "250.0", "NOT", "met"]]
+
+
+def test_of_many_rows_the_first_ones_and_the_last_are_shown_where_that_saves_room() -> None:
+    many = DataTable("", TABLE.columns[:2], [(f"row{index}", index) for index in range(9)])
+    assert [row[0] for row in screen(many, first=2)[1:]] == ["row0", "row1", "…", "row8"]
+    assert len(screen(many, first=7)[1:]) == 9
+
+
+def test_quantities_go_down_where_rows_go_across() -> None:
+    console = Console(width=80, file=io.StringIO())
+    with console.capture() as captured:
+        console.print(TABLE.transposed("screen"))
+    assert [line.split() for line in captured.get().splitlines()[:3]] == [
+        ["one", "two", "three"],
+        ["count", "1", "2", "3"],
+        ["size,", "mm", "500.0", "–", "250.0"],
+    ]
+
+
+@spread("name", sorted(path.stem for path in CONFIGS.glob("*.yaml")), quick=3, deep=4)
+def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str) -> None:
+    plan = nutdamp.plan(nutdamp.load(CONFIGS / f"{name}.yaml"), "optimal")
+    if not plan.feasible:
+        pytest.skip("optimal is infeasible here")
+    names = pulse_table(plan.flight).array().dtype.names or ()
+    dated, valves = plan.spacecraft.utc(0.0) is not None, plan.pulses.through_valves
+    assert names == (*PULSES_HEADER, *(EFFECTIVE * valves), *(("utc",) * dated))
+    assert tuple(next(csv.reader(io.StringIO(block_table(plan.flight).csv())))) == BLOCKS_HEADER
