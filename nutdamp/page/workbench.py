@@ -21,7 +21,7 @@ from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views.plan_tables import channel_text
+from nutdamp.views.pulses import channel_text
 from nutdamp.views.text import most, quantity
 
 RATIO, THRUST = 1.0, 5.0
