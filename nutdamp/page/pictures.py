@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nutdamp.figures import dispersion, export, image, overview, trade
+from nutdamp.figures import dispersion, image, overview, trade
 from nutdamp.figures.overview import NARROW
 from nutdamp.page.document import Picture
 from nutdamp.planning.decision import Comparison
@@ -30,14 +30,18 @@ FLIGHT = (
         "with the places of the angular momentum H.",
         "Pole curve in the body and track of the spin axis in space, with numbered pulses",
     ),
-    ("history", "Body rates and cone angles over time; bars mark the pulses.", "Body rates and cone angles over time"),
+    (
+        "history",
+        "Nutation on a log axis with what is required, the firings of each channel, and body rates over time.",
+        "Nutation, firings and body rates over time",
+    ),
 )
 """Names of the pictures of a flight, their captions and descriptions."""
 
 
 def flight_pictures(plan: Plan) -> tuple[Picture, ...]:
     """Motion and history of a plan, from its flight through the real widths; raises MissingExtra."""
-    flown, track = export.shown(plan)
+    flown, track = overview.shown(plan)
 
     def figure(name: str, *, narrow: bool = False) -> Figure:
         return overview.flight_figure(name, flown, track, narrow=narrow)

@@ -27,7 +27,6 @@ from nutdamp.page.document import Control, number_in
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Disturbance
-from nutdamp.views import guide
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -44,12 +43,6 @@ def ace(**control: str) -> Node:
     """The page of a body with an attitude and an epoch, without pictures."""
     repeat = Repeat("nutdamp report", "ace.yaml", ACE.read_text("utf-8"))
     return tree(plain_page(compared_ace(), repeat, control=Control(**control)))
-
-
-def test_assumptions_are_those_of_the_readme() -> None:
-    readme = (places.ROOT / "README.md").read_text("utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
-    assert guide.limits() == tuple(" ".join(part.split()) for part in f"\n{readme}".split("\n- ") if part.strip())
-    assert len(guide.limits()) >= 8
 
 
 @pytest.mark.deep

@@ -148,14 +148,14 @@ def test_the_same_input_gives_the_same_page(run: Run, tmp_path: Path) -> None:
 def test_pictures_are_inside_and_described() -> None:
     figures = tree(page(example_text(), pictured=True, samples=500)).all("figure")
     drawn = [svg for figure in figures for svg in figure.all("svg")]
-    assert len(drawn) >= 5  # motion, history and its narrow form, cases, budget
+    assert len(drawn) >= 5  # motion, history and its narrow form, cases, where H ends
     assert all(one.attributes["aria-label"] and one.attributes["role"] == "img" for one in drawn)
     assert all("viewbox" in one.attributes for one in drawn)
 
 
 def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     css = (places.ROOT / "nutdamp" / "page" / "page.css").read_text(encoding="utf-8")
-    used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED)
+    used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED, style.MISSED, style.UNCHECKED)
     assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {colour.lower() for colour in used}
 
 
