@@ -1,12 +1,13 @@
-"""Public interface of results (to_dict, to_csv, figure ...), implemented per type in `nutdamp.page.results`.
+"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api` names in `VIEWS`.
 
-A `Plan` thus writes itself as CSV although its module knows no files. The implementations are registered as soon as a
-public name of `nutdamp` is used; without them these functions raise TypeError.
+A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as soon as a public name
+of `nutdamp` is used; without them these methods raise TypeError.
 """
 
 from __future__ import annotations
 
-from functools import singledispatch
+from importlib import import_module
+from operator import attrgetter
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -24,98 +25,79 @@ if TYPE_CHECKING:
 Table = NDArray[np.void]
 """Structured array: one row per pulse or sample, fields named as the columns of the CSV files."""
 
+VIEWS: dict[str, dict[str, str]] = {}
+"""Functions by the class of a result and by their subject, loaded when they are called first.
 
-@singledispatch
-def data(result: object) -> dict[str, Any]:
-    """Contents of the JSON file."""
-    raise _missing(result)
-
-
-@singledispatch
-def table(result: object) -> Table:
-    """Rows of the CSV file."""
-    raise _missing(result)
+``module:function`` of the package takes the result, ``module:function name key=name`` these attributes of it.
+"""
 
 
-@singledispatch
-def write_csv(result: object, path: str | PathLike[str]) -> None:  # noqa: ARG001
-    """Write the rows as CSV."""
-    raise _missing(result)
+def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
+    """Value of the function of `VIEWS` for a result; TypeError where its class and its bases have none."""
+    for kind in type(result).__mro__:
+        if what in VIEWS.get(kind.__name__, ()):
+            place, *names = VIEWS[kind.__name__][what].split()
+            module, _, function = place.partition(":")
+            keyed = [name.split("=") for name in names if "=" in name]
+            parts = [attrgetter(name)(result) for name in names if "=" not in name]
+            named = {key: attrgetter(name)(result) for key, name in keyed}
+            call = getattr(import_module(f"nutdamp.{module}"), function)
+            return call(*(parts if names else [result]), *arguments, **named, **options)
+    raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
 
 
-@singledispatch
-def html(result: object) -> str | None:
-    """Small HTML table for notebooks; None without the extra plot, so that they show a line."""
-    raise _missing(result)
-
-
-@singledispatch
-def figure(result: object, name: str | None) -> Figure:  # noqa: ARG001
-    """Figure called ``name``."""
-    raise _missing(result)
-
-
-@singledispatch
-def sentences(result: object) -> tuple[str, ...]:
-    """Notes for the reader."""
-    raise _missing(result)
-
-
-@singledispatch
-def reason(result: object) -> str:
-    """Reason for the outcome."""
-    raise _missing(result)
-
-
-@singledispatch
-def line(result: object) -> str:
-    """Summary in one line."""
-    return object.__repr__(result)
-
-
-def _missing(result: object) -> TypeError:
-    return TypeError(f"expected what nutdamp.page.results can show, got a {type(result).__qualname__}")
+def has(result: object, what: str) -> bool:
+    """True if there is a `view` of a result."""
+    return any(what in VIEWS.get(kind.__name__, ()) for kind in type(result).__mro__)
 
 
 class Shown:
     """Mixin of results that show themselves at a prompt and in notebooks."""
 
     def __repr__(self) -> str:
-        return line(self)
+        return str(view(self, "line")) if VIEWS else object.__repr__(self)
 
     def _repr_html_(self) -> str | None:
-        return html(self)
+        shown: str | None = view(self, "html")
+        return shown
 
 
 class Data:
     """Mixin of results that are written as JSON."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Contents of the file that ``plan --json`` writes, or the part of it that holds this result."""
-        return finite(data(self))
+        """Contents of the file that the command of this result writes with ``--json``, or the part that holds it."""
+        return finite(view(self, "data"))
 
 
-class Tabled(Shown):
-    """Mixin of results with rows."""
+class Written:
+    """Mixin of results that are written as CSV and drawn."""
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
 
         Raises CannotWrite, and Infeasible for a plan without a schedule.
         """
-        write_csv(self, path)
+        view(self, "save", path)
 
     def figure(self, name: str | None = None) -> Figure:
-        """Matplotlib figure: of a comparison ``schemes``, else ``overview`` (the default) or one of the motion.
+        """Matplotlib figure that the command of this result draws with ``--plot``, by its name if it has several.
 
-        That is ``motion``, ``sphere``, ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra
-        without matplotlib, Infeasible for a plan without a schedule.
+        Of a comparison that is ``schemes``; of plans and flights ``overview`` (the default), ``motion``, ``sphere``,
+        ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for
+        a plan without a schedule.
         """
-        return figure(self, name)
+        drawn: Figure = view(self, "figure", *([] if name is None else [name]))
+        return drawn
+
+
+class Tabled(Shown, Written):
+    """Mixin of results with rows."""
 
     def to_numpy(self) -> Table:
         """Rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
-        return table(self)
+        rows: Table = view(self, "table")
+        return rows
 
     def to_pandas(self) -> DataFrame:
         """`to_numpy` as a DataFrame; raises MissingPandas where pandas is not installed."""
@@ -123,5 +105,5 @@ class Tabled(Shown):
             import pandas
         except ImportError:
             raise MissingPandas from None
-        rows = table(self)
+        rows = self.to_numpy()
         return pandas.DataFrame({name: rows[name] for name in rows.dtype.names or ()})

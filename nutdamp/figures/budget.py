@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation
 from nutdamp.figures import style
 from nutdamp.figures.legends import heading, legend
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
@@ -32,7 +32,7 @@ ROWS = 600
 
 
 @style.styled
-def budget_figure(budget: HoldingBudget) -> Figure:
+def budget_figure(budget: Budget) -> Figure:
     """Nutation without and with firings; below, pulses a day and propellant a year."""
     held = [row for row in budget.held if row.cycle is not None]
     figure = style.sheet(7.4, 3.4 + (1.1 + 0.22 * len(held)) * bool(held))
@@ -63,7 +63,7 @@ def _named(row: HeldNutation) -> str:
     return f"{math.degrees(row.thresholds.start):.3g} to {math.degrees(row.thresholds.stop):.3g} deg"
 
 
-def _courses(axes: Axes, budget: HoldingBudget, held: list[HeldNutation]) -> None:
+def _courses(axes: Axes, budget: Budget, held: list[HeldNutation]) -> None:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
     body = budget.spacecraft
     size = max([PERIODS / _pace(row) + _begins(row) for row in held], default=0.0)
