@@ -51,12 +51,12 @@ if TYPE_CHECKING:
         TwoPulseOptions,
     )
     from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.views.check_json import Checked
+    from nutdamp.views.check_json import CheckedFile
 
 
 __all__ = [
     "Budget",
-    "Checked",
+    "CheckedFile",
     "Comparison",
     "Dispersion",
     "Fitted",
@@ -120,7 +120,7 @@ _HOMES = {
     "nutdamp.planning.robust": ("RobustComparison",),
     "nutdamp.planning.tradeoff": ("Trade",),
     "nutdamp.spacecraft.model": ("Spacecraft",),
-    "nutdamp.views.check_json": ("Checked",),
+    "nutdamp.views.check_json": ("CheckedFile",),
 }
 """Modules of the public classes; options of schemes are those of the catalogue, functions those of `nutdamp.api`."""
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopDispersion
     from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
     from nutdamp.estimation.forecast import Fitted
-    from nutdamp.files.reader import Source
     from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.html import Report
     from nutdamp.planning.decision import Comparison, Simulation
@@ -39,94 +37,14 @@ if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Trade
     from nutdamp.schemes.planner import Choice
     from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.views.check_json import Checked
+    from nutdamp.views.check_json import CheckedFile
 
 PathName = str | PathLike[str]
 
 Progress = Callable[[int, int], None]
 """Hook that is called now and then with the number of steps done and that of all."""
 
-results.VIEWS.update(
-    {
-        "object": {"save": "page.results:save", "write": "page.results:write"},
-        "Spacecraft": {
-            "data": "views.plan_json:spacecraft_json",
-            **{what: f"page.results:spacecraft_{what}" for what in ("line", "html")},
-        },
-        "Plan": {
-            "data": "views.plan_json:plan_json",
-            "sentences": "planning.decision:remarks",
-            "reason": "planning.decision:infeasibility",
-            **{what: f"page.results:plan_{what}" for what in ("csv", "table", "figure", "line", "html")},
-        },
-        "Comparison": {
-            "sentences": "views.verdicts:warnings",
-            "reason": "views.verdicts:reason",
-            **{what: f"page.results:comparison_{what}" for what in ("data", "csv", "table", "figure", "line", "html")},
-        },
-        "RobustComparison": {"data": "page.results:robust_data"},
-        "Flight": {what: f"page.results:flight_{what}" for what in ("csv", "table", "figure", "line", "html")},
-        "Simulation": {
-            "screen": "views.simulate_tables:simulation_screen",
-            **{what: f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
-            **{what: f"page.results:flight_{what} shown" for what in ("line", "html")},
-        },
-        "Trade": {
-            "data": "views.trade_files:trade_json spacecraft fronts",
-            "csv": "views.trade_files:trade_csv fronts",
-            "figure": "figures.trade:trade_figure spacecraft fronts",
-            "screen": "views.trade_tables:trade_screen spacecraft fronts",
-        },
-        "Dispersion": {
-            "data": "views.dispersion_json:dispersion_json core scheme=scheme",
-            "figure": "page.results:dispersion_figure",
-            "screen": "views.dispersion_tables:dispersion_screen core scheme=scheme nominal=core.study.nominal",
-        },
-        "LoopDispersion": {
-            "data": "views.loop_cases:loop_cases_json core",
-            "figure": "figures.loop_cases:loop_cases_figure core",
-            "screen": "views.loop_cases_tables:loop_cases_screen core",
-        },
-        "LoopPlan": {
-            "data": "views.loop_json:loop_json",
-            "figure": "figures.loop:loop_figure",
-            "screen": "views.loop_tables:loop_screen",
-        },
-        "LoopVerification": {
-            "data": "views.loop_json:verified_json",
-            "screen": "views.loop_tables:verification_screen",
-        },
-        "Fitted": {
-            "data": "views.fit_json:fit_json core",
-            "figure": "figures.fit:fit_figure core",
-            "text": "files.editing:fitted_file core",
-            "spacecraft": "files.editing:fitted_spacecraft",
-            "screen": "views.fit_tables:fit_screen core",
-        },
-        "Verified": {
-            "data": "views.verification_json:verification_json plan.flight plan.scheme core",
-            "screen": "views.verify_tables:verification_screen plan.spacecraft plan.scheme core",
-        },
-        "Budget": {
-            "data": "views.budget_files:budget_json",
-            "csv": "views.budget_files:budget_csv",
-            "figure": "figures.budget:budget_figure",
-            "screen": "views.budget_tables:budget_screen",
-        },
-    }
-)
-
-
-def _source(path: PathName | Mapping[str, object], changes: Mapping[str, object] | None) -> Source:
-    from nutdamp.files.overrides import settings_of, text_of
-    from nutdamp.files.reader import Source
-    from nutdamp.files.yaml import read_text
-
-    if isinstance(path, Mapping):
-        return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
-    name = units.path("path", path, "the name of a file or a dict of its keys")
-    settings = settings_of(units.changes(changes))
-    return Source(read_text(Path(name)), name, settings)
+results.register("nutdamp.page.results")
 
 
 def load(
@@ -143,17 +61,16 @@ def load(
     set
         Keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
 
-    Raises
-    ------
-    CannotRead, BadRequest, FaultyFile
-        With everything wrong: in a dict, lines count in its JSON.
+    Raises CannotRead, or FaultyFile with everything wrong: in a dict, lines count in its JSON.
 
     Examples
     --------
     >>> nutdamp.load({"name": "Top", "inertia": {"A": 120, "C": "80 kg m^2"}, "omega0": [0.1, 0, 3]})
-    <Spacecraft Top: prolate, a = -0.3333, nutation 2.862 deg>
+    <Spacecraft Top: prolate, a = 0.3333, nutation 2.862 deg>
     """
-    return _source(path, set).read()
+    from nutdamp.files.reader import source_of
+
+    return source_of(path, set).read()
 
 
 def read(text: str, name: str = "text") -> Spacecraft:
@@ -184,7 +101,7 @@ def example(name: str = "example") -> Spacecraft:
     return Source(example_text(known), f"{known}.yaml").read()
 
 
-def check(path: PathName | Mapping[str, object]) -> Checked:
+def check(path: PathName | Mapping[str, object]) -> CheckedFile:
     """Check a spacecraft file, as ``nutdamp check`` does; raises CannotRead, and FaultyFile with everything wrong.
 
     Examples
@@ -192,10 +109,10 @@ def check(path: PathName | Mapping[str, object]) -> Checked:
     >>> nutdamp.check({"name": "Top", "inertia": {"A": 120, "C": 80}, "omega0": [0, 0, 3]}).to_dict()["valid"]
     True
     """
+    from nutdamp.files.reader import source_of
     from nutdamp.views.check_json import checked
 
-    source = _source(path, None)
-    return checked(source, source.name, [])
+    return checked(source := source_of(path), source.name, [])
 
 
 def _expected(spacecraft: Spacecraft) -> Spacecraft:
@@ -223,12 +140,12 @@ def plan(spacecraft: Spacecraft, scheme: str | None = None, options: Choice = No
     >>> nutdamp.plan(nutdamp.example(), "four-pulse", on_time=0.2).pulses[0].on_time
     0.2
     """
-    body, chance = _expected(spacecraft), None if scheme is None else expect_names([scheme])[0]
-    settled = expect_options(options, chosen, chance)
-    if chance is not None:
-        from nutdamp.planning.plan import plan as planned
+    from nutdamp.planning import plan as planning
 
-        return planned(body, chance, settled)
+    body, named = _expected(spacecraft), None if scheme is None else expect_names([scheme])[0]
+    settled = expect_options(options, chosen, named)
+    if named is not None:
+        return planning.plan(body, named, settled)
     compared = compare(body, options=settled)
     if compared.recommended is None:
         raise Infeasible(compared.reason)
@@ -252,10 +169,9 @@ def compare(
         Schemes, default the classic three and optimal, or those that point where the file has a target axis.
     options, chosen
         As of `plan`; each scheme takes those that it has.
-    samples
-        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values alone.
-    timed
-        Recommend pulses that no command block can fire, too.
+    samples, timed
+        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values alone; recommend pulses
+        that no command block can fire, too.
 
     Examples
     --------
@@ -300,6 +216,12 @@ def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
     """Load the pulses of a CSV file as ``plan --csv`` writes it, as a plan of that name.
 
     Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
+
+    Examples
+    --------
+    >>> nutdamp.plan(nutdamp.example(), "two-pulse").to_csv("pulses.csv")
+    >>> len(nutdamp.load_schedule("pulses.csv", nutdamp.example()))
+    2
     """
     from nutdamp.files.schedules import read_plan
 
@@ -316,12 +238,10 @@ def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, sam
     ----------
     plan
         Of `plan` or `load_schedule`; ``plan(spacecraft, "none")`` is free motion.
-    until
-        End, s; default one inertial nutation period after the last pulse.
+    until, samples
+        End, s, default one inertial nutation period after the last pulse; rows of the track.
     flown
         Show the flight through the real widths, not the impulse sum.
-    samples
-        Rows of the track.
 
     Examples
     --------
@@ -330,17 +250,12 @@ def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, sam
     """
     from nutdamp.figures.geometry import shown_until
     from nutdamp.planning.decision import Simulation
+    from nutdamp.planning.plan import feasible
 
-    body, pulses = _feasible(plan).spacecraft, plan.pulses
+    body, pulses = feasible(plan).spacecraft, plan.pulses
     end = units.end_of_flight(pulses.end + body.inertial_period if until is None else until)
     drawn_to = shown_until(body, pulses) if until is None else end
     return Simulation(plan, end, flown, units.rows(samples), drawn_to)
-
-
-def _feasible(plan: Plan) -> Plan:
-    from nutdamp.page.results import feasible
-
-    return feasible(plan)
 
 
 def trade(
@@ -360,15 +275,13 @@ def trade(
         Horizons tried for each front.
     allow
         How far from its target H may end, rad; a front for each.
-    least
-        ``propellant`` or ``impulse``.
-    progress
-        Called with the number of horizons tried, and that of all.
+    least, progress
+        ``propellant`` or ``impulse``; called with the number of horizons tried, and that of all.
 
     Examples
     --------
     >>> nutdamp.trade(nutdamp.example().with_(limits={"horizon": "8 s"}), 1, [0.0])
-    <Trade of Sounder-1: 1 schedules on 1 fronts>
+    <Trade of Sounder-1, fronts: 1, schedules: 1>
     """
     from nutdamp.planning import tradeoff
 
@@ -376,8 +289,8 @@ def trade(
     count, shifts = units.count("points", points), units.shifts(allow)
     options = OptimalOptions(least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances)
     most = count * len({*shifts})
-    step = lambda done: progress(done, most)  # noqa: E731
-    return tradeoff.Trade(body, tradeoff.fronts(body, options, count=count, shifts=shifts, progress=step))
+    fronts = tradeoff.fronts(body, options, count=count, shifts=shifts, progress=lambda done: progress(done, most))
+    return tradeoff.Trade(body, fronts)
 
 
 def disperse(
@@ -412,8 +325,9 @@ def disperse(
     """
     from nutdamp.files import samples as rows
     from nutdamp.montecarlo import study as dispersion
+    from nutdamp.planning.plan import feasible
 
-    study = dispersion.study_of(_feasible(plan).spacecraft, plan.pulses, seed=units.seed(seed))
+    study = dispersion.study_of(feasible(plan).spacecraft, plan.pulses, seed=units.seed(seed))
     cases = dispersion.Results(study, units.count("samples", samples))
     if study.lightening_error:
         remark(study.lightening_error)
@@ -442,6 +356,11 @@ def disperse_loop(
     """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
 
     The other parameters are those of `disperse`. Raises Infeasible where firings come too late to damp.
+
+    Examples
+    --------
+    >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 2, until=60.0)
+    <LoopDispersion: 2 of 2 cases comply>
     """
     from nutdamp.control_loop import dispersion
     from nutdamp.files.samples import streamed
@@ -459,8 +378,7 @@ def disperse_loop(
     def fly(collect: Callable[..., None] | None) -> None:
         dispersion.run(cases, watch=lambda done: progress(done, count), stopped=stopped, collect=collect)
 
-    unsaved = streamed(csv, cases, LoopCasesWriter, fly)
-    return dispersion.LoopDispersion(cases, unsaved)
+    return dispersion.LoopDispersion(cases, streamed(csv, cases, LoopCasesWriter, fly))
 
 
 def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, case: int | None = None) -> LoopPlan:
@@ -468,10 +386,8 @@ def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, c
 
     Parameters
     ----------
-    until
-        End, s; default the horizon after the nutation is at ``start``.
-    seed
-        Of the noise of the sensor.
+    until, seed
+        End, s, default the horizon after the nutation is at ``start``; of the noise of the sensor.
     case
         Number (from 1) of a dispersed case of `disperse_loop` with that seed.
 
@@ -498,16 +414,22 @@ def verify(plan: Plan) -> Verified:
     from nutdamp.flight import verification
     from nutdamp.planning import plan as planning
 
-    body, known = _feasible(plan).spacecraft, plan.options.with_disturbances
+    body, known = planning.feasible(plan).spacecraft, plan.options.with_disturbances
     core = verification.verify(body, plan.pulses, planning.unrounded(plan), expected=known)
     return planning.Verified(core, plan)
 
 
-def verify_loop(spacecraft: Spacecraft) -> LoopVerification:
-    """Fly the closed loop of the file in closed form and by DOP853, as ``nutdamp verify --loop`` does."""
+def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:
+    """Fly the closed loop of the file in closed form and by DOP853 to ``until`` s, as ``nutdamp verify --loop`` does.
+
+    Examples
+    --------
+    >>> nutdamp.verify_loop(nutdamp.example("upper-stage"), 10.0).agree
+    True
+    """
     from nutdamp.control_loop import evaluation
 
-    return evaluation.verify_loop(_expected(spacecraft))
+    return evaluation.verify_loop(_expected(spacecraft), None if until is None else units.end_of_flight(until))
 
 
 def budget(
@@ -532,7 +454,7 @@ def budget(
     Examples
     --------
     >>> nutdamp.budget(nutdamp.example("upper-stage"))
-    <Budget of Upper stage: 1 pairs of thresholds>
+    <Budget of Upper stage, pairs of thresholds: 1>
     """
     from nutdamp.control_loop import budget as holding
     from nutdamp.spacecraft.requirements import expect_loop
@@ -561,18 +483,21 @@ def export(
     ----------
     format, path
         Name of the format and of the file.
-    until
-        End of a history or spin table, s.
-    xml
-        CCSDS messages as XML; default where the name ends in .xml.
+    until, xml
+        End of a history or spin table, s; CCSDS messages as XML, default where the name ends in .xml.
+
+    Examples
+    --------
+    >>> nutdamp.export(nutdamp.plan(nutdamp.example(), "two-pulse"), "json", "plan.json")
     """
     from nutdamp.files.tabular import write_whole
+    from nutdamp.planning.plan import feasible
     from nutdamp.views.exchange import FORMATS, export_text
 
     form, name = units.one_of("format", format, tuple(FORMATS)), units.path("path", path)
     end = None if until is None else units.end_of_flight(until)
     notation = FORMATS[form].message and name.lower().endswith(".xml") if xml is None else xml
-    write_whole(name, export_text(_feasible(plan), form, xml=notation, until=end))
+    write_whole(name, export_text(feasible(plan), form, xml=notation, until=end))
 
 
 def fit(
@@ -587,14 +512,19 @@ def fit(
 
     Parameters
     ----------
-    telemetry
-        Name of the CSV file.
+    telemetry, sun_pulses
+        Names of the CSV files; ``sun_pulses`` are times of Sun pulses.
     schedule
         Pulses fired during the record: a plan of `load_schedule`, or the name of its file.
-    sun_pulses
-        CSV file of the times of Sun pulses.
     ignored
         Called with columns that are ignored, in place of Python warnings of them and of doubts about the estimates.
+
+    Examples
+    --------
+    >>> body = nutdamp.example()
+    >>> nutdamp.plan(body, "none").fly(20.0, samples=50).to_csv("flight.csv")
+    >>> nutdamp.fit("flight.csv", body, ignored=print).spacecraft().name
+    'Sounder-1'
     """
     from nutdamp.estimation.fit import fit as fitted
     from nutdamp.estimation.forecast import Fitted
@@ -632,10 +562,8 @@ def report(
 
     Parameters
     ----------
-    spacecraft
-        One of `load`, or an argument of `load`.
-    output
-        HTML file.
+    spacecraft, output
+        One of `load`, or an argument of `load`; HTML file.
     names, options, disperse
         As of `compare`, with ``disperse`` for its ``samples``.
     points
@@ -643,10 +571,12 @@ def report(
     control
         Texts of title, document, issue, author, date; see ``report --help``.
 
-    Raises
-    ------
-    BadRequest, MissingExtra, CannotWrite
-        For another ending, without the extra plot, and as `load` and `compare` do.
+    Raises MissingExtra without the extra plot.
+
+    Examples
+    --------
+    >>> nutdamp.report(nutdamp.example(), "report.html", ["two-pulse"], disperse=0).met
+    True
     """
     from nutdamp.files.tabular import write_whole
     from nutdamp.page.content import called
@@ -663,8 +593,8 @@ def report(
     fronts = () if points is None else trade(body, points, with_disturbances=known).fronts
     given = {"options": options and f"nutdamp.{options!r}", "disperse": disperse, "points": points}
     given |= {key: repr(value) for key, value in control.items()}
-    more = "".join(f", {key}={value}" for key, value in given.items() if value is not None)
-    named = f", {list(names)!r}" if names else ""
-    page = made_of(compared, called(body, f"{name!r}{named}{more}"), kept, fronts)
+    keyed = (f"{key}={value}" for key, value in given.items() if value is not None)
+    how = ", ".join([repr(name), *[repr(list(names))] * bool(names), *keyed])
+    page = made_of(compared, called(body, how), kept, fronts)
     write_whole(name, page.content)
     return page

@@ -18,7 +18,6 @@ import click
 
 from nutdamp.cli.options import FILE, Aim, Command, FileName, NameType, OutputName, options_in
 from nutdamp.cli.screen import progress, say, show, working
-from nutdamp.common import results
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 from nutdamp.schemes.catalogue import Options
 
@@ -184,7 +183,7 @@ class FlownChoice(NamedTuple):
 
 @dataclass
 class Job:
-    """What a command line names, and from `begin` on the ``spacecraft``, its ``source``, and ``silent``: no screens.
+    """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and ``silent``: no screens.
 
     ``read``: files; ``written``: files by their options; ``figure``: the picture of ``plot``, None for the only one;
     ``usual`` is its default.
@@ -269,6 +268,8 @@ class Job:
         ``more``: content of files by their options, else the views of the result make it, as its screen where none is
         given; ``shown`` are options of these views. ``files``: further ones. Raises as `deliver` does.
         """
+        from nutdamp.common import results
+
         contents = dict(more or {})
         for option, what in KINDS:
             if option not in contents and results.has(result, what):

@@ -1,4 +1,4 @@
-"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api` names in `VIEWS`.
+"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api` registers.
 
 A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as soon as a public name
 of `nutdamp` is used; without them these methods raise TypeError.
@@ -25,37 +25,49 @@ if TYPE_CHECKING:
 Table = NDArray[np.void]
 """Structured array: one row per pulse or sample, fields named as the columns of the CSV files."""
 
-VIEWS: dict[str, dict[str, str]] = {}
-"""Functions by the class of a result and by their subject, loaded when they are called first.
+_home: list[str] = []
+"""Module that has the table of `view`."""
 
-``module:function`` of the package takes the result, ``module:function name key=name`` these attributes of it.
-"""
+
+def register(module: str) -> None:
+    """Take the functions of `view` from the table ``VIEWS`` of a module, which is loaded when it is needed first.
+
+    Its keys are the class of a result and a subject (``Trade.csv``). Its values are ``module:function`` of the package,
+    which takes the result, or ``module:function name key=name``, which takes these attributes of it.
+    """
+    _home[:] = [module]
+
+
+def _entry(result: object, what: str) -> str | None:
+    views: dict[str, str] = import_module(_home[0]).VIEWS if _home else {}
+    keys = (f"{kind.__name__}.{what}" for kind in type(result).__mro__)
+    return next((views[key] for key in keys if key in views), None)
 
 
 def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
-    """Value of the function of `VIEWS` for a result; TypeError where its class and its bases have none."""
-    for kind in type(result).__mro__:
-        if what in VIEWS.get(kind.__name__, ()):
-            place, *names = VIEWS[kind.__name__][what].split()
-            module, _, function = place.partition(":")
-            keyed = [name.split("=") for name in names if "=" in name]
-            parts = [attrgetter(name)(result) for name in names if "=" not in name]
-            named = {key: attrgetter(name)(result) for key, name in keyed}
-            call = getattr(import_module(f"nutdamp.{module}"), function)
-            return call(*(parts if names else [result]), *arguments, **named, **options)
-    raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
+    """Value of the function for a result and a subject; TypeError where its class and its bases have none."""
+    entry = _entry(result, what)
+    if entry is None:
+        raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
+    place, *names = entry.split()
+    module, _, function = place.partition(":")
+    keyed = [name.split("=") for name in names if "=" in name]
+    parts = [attrgetter(name)(result) for name in names if "=" not in name]
+    named = {key: attrgetter(name)(result) for key, name in keyed}
+    call = getattr(import_module(f"nutdamp.{module}"), function)
+    return call(*(parts if names else [result]), *arguments, **named, **options)
 
 
 def has(result: object, what: str) -> bool:
     """True if there is a `view` of a result."""
-    return any(what in VIEWS.get(kind.__name__, ()) for kind in type(result).__mro__)
+    return _entry(result, what) is not None
 
 
 class Shown:
     """Mixin of results that show themselves at a prompt and in notebooks."""
 
     def __repr__(self) -> str:
-        return str(view(self, "line")) if VIEWS else object.__repr__(self)
+        return str(view(self, "line")) if _home else object.__repr__(self)
 
     def _repr_html_(self) -> str | None:
         shown: str | None = view(self, "html")

@@ -85,7 +85,7 @@ class Budget(results.Data, results.Written):
     held: tuple[HeldNutation, ...]
 
     def __repr__(self) -> str:
-        return f"<Budget of {self.spacecraft.name}: {len(self.held)} pairs of thresholds>"
+        return f"<Budget of {self.spacecraft.name}, pairs of thresholds: {len(self.held)}>"
 
     @property
     def until_largest(self) -> float | None:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import units
 from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files.dispersion_rules import dispersion_findings
@@ -35,7 +37,7 @@ from nutdamp.files.keys import (
     SunSensorSection,
     ThrusterSection,
 )
-from nutdamp.files.overrides import Setting, overlay, settings_within
+from nutdamp.files.overrides import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions
@@ -249,6 +251,18 @@ class Source(NamedTuple):
     def changed(self, keys: Mapping[str, object]) -> Spacecraft:
         """See `Spacecraft.with_`."""
         return self._replace(settings=(*self.settings, *settings_within(keys))).read()
+
+
+def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None) -> Source:
+    """Source of a spacecraft in a file, or in a dict of its keys, with ``changes`` of keys.
+
+    Raises CannotRead or BadRequest.
+    """
+    if isinstance(path, Mapping):
+        return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
+    name = units.path("path", path, "the name of a file or a dict of its keys")
+    settings = settings_of(units.changes(changes))
+    return Source(read_text(Path(name)), name, settings)
 
 
 def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:

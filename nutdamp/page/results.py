@@ -9,12 +9,12 @@ from typing import IO, TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import results
-from nutdamp.errors import BadRequest, Infeasible, MissingExtra
+from nutdamp.errors import BadRequest, MissingExtra
 from nutdamp.files.schedules import pulses_array, pulses_csv
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison, Decision, Simulation, decide
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, verdicts
 from nutdamp.views.decision_json import decision_json
@@ -29,6 +29,55 @@ if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.document import Block
     from nutdamp.planning.robust import RobustComparison
+
+
+_TABLED = ("csv", "table", "figure", "line", "html")
+"""Subjects of results with rows."""
+
+VIEWS = {
+    "object.save": "page.results:save",
+    "object.write": "page.results:write",
+    "Spacecraft.data": "views.plan_json:spacecraft_json",
+    **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
+    "Plan.data": "views.plan_json:plan_json",
+    "Plan.sentences": "planning.decision:remarks",
+    "Plan.reason": "planning.decision:infeasibility",
+    **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
+    "Comparison.data": "page.results:comparison_data",
+    "Comparison.sentences": "views.verdicts:warnings",
+    "Comparison.reason": "views.verdicts:reason",
+    **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in ("csv", "table", "figure", "line", "html")},
+    "RobustComparison.data": "page.results:robust_data",
+    **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
+    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
+    **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
+    "Trade.data": "views.trade_files:trade_json spacecraft fronts",
+    "Trade.csv": "views.trade_files:trade_csv fronts",
+    "Trade.figure": "figures.trade:trade_figure spacecraft fronts",
+    "Trade.screen": "views.trade_tables:trade_screen spacecraft fronts",
+    "Dispersion.data": "views.dispersion_json:dispersion_json core scheme=scheme",
+    "Dispersion.figure": "page.results:dispersion_figure",
+    "Dispersion.screen": "views.dispersion_tables:dispersion_screen core scheme=scheme nominal=core.study.nominal",
+    "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
+    "LoopDispersion.figure": "figures.loop_cases:loop_cases_figure core",
+    "LoopDispersion.screen": "views.loop_cases_tables:loop_cases_screen core",
+    "LoopPlan.data": "views.loop_json:loop_json",
+    "LoopPlan.figure": "figures.loop:loop_figure",
+    "LoopPlan.screen": "views.loop_tables:loop_screen",
+    "LoopVerification.data": "views.loop_json:verified_json",
+    "LoopVerification.screen": "views.loop_tables:verification_screen",
+    "Fitted.data": "views.fit_json:fit_json core",
+    "Fitted.figure": "figures.fit:fit_figure core",
+    "Fitted.text": "files.editing:fitted_file core",
+    "Fitted.spacecraft": "files.editing:fitted_spacecraft",
+    "Verified.data": "views.verification_json:verification_json plan.flight plan.scheme core",
+    "Verified.screen": "views.verify_tables:verification_screen plan.spacecraft plan.scheme core",
+    "Budget.data": "views.budget_files:budget_json",
+    "Budget.csv": "views.budget_files:budget_csv",
+    "Budget.figure": "figures.budget:budget_figure",
+    "Budget.screen": "views.budget_tables:budget_screen",
+}
+"""Functions of results, see `nutdamp.common.results.view`."""
 
 
 def comparison_data(compared: Comparison) -> dict[str, Any]:
@@ -241,11 +290,3 @@ def _block(content: Block) -> str | None:
 
 def _summary(flight: Flight) -> str:
     return f"{len(flight.schedule)} pulses until {flight.shown_to:.4g} s by {flight.model}"
-
-
-def feasible(plan: Plan) -> Plan:
-    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
-    units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
-    if not plan.feasible:
-        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
-    return plan

@@ -498,6 +498,14 @@ class Verified(results.Data):
         return f"<Verified {self.plan.scheme}: agrees with {', '.join(self.core.checks) if self.agree else 'nothing'}>"
 
 
+def feasible(plan: Plan) -> Plan:
+    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
+    units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
+    if not plan.feasible:
+        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
+    return plan
+
+
 def _helps(judged: Plan, left: Residual) -> bool:
     """True if nutation, distance from the target axis or from the requested spin is less than without pulses.
 

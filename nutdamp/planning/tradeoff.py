@@ -333,7 +333,7 @@ class Trade(results.Data, results.Written):
     fronts: tuple[Front, ...]
 
     def __repr__(self) -> str:
-        return f"<Trade of {self.spacecraft.name}: {len(self.plans)} schedules on {len(self.fronts)} fronts>"
+        return f"<Trade of {self.spacecraft.name}, fronts: {len(self.fronts)}, schedules: {len(self.plans)}>"
 
     @property
     def plans(self) -> tuple[Plan, ...]:

@@ -54,7 +54,7 @@ def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Checked(Data):
+class CheckedFile(Data):
     """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant."""
 
     spacecraft: Spacecraft
@@ -68,7 +68,7 @@ class Checked(Data):
 
 def checked(
     source: Source, name: str | None, doubts: list[Fault], warn: Callable[[Fault], object] = lambda _: None
-) -> Checked:
+) -> CheckedFile:
     """Check of a source called ``name``; ``doubts`` are added to the list, and ``warn`` is called with each.
 
     Derived quantities may be faulty, too. Raises FaultyFile.
@@ -77,7 +77,7 @@ def checked(
     for doubt in doubts:
         warn(doubt)
     try:
-        return Checked(body, tuple(doubts), checked_json(name, body, doubts))
+        return CheckedFile(body, tuple(doubts), checked_json(name, body, doubts))
     except NutdampError as wrong:
         raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 

@@ -79,6 +79,8 @@ def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkey
         monkeypatch.setitem(sys.modules, "pandas", None)
         with refused(nutdamp.NutdampError, "library.no-pandas"):
             made.to_pandas()
+        with pytest.raises(ImportError):
+            made.to_pandas()
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:

@@ -15,7 +15,7 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, Budget, Thresholds, budget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation, Thresholds, budget
 from nutdamp.control_loop.first_passage import Odds, Transfer, transfer
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.limit_cycle import Cycle, Map
