@@ -114,15 +114,19 @@ FOLDER = FolderName()
 
 
 class UnitType(ParamType[float]):
-    """A number in SI or a text with a unit, as in a spacecraft file, of which a ``check`` holds."""
+    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or one of ``words``."""
 
     name = "quantity"
 
-    def __init__(self, kind: str, check: Callable[[float], object] = float, problem: str = "") -> None:
-        self.kind, self.check, self.problem = kind, check, problem
+    def __init__(
+        self, kind: str, check: Callable[[float], object] = float, problem: str = "", **words: float | str
+    ) -> None:
+        self.kind, self.check, self.problem, self.words = kind, check, problem, words
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The SI value; a usage error for anything else."""
+        """The SI value, or that of a word; a usage error for anything else."""
+        if value in self.words:
+            return self.words[value]  # type: ignore[return-value]
         try:
             number = units.parse(value, self.kind, bare=True)
             self.check(number)
@@ -138,14 +142,6 @@ class UnitType(ParamType[float]):
 
 
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
-
-
-class FinalSpin(UnitType):
-    """A rate, or ``keep``."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The rate in rad/s, or ``keep`` as it is."""
-        return value if value == "keep" else super().convert(value, param, ctx)
 
 
 def reading_of(value: float, kind: str, meant: str) -> str:
@@ -303,7 +299,7 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
         *((sun,) if several else ()),
         option(
             "--spin",
-            type=FinalSpin("rate"),
+            type=UnitType("rate", keep="keep"),
             metavar="RATE|keep",
             help="Final spin rate, such as 30rpm; optimal can set it.",
         ),

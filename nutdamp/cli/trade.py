@@ -24,25 +24,18 @@ from nutdamp.cli.options import (
     reading_of,
 )
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL
+from nutdamp.units import shifts
 
 if TYPE_CHECKING:
     from nutdamp.errors import CannotWrite
     from nutdamp.planning.tradeoff import Front
 
 
-class Allowance(UnitType):
-    """An angle, or ``any``."""
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The angle in rad, infinite for ``any``."""
-        return float("inf") if value == "any" else super().convert(value, param, ctx)
-
-
 @click.command("trade", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
     "--allow",
-    type=Allowance("angle"),
+    type=UnitType("angle", lambda shift: shifts([shift]), "expected an angle of at least 0, or any", any=math.inf),
     multiple=True,
     metavar="ANGLE|any",
     help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
@@ -67,19 +60,17 @@ def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedul
     Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
     in both. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    if any(shift < 0.0 for shift in allow):
-        raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
     from nutdamp.planning.decision import CUT
     from nutdamp.planning.tradeoff import numbered
     from nutdamp.views.trade_files import schedule_paths
 
-    shifts = allow or (0.0, math.inf)
+    allowed = allow or (0.0, math.inf)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
             job.remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
-    job.begin([] if schedules is None else schedule_paths(schedules, points * len(set(shifts))))
+    job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
     expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.remark)
-    traded = fronts_of(job, points, shifts, least)
+    traded = fronts_of(job, points, allowed, least)
     for index, _, point in numbered(traded.fronts):
         if point.plan.cut:
             job.remark(f"point {index}: {CUT}")
