@@ -82,15 +82,8 @@ class Data:
         return finite(view(self, "data"))
 
 
-class Written:
-    """Mixin of results that are written as CSV and drawn."""
-
-    def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
-
-        Raises CannotWrite, and Infeasible for a plan without a schedule.
-        """
-        view(self, "save", path)
+class Drawn:
+    """Mixin of results that are drawn."""
 
     def figure(self, name: str | None = None) -> Figure:
         """Matplotlib figure that the command of this result draws with ``--plot``, by its name if it has several.
@@ -101,6 +94,17 @@ class Written:
         """
         drawn: Figure = view(self, "figure", *([] if name is None else [name]))
         return drawn
+
+
+class Written(Drawn):
+    """Mixin of results that are written as CSV, too."""
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
+
+        Raises CannotWrite, and Infeasible for a plan without a schedule.
+        """
+        view(self, "save", path)
 
 
 class Tabled(Shown, Written):

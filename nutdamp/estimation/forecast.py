@@ -194,7 +194,7 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fitted(results.Data, results.Written):
+class Fitted(results.Data, results.Drawn):
     """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and residuals.
 
     ``warnings`` are those of reading the record.

@@ -423,7 +423,7 @@ def run(
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Dispersed(results.Data, results.Written):
+class Dispersed(results.Data, results.Drawn):
     """Many dispersed cases; ``core`` holds their distributions, ``unsaved`` the error of a file that was not saved."""
 
     core: Counted

@@ -250,6 +250,18 @@ def test_flights_comparisons_and_plans_draw_themselves() -> None:
         nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}), "two-pulse").figure()
 
 
+@pytest.mark.deep
+def test_studies_draw_themselves_and_write_their_rows(tmp_path: Path) -> None:
+    stage, plan = nutdamp.example("upper-stage"), nutdamp.plan(CRAFT, "two-pulse")
+    budget, simulated = nutdamp.budget(stage), nutdamp.simulate(plan, 20.0, samples=50)
+    for result in (budget, simulated, nutdamp.loop(stage, 60.0), nutdamp.disperse(plan, 50)):
+        assert result.figure().axes
+    for rows in (budget, simulated):
+        rows.to_csv(tmp_path / "rows.csv")
+        assert (tmp_path / "rows.csv").read_text().count("\n") > 1
+    assert len(simulated.to_numpy()) == (tmp_path / "rows.csv").read_text().count("\n") - 1
+
+
 class Tags(HTMLParser):
     """Those that are open, and all that were seen."""
 
