@@ -14,6 +14,8 @@ from rich.console import Group
 
 from nutdamp import __version__
 from nutdamp.errors import printable
+from nutdamp.files.reader import Source
+from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
 from nutdamp.page.background import assumptions, method_blocks
 from nutdamp.page.document import (
@@ -75,6 +77,19 @@ class Repeat(NamedTuple):
     def digest(self) -> str:
         """SHA-256 of the input file; empty without one."""
         return hashlib.sha256(self.text.encode()).hexdigest() if self.text else ""
+
+
+def called(body: Spacecraft, how: str) -> Repeat:
+    """The call in Python that makes a page again; where fields were replaced, no file stands for the spacecraft."""
+    if not isinstance(body.source, Source):
+        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
+    return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+
+
+def repeated(command: str, source: Source) -> Repeat:
+    """The command or call that makes a page again from a file."""
+    settings = tuple((dotted(setting.path), str(setting.value)) for setting in source.settings)
+    return Repeat(command, source.name, source.text, settings)
 
 
 def report_page(

@@ -6,14 +6,17 @@ Each kind of block names the macro of the templates that shows it.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading
 from nutdamp.views.text import MISSING, sentence
 
@@ -206,6 +209,23 @@ class Control(NamedTuple):
     def number(self) -> str:
         """Number of the document and its issue."""
         return " ".join(filter(None, (self.document, self.issue and f"iss {self.issue}")))
+
+
+def controlled(**given: str) -> Control:
+    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where that is set.
+
+    Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
+    """
+    unknown = sorted({*given} - {*Control._fields})
+    if unknown:
+        raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
+    control, epoch = Control(**given), os.environ.get("SOURCE_DATE_EPOCH", "")
+    if control.date or not epoch:
+        return control
+    try:
+        return control._replace(date=datetime.fromtimestamp(int(epoch), UTC).date().isoformat())
+    except (ValueError, OverflowError, OSError):
+        raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
 
 
 UNCONTROLLED = Control()
