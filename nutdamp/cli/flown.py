@@ -108,17 +108,17 @@ def plan_or_read(job: Job, flown: FlownChoice, options: Options, *, jitter: bool
     ``judged``: a verdict on the screen names the cones that are broken.
     """
     from nutdamp.errors import Infeasible
-    from nutdamp.planning.decision import infeasibility, remarks
+    from nutdamp.planning.decision import infeasibility
+    from nutdamp.planning.notes import plan_notes
 
     if flown.schedule is not None:
         return _read(job, flown.schedule, options)
     if flown.blocks is not None:
         return _fired(job, flown.blocks, options, jitter=jitter)
-    plan = _recommended(job, options, judged=judged) if flown.scheme is None else _planned(job, flown.scheme, options)
+    plan = _recommended(job, options) if flown.scheme is None else _planned(job, flown.scheme, options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
-    for text in remarks(plan, cones=flown.scheme is not None and not judged):
-        job.remark(text)
+    job.note(plan_notes(plan, cones=flown.scheme is not None and not judged))
     return plan
 
 
@@ -142,19 +142,20 @@ def _planned(job: Job, scheme: str, options: Options) -> Plan:
         return planning.plan(job.spacecraft, scheme, options)
 
 
-def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
-    """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
+def _recommended(job: Job, options: Options) -> Plan:
+    """The plan that is recommended; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
-    from nutdamp.views import verdicts
+    from nutdamp.planning.notes import comparison_warnings, reasons
+    from nutdamp.views.notes import joined
 
     compared = compared_with(job, (), options)
     plan = compared.recommended
     show_failures(compared)
     if plan is not None:
-        job.remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
-    job.warn(verdicts.warnings(compared, beside_verdict=judged))
+        job.remark(f"using the recommended plan, {plan.scheme}")
+    job.note(comparison_warnings(compared))
     if plan is None:
-        raise Infeasible(f"{verdicts.reason(compared)}; `nutdamp plan` says more")
+        raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
     return plan
 
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from nutdamp.cli.options import Aim
+    from nutdamp.common.results import Note
     from nutdamp.errors import CannotWrite
     from nutdamp.files.overrides import Setting
     from nutdamp.spacecraft.model import Spacecraft
@@ -412,6 +413,13 @@ class Job(NamedTuple):
         """Print warnings about results on standard error, unless quiet."""
         for warning in warnings:
             self.remark(f"warning: {warning}")
+
+    def note(self, notes: Iterable[Note]) -> None:
+        """Print notes on results on standard error, unless quiet."""
+        from nutdamp.views.notes import message
+
+        for entry in notes:
+            self.remark(message(entry))
 
     def doubt(self, warnings: Iterable[str]) -> None:
         """Print warnings about the data on standard error, quiet or not."""

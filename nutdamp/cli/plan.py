@@ -98,7 +98,7 @@ def command(
         _expect_certified(names, job.spacecraft)
 
     from nutdamp.planning.decision import decide
-    from nutdamp.views import verdicts
+    from nutdamp.planning.notes import comparison_warnings
     from nutdamp.views.schemes import scheme_table
 
     compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
@@ -119,7 +119,7 @@ def command(
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
     ]
     if job.silent:
-        job.warn(verdicts.warnings(compared))
+        job.note(comparison_warnings(compared))
     job.deliver(outputs, partial(_screen, compared, decided, dispersed, verbose), unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
@@ -240,16 +240,14 @@ def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
 def _screen(
     compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None, verbose: bool
 ) -> RenderableType:
-    from nutdamp.views import robust_verdicts, verdicts
     from nutdamp.views.glance import glance
 
     if dispersed is not None:
         from nutdamp.views.robust_tables import robust_screen
 
-        reason = robust_verdicts.robust_reason(dispersed)
-        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, reason, dispersed.name)
+        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, dispersed.name)
     if verbose:
         from nutdamp.views.plan_tables import comparison_screen
 
         return comparison_screen(compared)
-    return glance(compared, decided, verdicts.reason(compared))
+    return glance(compared, decided)

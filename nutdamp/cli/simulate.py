@@ -139,14 +139,14 @@ def command(
     from nutdamp.figures.geometry import shown_until
     from nutdamp.files.tabular import write_track
     from nutdamp.planning.decision import Simulation
+    from nutdamp.planning.notes import model_warnings
     from nutdamp.views.decisions import verdict
     from nutdamp.views.simulation_json import simulation_json
-    from nutdamp.views.verdicts import model_warnings
 
     body, pulses = plan.spacecraft, plan.pulses
     simulation = Simulation(plan, pulses.end + body.inertial_period if until is None else until, real, samples)
     if job.silent:
-        job.warn(model_warnings(simulation.impulses, simulation.flown))
+        job.note(model_warnings(simulation.impulses, simulation.flown))
     track = None
     if plot is not None or drawn:
         track = simulation.track(min(samples, PICTURED), shown_until(body, pulses) if until is None else until)

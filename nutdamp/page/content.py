@@ -36,14 +36,16 @@ from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
 from nutdamp.page.sheets import aspects_sheet
-from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
+from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan, unrounded
-from nutdamp.planning.recommendation import Gain, Standing
+from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, verdicts
 from nutdamp.views.end_tables import bounds_text, direction_text, lasting, spin_text, target_text
+from nutdamp.views.notes import joined, ordered, sentences, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees, sentence
@@ -117,20 +119,17 @@ def _title(body: Spacecraft) -> str:
 
 
 def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Front]) -> str:
-    reason = verdicts.reason(compared)
+    reason = joined(reasons(compared))
     if decided is None:
         return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
     recommended = f"Recommended: {decided.plan.scheme} – {reason}."
     schedule = f"Schedule of the file {decided.plan.scheme}, as it is."
     recommendation = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
     needless = verdicts.needless(compared)
-    nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
-    others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
-    fired = [verdicts.hint(compared, entry) for entry in dict.fromkeys(others) if entry is not None]
-    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
-    notes += map(sentence, _broken(decided.plan))
-    notes += filter(None, [outdone(traded, decided.plan)])
-    return " ".join((recommendation, *notes, *verdicts.warnings(compared, beside_verdict=True)))
+    nothing = [] if needless is None else [f"No pulse is needed: {needless}."]
+    noted = sentences(ordered([*comparison_warnings(compared), *decision_notes(decided)]))
+    broken = map(sentence, _broken(decided.plan))
+    return " ".join((recommendation, *nothing, *noted, *broken, *filter(None, [outdone(traded, decided.plan)])))
 
 
 def _decision(decided: Decision) -> Iterator[Block]:
@@ -177,8 +176,10 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
 
 def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
-    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
-    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
+    remarks = tuple(
+        (plan.scheme, remark) for plan in compared.plans for remark in (*map(text, plan_notes(plan)), *_broken(plan))
+    )
+    hints = tuple(map(Prose, sentences(alternatives(compared))))
     table = scheme_table(compared, compared.recommended)
     blocks: list[Block] = [sheet(table.title, table), *hints, *map(Prose, _reading(compared))]
     if remarks:

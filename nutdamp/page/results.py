@@ -11,11 +11,13 @@ from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import Comparison, Decision, decide, infeasibility, remarks
+from nutdamp.planning.decision import Comparison, Decision, decide, infeasibility
+from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decision_json import decision_json
+from nutdamp.views.notes import joined, sentences
 from nutdamp.views.plan_json import comparison_json, plan_json, spacecraft_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
@@ -28,10 +30,22 @@ if TYPE_CHECKING:
     from nutdamp.page.document import Block
 
 
-results.sentences.register(Plan, remarks)
-results.sentences.register(Comparison, verdicts.warnings)
+@results.sentences.register
+def _(plan: Plan) -> tuple[str, ...]:
+    return sentences(plan_notes(plan) if plan.feasible else ())
+
+
+@results.sentences.register
+def _(compared: Comparison) -> tuple[str, ...]:
+    return sentences(comparison_warnings(compared))
+
+
 results.reason.register(Plan, infeasibility)
-results.reason.register(Comparison, verdicts.reason)
+
+
+@results.reason.register
+def _(compared: Comparison) -> str:
+    return joined(reasons(compared))
 
 
 results.data.register(Spacecraft, spacecraft_json)
@@ -45,7 +59,7 @@ def _(compared: Comparison) -> dict[str, Any]:
 
 def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
     """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
-    data = comparison_json(compared, verdicts.spoken(compared))
+    data = comparison_json(compared)
     return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 

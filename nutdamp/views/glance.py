@@ -7,23 +7,24 @@ the order of its worth and stands on the full screen (``-v``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import StringIO
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from nutdamp.errors import listed
-from nutdamp.flight.end_state import at_start
-from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
+from nutdamp.common.results import Note
+from nutdamp.planning.decision import Comparison, Decision, Line
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
-from nutdamp.views.decisions import coloured, limit, notes, size, verdict
-from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text, cone_margins, lasting
+from nutdamp.views.decisions import coloured, limit, size, verdict
+from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting
 from nutdamp.views.layout import FittedColumns, facts
+from nutdamp.views.notes import WARNING, joined, ordered, screen_line, severity
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
 from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
@@ -49,8 +50,8 @@ DIGITS = 8
 """Figures of a value beside its limit, at most."""
 
 
-def glance(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> RenderableType:
-    """The screen of a comparison and the plan to fly; without one the ``reason`` why there is none.
+def glance(compared: Comparison, decision: Decision | None, robust: str = "") -> RenderableType:
+    """The screen of a comparison and the plan to fly, or of the reason why there is none.
 
     ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases.
     """
@@ -59,35 +60,30 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
     if decision is None:
-        head = [Text.assemble(("NO PLAN", "bold red"), f": {reason}")]
-        return _fitted([*title, *head], [], [], [*_infeasible(compared)], _schemes(compared, ""))
+        head = [Text.assemble(("NO PLAN", "bold red"), f": {joined(reasons(compared))}")]
+        return _fitted([*title, *head], [], [], [*map(screen_line, _infeasible(compared))], _schemes(compared, ""))
     plan = decision.plan
     head = [_headline(compared, decision, robust), coloured(verdict(decision), decision.met)]
-    warnings = [*_unreached(compared, plan)]
+    remarks = [*decision_notes(decision), *alternatives(compared), *_infeasible(compared)]
+    remarks += plan_notes(plan) if plan in compared.plans else ()
     if not robust:  # its candidates are those that were made for the tolerances
-        warnings = [*verdicts.warnings(compared, beside_verdict=True), *warnings]
-    head += [Text.assemble(("warning: ", "bold red"), text) for text in warnings]
-    said_of = [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *_remarks(compared, plan)]
+        remarks = [*comparison_warnings(compared), *remarks]
+    remarks = ordered(remarks)
+    head += [screen_line(note) for note in remarks if severity(note) == WARNING]
+    more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     table = _schemes(compared, robust or plan.scheme)
 
     def screen(first: int) -> RenderableType:
         fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
         required, middle = _requirements(decision), [_ends(decision), *fired]
-        return _fitted([*title, *head], required, middle, said_of, table, blocks=bool(plan.pulses.blocks))
+        return _fitted([*title, *head], required, middle, more, table, blocks=bool(plan.pulses.blocks))
 
     return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
 
 
-def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
-    """Warnings of what no plan that may be recommended can do, and of those that could."""
-    for aspect in at_start(compared.spacecraft):
-        if not aspect.kept:
-            where = f"the spin axis is {degrees(aspect.least)} from {aspect.keep.name} at t = 0 already"
-            yield f"{where} ({bounds_text(aspect.keep)}): no plan can keep that"
-    others = [other.scheme for other in compared.plans if other.feasible and not other.commandable]
-    better = [scheme for scheme in others if compared.meets(compared[scheme])]
-    if better and plan.commandable and not compared.meets(plan):
-        yield f"no command block fires {listed(better)}, which would meet the requirement: --timed recommends those"
+def _infeasible(compared: Comparison) -> list[Note]:
+    """Reasons of schemes without a plan."""
+    return [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
 
 
 def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
@@ -97,8 +93,8 @@ def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
-    blocks = f"{len(pulses.blocks)} block{'s' * (len(pulses.blocks) != 1)}, " if pulses.blocks else ""
-    count = f"{blocks}{len(pulses)} pulse{'s' * (len(pulses) != 1)}, {spent}, ends at {pulses.end:.4g} s"
+    blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
+    count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
@@ -178,23 +174,11 @@ def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     return scheme_table(compared, plan).screen("screen", between=" ")
 
 
-def _infeasible(compared: Comparison) -> Iterator[str]:
-    """Reasons of schemes without a plan."""
-    for plan in compared.plans:
-        if not plan.feasible:
-            yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
-
-
-def _remarks(compared: Comparison, chosen: Plan) -> Iterator[str]:
-    """Remarks of the scheme on the plan to fly."""
-    yield from (f"{chosen.scheme}: {text}" for text in (notes_on(chosen) if chosen in compared.plans else ()))
-
-
 def _fitted(
     head: Sequence[Text],
     required: Sequence[tuple[float, bool, tuple[str | Text, ...]]],
     middle: Sequence[RenderableType],
-    more: Sequence[str],
+    more: Sequence[Text],
     schemes: FittedColumns,
     *,
     blocks: bool = False,
@@ -213,17 +197,16 @@ def _fitted(
         table.add_column()
     for _, _, cells in shown:
         table.add_row(*cells)
-    told: list[str] = []
-    for text in more:
-        lines += _lines(Text(f"note: {text}"))
-        if lines > LINES or len(told) == NOTES:
+    notes: list[Text] = []
+    for note in more:
+        lines += _lines(note)
+        if lines > LINES or len(notes) == NOTES:
             break
-        told.append(text)
-    hidden = len(more) - len(told) + len(required) - len(shown)
+        notes.append(note)
+    hidden = len(more) - len(notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    remarks = [Text.assemble(("note: ", "bold"), text) for text in told]
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *remarks, steps)
+    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *notes, steps)
 
 
 def _lines(*parts: RenderableType) -> int:
