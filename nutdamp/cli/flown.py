@@ -115,7 +115,7 @@ def plan_or_read(job: Job, flown: FlownChoice, options: Options, *, jitter: bool
         return _read(job, flown.schedule, options)
     if flown.blocks is not None:
         return _fired(job, flown.blocks, options, jitter=jitter)
-    plan = _recommended(job, options) if flown.scheme is None else _planned(job, flown.scheme, options)
+    plan = _recommended(job, options, judged=judged) if flown.scheme is None else _planned(job, flown.scheme, options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
     job.note(plan_notes(plan, cones=flown.scheme is not None and not judged))
@@ -142,8 +142,8 @@ def _planned(job: Job, scheme: str, options: Options) -> Plan:
         return planning.plan(job.spacecraft, scheme, options)
 
 
-def _recommended(job: Job, options: Options) -> Plan:
-    """The plan that is recommended; raises Infeasible where there is none."""
+def _recommended(job: Job, options: Options, *, judged: bool) -> Plan:
+    """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
     from nutdamp.planning.notes import comparison_warnings, reasons
     from nutdamp.views.notes import joined
@@ -153,7 +153,7 @@ def _recommended(job: Job, options: Options) -> Plan:
     show_failures(compared)
     if plan is not None:
         job.remark(f"using the recommended plan, {plan.scheme}")
-    job.note(comparison_warnings(compared))
+    job.note(comparison_warnings(compared, cones=not judged))
     if plan is None:
         raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
     return plan

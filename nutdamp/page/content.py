@@ -127,7 +127,7 @@ def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Fr
     recommendation = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
     needless = verdicts.needless(compared)
     nothing = [] if needless is None else [f"No pulse is needed: {needless}."]
-    noted = sentences(ordered([*comparison_warnings(compared), *decision_notes(decided)]))
+    noted = sentences(ordered([*comparison_warnings(compared, cones=False), *decision_notes(decided)]))
     broken = map(sentence, _broken(decided.plan))
     return " ".join((recommendation, *nothing, *noted, *broken, *filter(None, [outdone(traded, decided.plan)])))
 

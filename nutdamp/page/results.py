@@ -59,7 +59,7 @@ def _(compared: Comparison) -> dict[str, Any]:
 
 def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
     """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
-    data = comparison_json(compared)
+    data = comparison_json(compared, decided)
     return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 

@@ -137,6 +137,8 @@ TURNED = math.radians(0.1)
 def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note]:
     """Notes beside the verdict; ``looped``: it is the flight of a closed loop, which goes on firing."""
     plan, body, final = decision.plan, decision.plan.spacecraft, decision.flight.residual
+    if decision.undispersed and requirements.judged(body):
+        yield note("tolerances-not-checked")
     if code := ideal_code(plan):
         yield note(code, scheme=plan.scheme)
     if looped:
@@ -148,8 +150,6 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
     change = decision.final.spin - body.spin
     if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
         yield note("spin-change", scheme=plan.scheme, spin_change_rad_s=change)
-    if decision.undispersed and requirements.judged(body):
-        yield note("tolerances-not-checked")
     yield from _growing(decision)
     yield from _unaided(decision)
     if body.loop is not None:
@@ -198,14 +198,17 @@ def _unaided(decision: Decision) -> Iterator[Note]:
         yield note("met-without-pulse-until", until_s=idle, nutation_deg=now, limit_deg=limit)
 
 
-def comparison_warnings(compared: Comparison) -> Iterator[Note]:
-    """Requirements that the recommended plan misses, the causes, and the cones that the spin axis breaks."""
+def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
+    """Requirements that the recommended plan misses, the causes, and the cones that the spin axis breaks.
+
+    Without ``cones`` a verdict names those that are broken.
+    """
     chosen = compared.recommended
     if chosen is None:
         return
     yield from _missed(chosen, compared)
     broken = [aspect for aspect in chosen.aspects if not aspect.kept]
-    yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken)
+    yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if cones)
     if broken:
         keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
         yield note("plans-keep-cones", schemes=", ".join(keeping) or "none")
@@ -352,7 +355,9 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         yield note("most-cases", count=count)
         return
     if recommendation.standing is Standing.COMPLIES:
-        if not requirements.required(body):
+        if recommendation.plan.kept is False:
+            yield note("cheapest-at-end", count=count)
+        elif not requirements.required(body):
             yield note("damps-at-least", count=count)
         else:
             yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)

@@ -29,7 +29,7 @@ def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> No
     form, flown = search.model.left(chosen.sequence.state), left_by(propagation.flown(search.body, chosen.schedule))
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
     if first:
-        return note("blocks-compared", compared=f"{search.looked:,}", nutation_deg=nutation, end_deg=end)
+        return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
     return note("blocks-flown", nutation_deg=nutation, end_deg=end)
 
 

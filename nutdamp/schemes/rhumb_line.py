@@ -535,7 +535,7 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> Note:
         channels=", ".join(channel.name for channel in train.channels) or "the steerable torquer",
         on_time_s=on_time,
         way_deg=math.degrees(train.way),
-        efficiency=f"{precession.arc_efficiency(train.here.spin, on_time):.4f}",
+        efficiency=float(precession.arc_efficiency(train.here.spin, on_time)),
         damping=max(len(builder.pulses) - count, 0),
     )
 

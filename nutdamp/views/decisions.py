@@ -55,8 +55,7 @@ def _at_end(decision: Decision) -> str:
         if nominal:
             return verdicts.cases_verdict(cases.complying, cases.probability)
         return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
-    result = f"{'met' if nominal else 'NOT met'} with nominal values"
-    return f"{result}; tolerances not checked" if decision.undispersed else result
+    return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
 def decision_table(decision: Decision, values: str = "nominal") -> Table:
@@ -127,13 +126,11 @@ def end_facts(decision: Decision) -> Table:
 
 def decision_screen(compared: Comparison, decision: Decision) -> list[RenderableType]:
     """The decision as the top of a screen: plan and reason, verdict, margins, and final motion."""
-    why = joined(reasons(compared))
+    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
     return [
         Text.assemble("Recommended: ", (decision.plan.scheme, "bold"), f" – {why}."),
         statement(decision),
-        *map(
-            screen_line, ordered([*comparison_warnings(compared), *decision_notes(decision), *alternatives(compared)])
-        ),
+        *map(screen_line, ordered([*warnings, *decision_notes(decision), *alternatives(compared)])),
         *figures(decision),
     ]
 

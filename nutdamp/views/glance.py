@@ -65,9 +65,9 @@ def glance(compared: Comparison, decision: Decision | None, robust: str = "") ->
     plan = decision.plan
     head = [_headline(compared, decision, robust), coloured(verdict(decision), decision.met)]
     remarks = [*decision_notes(decision), *alternatives(compared), *_infeasible(compared)]
-    remarks += plan_notes(plan) if plan in compared.plans else ()
+    remarks += plan_notes(plan, cones=False) if plan in compared.plans else ()
     if not robust:  # its candidates are those that were made for the tolerances
-        remarks = [*comparison_warnings(compared), *remarks]
+        remarks = [*comparison_warnings(compared, cones=False), *remarks]
     remarks = ordered(remarks)
     head += [screen_line(note) for note in remarks if severity(note) == WARNING]
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]

@@ -9,8 +9,8 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.planning.decision import Comparison, infeasibility
-from nutdamp.planning.notes import alternatives, comparison_warnings, plan_notes, reasons
+from nutdamp.planning.decision import Comparison, Decision, infeasibility
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
@@ -31,15 +31,16 @@ def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
-def comparison_json(compared: Comparison) -> dict[str, Any]:
-    """The object of ``plan --json``, without the decision."""
+def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+    """The object of ``plan --json``, without the decision itself."""
+    beside = () if decided is None else decision_notes(decided)
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
         "recommended": None if compared.recommended is None else compared.recommended.scheme,
         "no_pulse_needed": compared.needless,
         "reason": joined(reasons(compared)),
-        "notes": [note_json(note) for note in (*comparison_warnings(compared), *alternatives(compared))],
+        "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
     }
 
 

@@ -56,7 +56,7 @@ def test_every_entry_is_used_and_says_what_it_means() -> None:
     ("limit_deg", 1e-12, "< 1e-9 deg"),
 ])  # fmt: skip
 def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, shown: str) -> None:
-    values = {"angle_deg": 1.0, "direction": "Sun", "at_s": 1.0, "limit_deg": 1.0, "scheme": "x"} | {name: value}
+    values = {"angle_deg": 1.0, "direction": "Sun", "at_s": 1.0, "limit_deg": 1.0, "scheme": "x", name: value}
     assert shown in text(note("cone-broken", **values))
 
 
