@@ -145,7 +145,8 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
         return
     if not plan.commandable:
         yield note("not-commandable", scheme=plan.scheme)
-    if body.goal.axis is None and final.momentum_shift > TURNED:
+    limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
+    if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
     change = decision.final.spin - body.spin
     if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):

@@ -11,7 +11,7 @@ import pytest
 from support.process import Run
 
 import nutdamp
-from nutdamp.common.results import note
+from nutdamp.common.results import Note, Value, note
 from nutdamp.planning.decision import compare, decide
 from nutdamp.planning.notes import GAINS, TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.views.notes import NAME, NOTE, REASON, WARNING, catalogue, message, note_json, ordered, text
@@ -56,8 +56,15 @@ def test_every_entry_is_used_and_says_what_it_means() -> None:
     ("limit_deg", 1e-12, "< 1e-9 deg"),
 ])  # fmt: skip
 def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, shown: str) -> None:
-    values = {"angle_deg": 1.0, "direction": "Sun", "at_s": 1.0, "limit_deg": 1.0, "scheme": "x", name: value}
-    assert shown in text(note("cone-broken", **values))
+    values: dict[str, Value] = {
+        "angle_deg": 1.0,
+        "direction": "Sun",
+        "at_s": 1.0,
+        "limit_deg": 1.0,
+        "scheme": "x",
+        name: value,
+    }
+    assert shown in text(Note("cone-broken", tuple(values.items())))
 
 
 def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:
