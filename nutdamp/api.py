@@ -150,7 +150,7 @@ class Trade:
 
     def to_dict(self) -> dict[str, Any]:
         """The object of ``trade --json``."""
-        from nutdamp.views.trade_files import trade_json
+        from nutdamp.views.trade import trade_json
 
         return finite(trade_json(self.spacecraft, self.fronts))
 
@@ -174,7 +174,7 @@ class Dispersion:
 
     def to_dict(self, worst: int = 5) -> dict[str, Any]:
         """The object of ``disperse --json``, with as many ``worst`` cases."""
-        from nutdamp.views.dispersion_json import dispersion_json
+        from nutdamp.views.dispersion import dispersion_json
 
         return finite(dispersion_json(self.core, scheme=self.scheme, worst=worst))
 
@@ -216,7 +216,7 @@ class Verified:
 
     def to_dict(self) -> dict[str, Any]:
         """The object of ``verify --json``."""
-        from nutdamp.views.verification_json import verification_json
+        from nutdamp.views.verification import verification_json
 
         return finite(verification_json(self.plan.flight, self.plan.scheme, self.core))
 

@@ -104,6 +104,7 @@ def _looked_into(
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=FILE, help="Write methods, differences and error budget.")
+@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
 def verify_command(
     spacecraft: FileInput,
@@ -112,6 +113,7 @@ def verify_command(
     aim: Aim,
     looped: bool,
     json: str | None,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
@@ -128,13 +130,14 @@ def verify_command(
 
     from nutdamp.api import verify
     from nutdamp.cli.job import working
-    from nutdamp.views.verify_tables import verification_screen
+    from nutdamp.views.verification import verification_brief, verification_screen
 
     plan = plan_or_read(job, flown, options)
     with working("verifying", quiet=quiet):
         verified = verify(plan)
     core = verified.core
-    job.deliver([(json, verified.to_dict)], lambda: verification_screen(job.spacecraft, plan.scheme, core))
+    screen = verification_screen if verbose else verification_brief
+    job.deliver([(json, verified.to_dict)], lambda: screen(plan, core))
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")

@@ -136,6 +136,7 @@ FIGURES = ("overview", "cases", "momentum", "budget")
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
+@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
 def command(
     spacecraft: FileInput,
@@ -153,6 +154,7 @@ def command(
     json: str | None,
     plot: str | None,
     figure: str,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
@@ -174,7 +176,7 @@ def command(
     plan = plan_or_read(job, flown, options)
 
     from nutdamp.montecarlo.study import study_of
-    from nutdamp.views.dispersion_json import dispersion_json
+    from nutdamp.views.dispersion import dispersion_json
 
     study = study_of(plan.spacecraft, plan.pulses, seed=seed)
     if note := study.lightening_error:
@@ -185,7 +187,7 @@ def command(
     results, unsaved, stopped_by = fly(study, samples, threads, csv, quiet)
     data = partial(dispersion_json, results, scheme=plan.scheme, worst=worst)
     outputs: list[Output] = [(json, data), (plot, partial(_picture, results, figure, plan.scheme))]
-    job.deliver(outputs, partial(_screen, results, plan.scheme, worst), unsaved=unsaved)
+    job.deliver(outputs, partial(_screen, results, plan.scheme, worst if verbose else None), unsaved=unsaved)
     if stopped_by is not None and results.done < results.requested:
         say(f"interrupted: {results.done} of {results.requested} cases are done")
         sys.exit(128 + stopped_by)
@@ -198,9 +200,12 @@ def _picture(results: Results, figure: str, scheme: str) -> Figure:
     return dispersion.dispersion_figure(figure, results, scheme=scheme)
 
 
-def _screen(results: Results, scheme: str, worst: int) -> RenderableType:
-    from nutdamp.views.dispersion_tables import dispersion_screen
+def _screen(results: Results, scheme: str, worst: int | None) -> RenderableType:
+    """All values with ``worst`` cases; the default screen without."""
+    from nutdamp.views.dispersion import dispersion_brief, dispersion_screen
 
+    if worst is None:
+        return dispersion_brief(results, scheme=scheme)
     return dispersion_screen(results, scheme=scheme, worst=worst, nominal=results.study.nominal)
 
 
@@ -273,8 +278,7 @@ def _fly_into(csv: str | None, study: Study, samples: int, fly_all: Callable[[Co
 
 def _one_case(job: Job, study: Study, case: int, scheme: str, json: str | None) -> None:
     """Show a single case."""
-    from nutdamp.views.dispersion_json import case_json
-    from nutdamp.views.dispersion_tables import case_screen
+    from nutdamp.views.dispersion import case_json, case_screen
 
     draws = study.draws_of(case)
 

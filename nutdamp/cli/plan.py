@@ -220,7 +220,7 @@ def _data(compared: Comparison, decided: Decision | None, dispersed: RobustCompa
     if dispersed is None:
         return data
     from nutdamp.views import robust_verdicts
-    from nutdamp.views.robust_json import robust_json
+    from nutdamp.views.robust import robust_json
 
     return {**data, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
 
@@ -244,7 +244,7 @@ def _screen(
     from nutdamp.views.glance import glance
 
     if dispersed is not None:
-        from nutdamp.views.robust_tables import robust_screen
+        from nutdamp.views.robust import robust_screen
 
         reason = robust_verdicts.robust_reason(dispersed)
         return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, reason, dispersed.name)

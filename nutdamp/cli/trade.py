@@ -65,6 +65,7 @@ class Allowance(UnitType):
 @click.option("--json", type=FILE, help="Write the points with their pulses.")
 @click.option("--plot", type=FILE, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
 def command(
     spacecraft: FileInput,
@@ -77,6 +78,7 @@ def command(
     json: str | None,
     plot: str | None,
     schedules: str | None,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
@@ -88,7 +90,7 @@ def command(
         raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
     from nutdamp.planning.decision import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade_files import schedule_paths, trade_csv
+    from nutdamp.views.trade import schedule_paths, trade_csv
 
     shifts = allow or (0.0, math.inf)
     most = points * len(set(shifts))
@@ -109,7 +111,7 @@ def command(
         (plot, partial(_picture, traded)),
     ]
     files, unsaved = ([], []) if schedules is None else _schedules(fronts, schedules)
-    job.deliver([*outputs, *files], partial(_screen, traded), unsaved=unsaved)
+    job.deliver([*outputs, *files], partial(_screen, traded, verbose), unsaved=unsaved)
     leave(infeasible=not any(front.points for front in fronts))
 
 
@@ -117,7 +119,7 @@ def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list
     """A file of each schedule, or the error where the folder cannot be made."""
     from nutdamp.errors import CannotWrite
     from nutdamp.files.tabular import make_folder
-    from nutdamp.views.trade_files import schedule_files
+    from nutdamp.views.trade import schedule_files
 
     try:
         make_folder(folder)
@@ -132,7 +134,7 @@ def _picture(traded: Trade) -> Figure:
     return trade.trade_figure(traded.spacecraft, traded.fronts)
 
 
-def _screen(traded: Trade) -> RenderableType:
-    from nutdamp.views.trade_tables import trade_screen
+def _screen(traded: Trade, verbose: bool) -> RenderableType:
+    from nutdamp.views.trade import trade_brief, trade_screen
 
-    return trade_screen(traded.spacecraft, traded.fronts)
+    return (trade_screen if verbose else trade_brief)(traded.spacecraft, traded.fronts)

@@ -47,8 +47,8 @@ from nutdamp.views.end_tables import bounds_text, direction_text, lasting, spin_
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees, sentence
-from nutdamp.views.trade_tables import apart, beats, front_parts, outdone
-from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
+from nutdamp.views.trade import apart, beats, front_parts, outdone
+from nutdamp.views.verification import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
@@ -260,7 +260,7 @@ def _verification(chosen: Plan) -> PageSection:
 
 
 def _dispersion(chosen: Plan, dispersed: Results) -> PageSection:
-    from nutdamp.views.dispersion_tables import dispersion_screen
+    from nutdamp.views.dispersion import dispersion_screen
 
     blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
     if note := dispersed.study.lightening_error:

@@ -15,7 +15,8 @@ from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.montecarlo.statistics import Exact
 from nutdamp.views import verdicts
-from nutdamp.views.dispersion_tables import (
+from nutdamp.views.dispersion import (
+    MOST_ROWS,
     PERCENTS,
     add_angles,
     angles_note,
@@ -23,14 +24,15 @@ from nutdamp.views.dispersion_tables import (
     bounded,
     bounded_heads,
     cone_lines,
+    in_words,
     inputs_table,
     requirement_lines,
+    size_text,
     unused_table,
 )
 from nutdamp.views.layout import columns
 from nutdamp.views.loop_tables import described
 from nutdamp.views.text import MISSING, degrees, duration
-from nutdamp.views.tolerance_tables import MOST_ROWS, in_words, size_text
 
 NAMES = {
     "settled": ("first quiet, s", 1.0),

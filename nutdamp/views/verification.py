@@ -1,0 +1,189 @@
+"""Results of ``verify``: methods side by side, conserved quantities, and the effect of each imperfection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from operator import attrgetter
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from nutdamp.errors import listed
+from nutdamp.flight.propagation import Flight
+from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views import verdicts
+from nutdamp.views.decisions import coloured, size
+from nutdamp.views.end_tables import requested
+from nutdamp.views.layout import FittedColumns, brief
+from nutdamp.views.plan_json import final_json, heading, target_json
+from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.tables import TEXT, Column, DataTable
+from nutdamp.views.text import MISSING, degrees, small_angle
+
+SHOWN = 1e-9 * math.pi / 180.0
+"""rad; smaller differences are shown as rounding."""
+
+BUDGET = "Error budget: what each imperfection leaves, alone"
+"""The title of `budget_table`."""
+
+
+def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
+    """The default screen of ``verify``: verdict, requirement, methods."""
+    notes = [*_missing(verification), conservation(verification), *_largest(verification)]
+    return brief([*_head(plan, verification)], methods_table(verification), notes, "--json verified.json")
+
+
+def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
+    """What is verified, the verdict, and what the flown motion leaves."""
+    body = plan.spacecraft
+    yield Text.assemble((body.name, "bold"), f": {plan.scheme}; Δ: maximum difference from the flown motion")
+    yield coloured(verdict(verification), verification.agree)
+    if required := requested(body):
+        left = "; ".join(f"{line.bound.part.label} {size(line.bound, line.left)}" for line in plan.held)
+        met = coloured(verdicts.VERDICT[plan.meets_requirement], plan.meets_requirement)
+        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, f" with nominal values: {left}.")
+
+
+def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
+    """All tables of ``verify``."""
+    body = plan.spacecraft
+    note = budget_note(verification, aimed=body.goal.axis is not None)
+    parts: list[RenderableType] = [*_head(plan, verification), Text(), derived_table(body)]
+    parts += [Text(), methods_table(verification), *map(Text, _missing(verification))]
+    parts += [Text(), Text(conservation(verification)), Text(), Text(BUDGET, "bold"), Text()]
+    return Group(*parts, budget_table(body, verification), *[Text(note, "dim")] * bool(note))
+
+
+def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
+    """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
+    spacecraft = flown.spacecraft
+    return {
+        **heading(spacecraft),
+        "scheme": name,
+        "agree": verification.agree if verification.checks else None,
+        "disagreeing": list(verification.disagreeing),
+        "final": final_json(flown),
+        "target": target_json(spacecraft),
+        "methods": DataTable("", METHODS, verification.methods).json(),
+        "momentum_drift": verification.momentum.drift,
+        "momentum_kept": verification.momentum.kept,
+        "energy_drift": verification.energy.drift,
+        "energy_kept": verification.energy.kept,
+        "budget": DataTable("", IMPERFECTIONS, verification.budget, spacecraft).json(),
+    }
+
+
+def _angle(name: str) -> Callable[[Any], float | None]:
+    def value(row: Any) -> float | None:
+        angle = getattr(row, name)
+        return None if angle is None else math.degrees(angle)
+
+    return value
+
+
+def _difference(value: float | None) -> str:
+    if value is None:
+        return MISSING
+    return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
+
+
+BOTH = "json screen"
+METHODS = (
+    Column("name", "method", "", attrgetter("name"), where=BOTH, kind=TEXT),
+    Column("nutation_deg", "nutation", "deg", _angle("nutation"), small_angle, BOTH),
+    Column("momentum_shift_deg", "momentum shift", "deg", _angle("momentum_shift"), small_angle, BOTH),
+    Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, BOTH),
+    Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, BOTH),
+    Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, BOTH),
+    Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
+)
+IMPERFECTIONS = (
+    Column("imperfection", "imperfection", "", attrgetter("name"), where=BOTH, kind=TEXT),
+    Column("nutation_deg", "nutation", "deg", _angle("nutation"), small_angle, BOTH),
+    Column("momentum_shift_deg", "", "", _angle("momentum_shift"), where="json"),
+    Column("", "momentum shift", "deg", _angle("momentum_shift"), small_angle, "screen",
+           lambda body: body.goal.axis is None),
+    Column("axis_error_deg", "", "", _angle("axis_error"), where="json"),
+    Column("", "axis error", "deg", _angle("axis_error"), small_angle, "screen",
+           lambda body: body.goal.axis is not None),
+)  # fmt: skip
+
+
+def methods_table(verification: Verification) -> FittedColumns:
+    """One row a way to fly the schedule: its residuals, and its difference from the flown motion."""
+    rows = [method for method in verification.methods if not method.missing]
+    return DataTable("Methods", METHODS, rows).screen("screen")
+
+
+def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedColumns:
+    """One row an imperfection: residuals with it alone; then residuals without each effect that plans include."""
+    return DataTable(BUDGET, IMPERFECTIONS, verification.budget, spacecraft).screen("screen")
+
+
+def _missing(verification: Verification) -> list[str]:
+    """Methods that were not flown, with the reason."""
+    return [f"{method.name}: {method.missing}" for method in verification.methods if method.missing]
+
+
+def verdict(verification: Verification) -> str:
+    """Sentence whether the integrations from outside confirm the flown motion."""
+    if not verification.checks:
+        return "NOT CONFIRMED: no independent integration was flown to the end."
+    names = verification.checks if verification.agree else verification.disagreeing
+    how = f"agree (within {AGREE:g} rad)" if verification.agree else f"DO NOT AGREE (within {AGREE:g} rad)"
+    return f"The flown motion and {' and '.join(names)} {how}."
+
+
+def conservation(verification: Verification) -> str:
+    """Sentence on the change of |H| and of the energy on coasts, and its cause."""
+    both = verification.momentum, verification.energy
+    if all(course.drift == 0.0 for course in both):
+        return "On coasts |H| and the energy are constant to the last digit."
+    momentum, energy = map(_course, both)
+    return f"On coasts |H| {momentum}, the energy {energy}."
+
+
+def _course(course: Conservation) -> str:
+    if course.drift == 0.0 and not course.changed:
+        return "is constant to the last digit"
+    how = "is NOT constant" if course.kept is False else "is constant to rounding"
+    if course.changed:
+        how = f"is changed by {' and '.join(course.changed)}"
+    return f"{how} ({_difference(course.drift)} of itself at most)"
+
+
+def _largest(verification: Verification) -> list[str]:
+    """The imperfection that leaves the most nutation alone; empty where none leaves any."""
+    single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
+    most = max(single, key=lambda row: row.nutation, default=None)
+    if most is None or most.nutation <= SHOWN:
+        return []
+    return [f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."]
+
+
+def budget_note(verification: Verification, *, aimed: bool) -> str:
+    """Note on rows that leave an effect out, and on one that leaves more than all; empty where neither is."""
+    names = [row.name.removeprefix(WITHOUT) for row in verification.budget if row.name.startswith(WITHOUT)]
+    flown = next(row for row in verification.budget if row.name == AS_FLOWN)
+    single = [row for row in verification.budget if row is not flown and not row.name.startswith(WITHOUT)]
+    farther, notes = "a larger axis error" if aimed else "a larger momentum shift", []
+    if len(verification.budget) == len({IDEAL, AS_FLOWN}):
+        notes.append("Nothing is imperfect here: ideal impulses, no ticks, no disturbances.")
+    for row in single:
+        left = [("more nutation", row.nutation - flown.nutation), (farther, row.axis_error - flown.axis_error)]
+        more = [what for what, by in left if by > SHOWN]
+        if more:
+            how = "As ideal impulses" if row.name == IDEAL else f"With {row.name} alone"
+            tuned = "plans are tuned to what is fired, so that the rows do not add up"
+            notes.append(f"{how} the pulses leave {listed(more)} than as flown: {tuned}.")
+            break
+    if names:
+        notes.append(
+            f"The other rows are flown with {listed(names)}. Plans are checked by such flights, on which most schemes "
+            "correct them; a row 'without' shows what the same pulses leave without that effect, more or less."
+        )
+    return " ".join(notes)
