@@ -17,7 +17,7 @@ from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.dispersion import budget_rows
+from nutdamp.views.tolerances import budget_rows
 from nutdamp.views.verdicts import cases_verdict, exact_percent
 
 if TYPE_CHECKING:

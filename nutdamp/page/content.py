@@ -48,7 +48,7 @@ from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees, sentence
 from nutdamp.views.trade import apart, beats, front_parts, outdone
-from nutdamp.views.verification import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
+from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
@@ -254,7 +254,7 @@ def _verification(chosen: Plan) -> PageSection:
             BUDGET,
             budget_table(chosen.spacecraft, verified),
         ),
-        *[Prose(note) for note in (budget_note(verified, aimed=chosen.spacecraft.goal.axis is not None),) if note],
+        Prose(BUDGET_NOTE),
     ]
     return PageSection("budget", "Verification and error budget", tuple(blocks))
 

@@ -16,8 +16,8 @@ from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views.dispersion import budget_rows
 from nutdamp.views.text import degrees
+from nutdamp.views.tolerances import budget_rows
 
 if TYPE_CHECKING:
     from nutdamp.flight.track import Track

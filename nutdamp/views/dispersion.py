@@ -1,4 +1,4 @@
-"""Results of ``disperse``: percentiles, requirement, cones, tolerance budget and cases; tolerances in words.
+"""Results of ``disperse``: percentiles, requirement, cones, and cases; the tolerance budget is in `tolerances`.
 
 The files of loops and the screens of other commands use the same parts.
 """
@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -19,26 +19,34 @@ from rich.text import Text
 from nutdamp.files.samples import OUTPUT_COLUMNS
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
-from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
-from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, FirstOrder, cases_to_show
-from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study
-from nutdamp.spacecraft import requirements
+from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
+from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
-from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import bounds_text, end_table, requested
-from nutdamp.views.layout import brief, columns, facts
+from nutdamp.views.layout import brief
 from nutdamp.views.plan_json import final_json, heading, target_json
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
-from nutdamp.views.text import degrees, digits, quantity
+from nutdamp.views.text import degrees, digits
+from nutdamp.views.tolerances import (
+    budgeted_outputs,
+    in_words,
+    inputs_table,
+    main_causes,
+    tolerance_budget,
+    unused_table,
+)
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopResults
 
 
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
-BRIEFLY = (50.0, 95.0, 99.7)
-"""Those of the default screen."""
+LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "99.7")
+"""Their names, and those on the default screen."""
+
+BOTH = "screen full"
+"""The default screen, and that of all values."""
 
 NAMES = (
     ("nutation", "deg", 1.0),
@@ -55,28 +63,11 @@ NOTHING = 1e-9
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
 """Note on a case whose tank runs empty."""
 
-SHOWN = {
-    "rad": ("deg", 180.0 / math.pi),
-    "rad/s": ("deg/s", 180.0 / math.pi),
-    "m": ("mm", 1e3),
-    "s": ("ms", 1e3),
-    "Pa": ("bar", 1e-5),
-}
-"""Units for people of those of inputs, and the factor."""
-
-MOST_ROWS = 12
-"""Largest number of inputs that the budget names; the rest is summed up."""
-
-TINY = 1e-300
-
-ROUNDING = 1e-12
-"""rad; a smaller variation is rounding."""
-
 
 def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = list(_main_causes(results)), ""
+    notes, case = list(main_causes(results)), ""
     if _varies(results):
         case = f" · {_again(results)} (worst)"
     if unused := results.study.model.inputs.unused:
@@ -94,7 +85,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    parts += [Text(), *_tolerance_budget(results)]
+    parts += [Text(), *tolerance_budget(results)]
     if worst and _varies(results):
         cases = _cases(results.study, _worst(results, worst))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("full")]
@@ -179,8 +170,7 @@ def percentiles_json(
         shares = np.array(PERCENTS) / 100.0
         levels = distribution.quantiles(1.0 - shares if lower else shares).tolist()
         spread = [distribution.minimum, *levels, distribution.maximum]
-    names = ("nominal", "min", *(f"{percent:g}" for percent in PERCENTS), "max")
-    values = zip(names, (nominal, *spread), strict=True)
+    values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
     return {name: None if value is None else shown(column, value) for name, value in values}
 
 
@@ -189,37 +179,27 @@ def _percentiles(results: Results) -> DataTable:
     rows = []
     nominal = results.study.outputs_of({}).tolist()
     for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, NAMES, nominal, strict=True):
-        distribution = results.distribution(output)
-        signs = {"": False}
+        distribution, signs = results.distribution(output), {"": False}
         if distribution is not None and distribution.minimum < 0.0:
             signs = {" ≤": False, " ≥": True} if distribution.maximum > 0.0 else {" ≥": True}
         for sign, lower in signs.items():
-            values = percentiles_json(column, plan, distribution, lower=lower)
-            texts = _side_by_side({key: None if value is None else scale * value for key, value in values.items()})
-            last = texts["min" if lower else "max"]
-            # The nominal value has digits of its own: other places show it alone.
-            own = texts["max"] and ("0" if abs(scale * plan) < NOTHING else digits(scale * shown(column, plan), 4))
-            rows.append({**texts, "name": f"{name}{sign}, {unit}", "nominal": own, "max": last})
+            given = percentiles_json(column, plan, distribution, lower=lower)
+            values = {key: math.nan if value is None else scale * value for key, value in given.items()}
+            largest = max(abs(values["min"]), abs(values["max"]))
+            row = {key: None if math.isnan(value) else beside(value, largest) for key, value in values.items()}
+            if distribution is not None:  # the nominal value has digits of its own: other places show it alone
+                row["nominal"] = "0" if abs(values["nominal"]) < NOTHING else digits(values["nominal"], 4)
+            rows.append({**row, "": f"{name}{sign}, {unit}", "max": row["min" if lower else "max"]})
     return DataTable("Percentiles", PERCENTILES, rows)
 
 
-def _side_by_side(values: Mapping[str, float | None]) -> dict[str, str | None]:
-    """Numbers with as many decimals as the largest of the cases has."""
-    largest = max(abs(values[key] or 0.0) for key in ("min", "max"))
-    return {key: None if value is None else beside(value, largest) for key, value in values.items()}
-
-
 PERCENTILES = (
-    Column("", "", "", itemgetter("name"), where="screen full", kind=TEXT),
-    Column("", "nominal", "", itemgetter("nominal"), where="screen full"),
-    *(
-        Column(
-            "", f"{percent:g} %", "", itemgetter(f"{percent:g}"), where="screen full" if percent in BRIEFLY else "full"
-        )
-        for percent in PERCENTS
-    ),
-    Column("", "max", "", itemgetter("max"), where="screen full"),
+    Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
+    Column("", "nominal", "", itemgetter("nominal"), where=BOTH),
+    *(Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full") for key in LEVELS),
+    Column("", "max", "", itemgetter("max"), where=BOTH),
 )
+"""Columns of rows of texts: the name without a key, the values by the names of `percentiles_json`."""
 
 
 def shown(column: str, value: float) -> float:
@@ -305,19 +285,10 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
     nominal = np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
     for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
         least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
-        yield (
-            keep,
-            {
-                "name": keep.name,
-                "min_deg": math.degrees(keep.least),
-                "max_deg": math.degrees(keep.most),
-                "broken_fraction": float(results.broken[index] / results.done),
-                "least_deg": least_of_all,
-                "largest_deg": largest_of_all,
-                "nominal_least_deg": least,
-                "nominal_largest_deg": largest,
-            },
-        )
+        entry = {"name": keep.name, "min_deg": math.degrees(keep.least), "max_deg": math.degrees(keep.most)}
+        entry["broken_fraction"] = float(results.broken[index] / results.done)
+        entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
+        yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
 
 
 def _emptied(results: Results) -> Iterator[Text]:
@@ -332,8 +303,7 @@ def _emptied(results: Results) -> Iterator[Text]:
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    outputs = study.outputs_of(draws).tolist()
-    angles = study.aspects_of(draws)
+    outputs, angles = study.outputs_of(draws).tolist(), study.aspects_of(draws)
     return {
         "case": case + 1,
         "inputs": {entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn},
@@ -397,23 +367,6 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
     return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
 
 
-def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> Table:
-    """Every input of one case: nominal, drawn, and the deviation."""
-    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
-    for entry in drawn:
-        (unit, scale), draw = _of_people(entry), draws[entry.name]
-        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
-        off = of_nominal(entry, draw, "+.4g") if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
-        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
-        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
-    return inputs
-
-
-def _of_people(entry: DispersedInput) -> tuple[str, float]:
-    """The unit of an input for people, and the factor to it."""
-    return SHOWN.get(entry.unit, (entry.unit, 1.0))
-
-
 def _bounded(keep: Keep) -> list[str]:
     """Bounded ones of the angles to the direction of a cone: the least, the largest."""
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
@@ -450,121 +403,6 @@ def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
     return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}
 
 
-def unused_table(unused: Iterable[Unused]) -> Table:
-    """Inputs without effect; names that share a reason are listed together."""
-    table = facts()
-    reasons: dict[str, list[str]] = {}
-    for name, reason in unused:
-        reasons.setdefault(reason, []).append(in_words(name))
-    for reason, names in reasons.items():
-        table.add_row(", ".join(names), reason)
-    return table
-
-
-# --- tolerance budget
-
-
-class BudgetRow(NamedTuple):
-    """A line of the tolerance budget: one input, or those that are left together.
-
-    ``size``: one sigma or the bias as text; ``effects``: those of it alone on the two `budgeted_outputs`, rad, or the
-    root mean square of those of correlated inputs together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
-    it varies.
-    """
-
-    name: str
-    size: str
-    effects: tuple[float, float]
-    inputs: list[int]
-    bias: bool
-
-
-def budget_rows(study: Study) -> list[BudgetRow]:
-    """The inputs that count most, the largest first, and the others together; none where nothing varies."""
-    inputs, first = study.model.inputs.drawn, study.first_order
-    if not any(entry.sigma for entry in inputs):
-        return []
-    outputs = [output for output, _ in budgeted_outputs(study)]
-    units = together(inputs, study.model.groups)
-    effects = np.array([[_effect(first, output, rows) for rows in units] for output in outputs])
-    scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
-    order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
-    named = order if len(order) <= MOST_ROWS + 1 else order[:MOST_ROWS]
-    groups = [(*_named([inputs[row] for row in units[at]]), [at]) for at in named]
-    if named != order:
-        others = order[len(named) :]
-        groups.append((f"{sum(len(units[at]) for at in others)} others", "", others))
-    rows = []
-    for name, size, members in groups:
-        nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
-        of = [row for at in members for row in units[at]]
-        rows.append(BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of)))
-    return rows
-
-
-def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
-    """Effect of an input alone, or of correlated ones together (root mean square)."""
-    if len(rows) == 1:
-        return float(first.effects(output)[rows[0]])
-    return float(np.linalg.norm(first.independent(output)[:, rows]))
-
-
-def _named(entries: list[DispersedInput]) -> tuple[str, str]:
-    """Name and size of an input, or of correlated ones."""
-    name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
-    return (f"{name} (correlated)" if len(entries) > 1 else name), size
-
-
-def _tolerance_budget(results: Results) -> list[RenderableType]:
-    """Shares of the variance by input, by first order and by the cases, and the tolerances that count most."""
-    study, rows = results.study, budget_rows(results.study)
-    if not rows:
-        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
-    inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
-    outputs = dict(budgeted_outputs(study))
-    heads = (head for label in outputs.values() for head in (f"{label}\ndeg", "linear\n%", "cases\n%"))
-    table = columns("input\n", "one sigma\nor bias", *heads)
-    for row in rows:
-        cells = []
-        for output, effect in zip(outputs, row.effects, strict=True):
-            seen = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
-            linear = float(first.shares(output)[row.inputs].sum())
-            cells += [f"{math.degrees(effect):.3g}", *(("bias", "") if row.bias else map(_percent, (linear, seen)))]
-        name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
-        table.add_row(Text(name, style="dim"), size, *cells)
-    rest = (1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs)
-    shares = (max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True))
-    table.add_row(Text("interactions", "dim"), "", *(cell for share in shares for cell in ("", "", _percent(share))))
-    note = (
-        "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
-        f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
-        "may not total 100 %."
-    )
-    if study.model.groups:
-        note += " Correlated inputs vary together: their effect is the root mean square of the group."
-    return [Text("Tolerance budget", "bold"), table, Text(note, "dim"), *map(Text, _main_causes(results))]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f}" if share >= 5e-4 else "0"
-
-
-def _main_causes(results: Results) -> Iterator[str]:
-    """The tolerances of the file with the largest shares of each residual."""
-    first = results.study.first_order
-    for output, name in budgeted_outputs(results.study):
-        sums: dict[str, float] = {}
-        shares = first.shares(output)
-        for rows in together(first.inputs, results.study.model.groups):
-            entries = [first.inputs[row] for row in rows]
-            key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
-            sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        ranked = sorted(sums.items(), key=lambda item: -item[1])
-        leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
-        if any(sums.values()):
-            yield f"Main causes of {name}: {', '.join(leading or [ranked[0][0]])}."
-
-
 def _shares(results: Results) -> Iterator[dict[str, Any]]:
     """Share of each input in each output, by first order and by the cases."""
     first = results.study.first_order
@@ -581,44 +419,3 @@ def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
     """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
     pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
     return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
-
-
-def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The outputs of the tolerance budget, and their names for people."""
-    first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
-    return (first.value, first.label), (second.value, second.label)
-
-
-# --- tolerances in words
-
-
-def in_words(name: str) -> str:
-    """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the file."""
-    key, blank, whose = name.replace("tank ", "tank_", 1).partition(" ")
-    if key.startswith("omega0"):
-        return f"initial ω{key.removeprefix('omega0').removeprefix('_')}"
-    return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
-
-
-def size_text(entry: DispersedInput) -> str:
-    """One sigma, or the bias, in the form of the file."""
-    if entry.unit == "":
-        return of_nominal(entry, entry.sigma or entry.size, ".3g")
-    unit, scale = _of_people(entry)
-    return quantity(scale * (entry.sigma or entry.size), unit, 3)
-
-
-def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) -> str:
-    """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
-    share = entry.nominal != 0.0 and (relative or entry.unit == "")
-    unit, scale = ("%", 100.0 / abs(entry.nominal)) if share else _of_people(entry)
-    value = scale * entry.size
-    if down and value > 0.0:
-        step = 10.0 ** (math.floor(math.log10(value)) - 2)
-        value = step * math.floor(value / step * (1.0 + 1e-12))
-    return quantity(value, unit, 3).strip()
-
-
-def of_nominal(entry: DispersedInput, value: float, form: str) -> str:
-    """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
-    return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"

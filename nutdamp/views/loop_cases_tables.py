@@ -16,7 +16,6 @@ from nutdamp.control_loop.law import Ending
 from nutdamp.montecarlo.statistics import Exact
 from nutdamp.views import verdicts
 from nutdamp.views.dispersion import (
-    MOST_ROWS,
     PERCENTS,
     add_angles,
     angles_note,
@@ -24,15 +23,12 @@ from nutdamp.views.dispersion import (
     bounded,
     bounded_heads,
     cone_lines,
-    in_words,
-    inputs_table,
     requirement_lines,
-    size_text,
-    unused_table,
 )
 from nutdamp.views.layout import columns
 from nutdamp.views.loop_tables import described
 from nutdamp.views.text import MISSING, degrees, duration
+from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
 NAMES = {
     "settled": ("first quiet, s", 1.0),

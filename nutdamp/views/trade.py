@@ -148,7 +148,7 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
 
 
 def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
-    """What is traded, the cheapest and the earliest schedule, and the number that meet the requirement."""
+    """Title, the cheapest and the earliest schedule, and the number that meet the requirement."""
     points = rows_of(fronts)
     yield Text.assemble((spacecraft.name, "bold"), f": finish time against cost; schedules: {len(points)}")
     if not points:

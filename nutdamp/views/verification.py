@@ -10,7 +10,6 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.errors import listed
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.planning.plan import Plan
@@ -30,6 +29,12 @@ SHOWN = 1e-9 * math.pi / 180.0
 BUDGET = "Error budget: what each imperfection leaves, alone"
 """The title of `budget_table`."""
 
+BUDGET_NOTE = (
+    "Plans are tuned to what is fired, so that the rows do not add up. A row 'without' shows what the same pulses "
+    "leave without that effect, more or less."
+)
+"""Note on `budget_table`."""
+
 
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
@@ -38,7 +43,7 @@ def verification_brief(plan: Plan, verification: Verification) -> RenderableType
 
 
 def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
-    """What is verified, the verdict, and what the flown motion leaves."""
+    """Title, verdict, and the residual of the flown motion beside the requirement."""
     body = plan.spacecraft
     yield Text.assemble((body.name, "bold"), f": {plan.scheme}; Δ: maximum difference from the flown motion")
     yield coloured(verdict(verification), verification.agree)
@@ -51,11 +56,10 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
 def verification_screen(plan: Plan, verification: Verification) -> RenderableType:
     """All tables of ``verify``."""
     body = plan.spacecraft
-    note = budget_note(verification, aimed=body.goal.axis is not None)
     parts: list[RenderableType] = [*_head(plan, verification), Text(), derived_table(body)]
     parts += [Text(), methods_table(verification), *map(Text, _missing(verification))]
     parts += [Text(), Text(conservation(verification)), Text(), Text(BUDGET, "bold"), Text()]
-    return Group(*parts, budget_table(body, verification), *[Text(note, "dim")] * bool(note))
+    return Group(*parts, budget_table(body, verification), Text(BUDGET_NOTE, "dim"))
 
 
 def verification_json(flown: Flight, name: str, verification: Verification) -> dict[str, Any]:
@@ -140,20 +144,14 @@ def verdict(verification: Verification) -> str:
 
 def conservation(verification: Verification) -> str:
     """Sentence on the change of |H| and of the energy on coasts, and its cause."""
-    both = verification.momentum, verification.energy
-    if all(course.drift == 0.0 for course in both):
-        return "On coasts |H| and the energy are constant to the last digit."
-    momentum, energy = map(_course, both)
-    return f"On coasts |H| {momentum}, the energy {energy}."
+    momentum, energy = map(_course, (verification.momentum, verification.energy))
+    return f"On coasts |H| is {momentum}, the energy {energy}."
 
 
 def _course(course: Conservation) -> str:
-    if course.drift == 0.0 and not course.changed:
-        return "is constant to the last digit"
-    how = "is NOT constant" if course.kept is False else "is constant to rounding"
-    if course.changed:
-        how = f"is changed by {' and '.join(course.changed)}"
-    return f"{how} ({_difference(course.drift)} of itself at most)"
+    how = f"changed by {' and '.join(course.changed)}" if course.changed else "constant to rounding"
+    how = "NOT constant" if course.kept is False else how
+    return f"{how} (by {_difference(course.drift)} of itself at most)" if course.drift else how
 
 
 def _largest(verification: Verification) -> list[str]:
@@ -163,27 +161,3 @@ def _largest(verification: Verification) -> list[str]:
     if most is None or most.nutation <= SHOWN:
         return []
     return [f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."]
-
-
-def budget_note(verification: Verification, *, aimed: bool) -> str:
-    """Note on rows that leave an effect out, and on one that leaves more than all; empty where neither is."""
-    names = [row.name.removeprefix(WITHOUT) for row in verification.budget if row.name.startswith(WITHOUT)]
-    flown = next(row for row in verification.budget if row.name == AS_FLOWN)
-    single = [row for row in verification.budget if row is not flown and not row.name.startswith(WITHOUT)]
-    farther, notes = "a larger axis error" if aimed else "a larger momentum shift", []
-    if len(verification.budget) == len({IDEAL, AS_FLOWN}):
-        notes.append("Nothing is imperfect here: ideal impulses, no ticks, no disturbances.")
-    for row in single:
-        left = [("more nutation", row.nutation - flown.nutation), (farther, row.axis_error - flown.axis_error)]
-        more = [what for what, by in left if by > SHOWN]
-        if more:
-            how = "As ideal impulses" if row.name == IDEAL else f"With {row.name} alone"
-            tuned = "plans are tuned to what is fired, so that the rows do not add up"
-            notes.append(f"{how} the pulses leave {listed(more)} than as flown: {tuned}.")
-            break
-    if names:
-        notes.append(
-            f"The other rows are flown with {listed(names)}. Plans are checked by such flights, on which most schemes "
-            "correct them; a row 'without' shows what the same pulses leave without that effect, more or less."
-        )
-    return " ".join(notes)

@@ -34,7 +34,7 @@ from nutdamp.page.pictures import dispersion_pictures_of
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
-from nutdamp.views.dispersion import budget_rows, in_words
+from nutdamp.views.tolerances import budget_rows, in_words
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
