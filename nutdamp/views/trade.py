@@ -144,7 +144,7 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     if len(shown) < len(points):
         notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")
     rows = [points[index] for index in shown]
-    return brief([*_head(spacecraft, fronts)], _table(rows).screen("brief"), [*notes, *_notes(fronts)], steps)
+    return brief([*_head(spacecraft, fronts)], _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps)
 
 
 def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
@@ -180,15 +180,14 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
         if front.points:
             rows = [row for row in rows_of(fronts) if row.front is front]
             parts.append(_table(rows).screen("full"))
-    for note in _notes(fronts):
+    below = [BELOW] * any(map(_below, rows_of(fronts)))
+    for note in (*below, *_ends_off(fronts)):
         parts += [Text(), Text(note, style="dim")]
     return parts
 
 
-def _notes(fronts: Sequence[Front]) -> Iterator[str]:
-    """Notes on numbers of the tables."""
-    if any(map(_below, rows_of(fronts))):
-        yield BELOW
+def _ends_off(fronts: Sequence[Front]) -> Iterator[str]:
+    """Note on schedules that end off a target that they were planned for."""
     off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield OFF

@@ -38,7 +38,7 @@ BUDGET_NOTE = (
 
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
-    notes = [*_missing(verification), conservation(verification), *_largest(verification)]
+    notes = [conservation(verification), *_largest(verification), *_missing(verification)]
     return brief([*_head(plan, verification)], methods_table(verification), notes, "--json verified.json")
 
 
