@@ -118,8 +118,8 @@ def verify_command(
 ) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
-    Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
-    DOP853 and Basilisk are not confirmed: exit status 3.
+    Shows the largest differences and what is conserved, with -v what each imperfection alone leaves. Motions too long
+    for DOP853 and Basilisk are not confirmed: exit status 3.
     """
     if looped and flown != (None, None, None):
         raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")

@@ -131,7 +131,7 @@ FIGURES = ("overview", "cases", "momentum", "budget")
 @click.option("--until", type=EndTime(), help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @click.option(
-    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
+    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases with -v."
 )
 @click.option("--csv", type=FILE, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=FILE, help="Write percentiles, requirement, tolerance budget, worst cases.")
@@ -159,8 +159,9 @@ def command(
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
 
-    Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
-    Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
+    Shows percentiles of what is left, the share of cases that comply, and which tolerance counts; with -v the tolerance
+    budget and the worst cases. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp
+    plan`.
     """
     if case is not None and (csv or plot):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")

@@ -15,7 +15,6 @@ from nutdamp.planning.decision import infeasibility
 from nutdamp.planning.robust import RobustComparison
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import robust_verdicts, verdicts
 from nutdamp.views.decisions import KEPT, figures, requirement
 from nutdamp.views.plan_json import final_json, plan_json, target_json
@@ -163,7 +162,7 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
-    level, left = verdicts.exact_percent(robust.probability), robust_verdicts.left_name(_body(robust))
+    level, left = verdicts.exact_percent(robust.probability), robust_verdicts.left_name(robust.comparison.spacecraft)
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
         *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),
@@ -171,10 +170,6 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
         *["* is recommended without --robust."] * (robust.usual is not None),
     ]
     return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
-
-
-def _body(robust: RobustComparison) -> Spacecraft:
-    return robust.comparison.spacecraft
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:

@@ -17,6 +17,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import SAME_ANGLE
 from nutdamp.planning.tradeoff import Front, Point, numbered
 from nutdamp.schemes.catalogue import OPTIMAL
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import STEERABLE
@@ -243,23 +244,22 @@ def trade_csv(fronts: Sequence[Front]) -> str:
 
 def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
-    points: dict[int, list[dict[str, Any]]] = {id(front): [] for front in fronts}
-    for index, front, point in numbered(fronts):
-        points[id(front)].append({"point": index, "horizon_s": point.horizon, **plan_json(point.plan)})
-    return {
-        **heading(spacecraft),
-        "fronts": [
-            {"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": points[id(front)]}
-            for front in fronts
-        ],
-    }
+    points = [
+        (row.front, {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)})
+        for row in rows_of(fronts)
+    ]
+    entries = []
+    for front in fronts:
+        own = [point for owner, point in points if owner is front]
+        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": own})
+    return {**heading(spacecraft), "fronts": entries}
 
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    points = list(numbered(fronts))
-    paths = schedule_paths(folder, len(points))
-    return [(path, pulse_table(point.plan.flight).csv()) for path, (_, _, point) in zip(paths, points, strict=True)]
+    plans = [row.plan for row in rows_of(fronts)]
+    files = (pulse_table(plan.flight).csv() for plan in plans)
+    return list(zip(schedule_paths(folder, len(plans)), files, strict=True))
 
 
 def schedule_paths(folder: str, count: int) -> list[str]:
@@ -278,9 +278,7 @@ class _Better(NamedTuple):
 
     saved: float
     earlier: float
-    number: int
-    front: Front
-    point: Point
+    row: TradeRow
     only: bool
 
     @property
@@ -288,10 +286,9 @@ class _Better(NamedTuple):
         """Words for its advantage."""
         if self.only:
             return "meets the requirement with nominal values, which the recommended plan does not"
-        if self.saved:
-            ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
-            return f"costs {100.0 * self.saved:.2g} % less than the recommended plan and ends {ends}"
-        return f"costs as much as the recommended plan and ends {duration(self.earlier)} earlier"
+        costs = f"costs {100.0 * self.saved:.2g} % less than" if self.saved else "costs as much as"
+        ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
+        return f"{costs} the recommended plan and ends {ends}"
 
 
 def _better(fronts: Sequence[Front], chosen: Plan) -> _Better | None:
@@ -300,17 +297,13 @@ def _better(fronts: Sequence[Front], chosen: Plan) -> _Better | None:
     Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
     first.
     """
-    until, misses = chosen.pulses.end, chosen.meets_requirement is False
-    better = [
-        _Better(
-            saved if misses or saved > SAME_COST else 0.0, until - point.plan.pulses.end, index, front, point, misses
-        )
-        for index, front, point in numbered(fronts)
-        if point.plan.meets_requirement
-        for saved in [1.0 - point.cost / chosen.pulses.cost_in(point.unit)]
-        if misses or (saved > SAME_COST and point.plan.pulses.end <= until) or _sooner(point.plan, chosen, saved)
-    ]
-    return max(better, key=lambda entry: entry[:2], default=None)
+    until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
+    for row in rows_of(fronts):
+        saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
+        cheaper = saved > SAME_COST and end <= until
+        if row.plan.meets_requirement and (misses or cheaper or _sooner(row.plan, chosen, saved)):
+            better.append(_Better(saved if misses or saved > SAME_COST else 0.0, until - end, row, misses))
+    return max(better, key=itemgetter(0, 1), default=None)
 
 
 def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
@@ -331,48 +324,43 @@ def beats(fronts: Sequence[Front], chosen: Plan) -> str:
     better = _better(fronts, chosen)
     if better is None:
         return ""
-    front, point = better.front, better.point
-    pointing = chosen.spacecraft.goal.axis is not None
-    off = [plan.flight.residual.axis_error for plan in (point.plan, chosen)]
-    counts = [len(plan.pulses) for plan in (point.plan, chosen)]
-    asides = [f"{'axis error' if pointing else 'momentum shift'} {degrees(off[0])} instead of {degrees(off[1])}"]
-    asides = asides * (abs(off[0] - off[1]) > SAME_ANGLE)
-    asides += [f"pulses: {counts[0]} instead of {counts[1]}"] * (counts[0] != counts[1])
+    number, front, point = better.row
+    pointing, plans = chosen.spacecraft.goal.axis is not None, (point.plan, chosen)
+    off, counts = [plan.flight.residual.axis_error for plan in plans], [len(plan.pulses) for plan in plans]
+    asides = [front_name(front, pointing=pointing)]
+    if abs(off[0] - off[1]) > SAME_ANGLE:
+        name = requirements.aim(chosen.spacecraft).label
+        asides.append(f"{name} {degrees(off[0])} instead of {degrees(off[1])}")
+    if counts[0] != counts[1]:
+        asides.append(f"pulses: {counts[0]} instead of {counts[1]}")
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     return (
-        f"point {better.number} {'meets the requirement with nominal values too, ' * (not better.only)}{better.how} "
-        f"({'; '.join([front_name(front, pointing=pointing), *asides])}): "
+        f"point {number} {'meets the requirement with nominal values too, ' * (not better.only)}{better.how} "
+        f"({'; '.join(asides)}): "
         f'nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}--set "limits.horizon={point.horizon:.6g} s".'
     )
 
 
 def apart(fronts: Sequence[Front], chosen: Plan) -> str:
     """The reason why the ``chosen`` plan may cost less than the schedules traded, by another scheme; or nothing."""
-    points = {
-        number: point
-        for number, _, point in numbered(fronts)
-        if point.plan.pulses.end <= chosen.pulses.end and not fails(point)
-    }
-    if not points:
+    rows = [row for row in rows_of(fronts) if row.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
+    if not rows:
         return ""
-    number, nearest = min(points.items(), key=lambda item: item[1].cost)
-    spent, cheapest = chosen.pulses.cost_in(nearest.unit), nearest.cost
+    nearest = min(rows, key=lambda row: row.point.cost)
+    spent, cheapest = chosen.pulses.cost_in(nearest.point.unit), nearest.point.cost
     if spent >= cheapest * (1.0 - SAME_COST):
-        alike = spent < cheapest and cost(spent, nearest.unit) != cost(cheapest, nearest.unit)
-        return ALIKE * alike
+        return ALIKE * (spent < cheapest and nearest.spent(spent) != nearest.spent(cheapest))
     if chosen.scheme in schemes_of(fronts):
         return ""
     reasons = []
     if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
         impulses = " with ideal impulses" * chosen.pulses.idealised
         reasons.append(f"it fires the steerable torquer{impulses}, which the schedules of the trade do not")
-    left = max(point.plan.flight.residual.nutation for point in points.values())
-    if chosen.flight.residual.nutation > left + SAME_ANGLE:
-        reasons.append(
-            f"it leaves {degrees(chosen.flight.residual.nutation)} of nutation, they at most {degrees(left)}"
-        )
+    own, left = chosen.flight.residual.nutation, max(row.plan.flight.residual.nutation for row in rows)
+    if own > left + SAME_ANGLE:
+        reasons.append(f"it leaves {degrees(own)} of nutation, they at most {degrees(left)}")
     because = f": {listed(reasons)}" if reasons else ""
     return (
         f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than "
-        f"point {number}, the cheapest of the trade that meets the requirement and ends no later{because}."
+        f"point {nearest.number}, the cheapest of the trade that meets the requirement and ends no later{because}."
     )
