@@ -22,6 +22,7 @@ from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
 from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import bounds_text, end_table, requested
 from nutdamp.views.layout import brief
@@ -49,9 +50,7 @@ BOTH = "screen full"
 """The default screen, and that of all values."""
 
 NAMES = (
-    ("nutation", "deg", 1.0),
-    ("momentum shift", "deg", 1.0),
-    ("axis error", "deg", 1.0),
+    *((part.label, "deg", 1.0) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
     ("spin change", "mrad/s", 1e3),
     ("propellant", "g", 1e3),
 )

@@ -19,7 +19,7 @@ from nutdamp.planning.tradeoff import Front, Point, numbered
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import requested
@@ -111,7 +111,7 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
     yield Column("nutation_deg", "", "", _residual("nutation"), where="csv")
     shift = _residual("momentum_shift")
-    yield Column("momentum_shift_deg", "momentum shift", "deg", shift, small_angle, "csv full brief")
+    yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
     yield Column("axis_error_deg", "", "", _residual("axis_error"), where="csv")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")

@@ -14,6 +14,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, size
 from nutdamp.views.end_tables import requested
@@ -98,8 +99,8 @@ def _difference(value: float | None) -> str:
 BOTH = "json screen"
 METHODS = (
     Column("name", "method", "", attrgetter("name"), where=BOTH, kind=TEXT),
-    Column("nutation_deg", "nutation", "deg", _angle("nutation"), small_angle, BOTH),
-    Column("momentum_shift_deg", "momentum shift", "deg", _angle("momentum_shift"), small_angle, BOTH),
+    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, BOTH),
+    Column("momentum_shift_deg", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, BOTH),
     Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, BOTH),
     Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, BOTH),
     Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, BOTH),
@@ -107,12 +108,12 @@ METHODS = (
 )
 IMPERFECTIONS = (
     Column("imperfection", "imperfection", "", attrgetter("name"), where=BOTH, kind=TEXT),
-    Column("nutation_deg", "nutation", "deg", _angle("nutation"), small_angle, BOTH),
+    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, BOTH),
     Column("momentum_shift_deg", "", "", _angle("momentum_shift"), where="json"),
-    Column("", "momentum shift", "deg", _angle("momentum_shift"), small_angle, "screen",
+    Column("", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),
     Column("axis_error_deg", "", "", _angle("axis_error"), where="json"),
-    Column("", "axis error", "deg", _angle("axis_error"), small_angle, "screen",
+    Column("", Part.DISTANCE.label, "deg", _angle("axis_error"), small_angle, "screen",
            lambda body: body.goal.axis is not None),
 )  # fmt: skip
 
