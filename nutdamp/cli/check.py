@@ -26,7 +26,7 @@ from nutdamp.cli.job import (
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
 from nutdamp.cli.options import FILE, Aim, PlanningCommand, goal_options
-from nutdamp.cli.screen import say, show
+from nutdamp.cli.screen import console, say, show
 from nutdamp.errors import printable
 from nutdamp.schemes.catalogue import Options
 
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from nutdamp.errors import Fault
     from nutdamp.files.overrides import Setting
-    from nutdamp.views.guide import Topic
 
 
 @click.command("check")
@@ -239,38 +238,44 @@ def schema_command(output: str) -> None:
 
 
 def _completed_topics(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG001
-    from nutdamp.views.guide import SUMMARIES
+    from nutdamp.views.guide import NAMES, page_or_topic
 
-    topics = [topic for _, group in SUMMARIES for topic in group]
-    return [CompletionItem(name, help=text) for name, text in topics if name.startswith(incomplete)]
+    return [CompletionItem(name, help=page_or_topic(name).summary) for name in NAMES if name.startswith(incomplete)]
 
 
 @click.command("explain")
 @click.argument("topic", nargs=-1, metavar="[TOPIC]", shell_complete=_completed_topics)
 def explain_command(topic: tuple[str, ...]) -> None:
-    """Explain a scheme, an equation of the sources, the motion, or the keys of the spacecraft file.
+    """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the spacecraft file.
 
-    TOPIC is a scheme; a number such as 17, K7 or 24.4, or `equations` for all; `nutation`, `dissipation`, `figures`;
-    `file`, `file.thrusters`, `units`. Without it the topics are listed.
+    TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
+    or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain_tables
+    from nutdamp.views import explain_tables, guide, topics
 
-    requested = " ".join(topic)
-    if not requested.strip():
-        show(explain_tables.topics_screen())
-    elif requested.strip().casefold() == "equations":
-        show(explain_tables.equations_screen())
+    requested = " ".join(topic).strip()
+    if not requested:
+        _read(explain_tables.topics_screen())
+    elif requested.casefold() == guide.OVERVIEW:
+        _read(explain_tables.equations_screen())
     else:
-        show(explain_tables.topic_screen(_topic(requested.strip())))
+        _read(explain_tables.topic_screen(topics.explained(requested)))
 
 
-def _topic(requested: str) -> Topic:
-    """The topic of that name; those on the spacecraft file are made from its models, which take longer to load."""
-    from nutdamp.views import guide
+def on_keyboard() -> bool:
+    """True where someone can leave a pager."""
+    return sys.stdin.isatty()
 
-    name, _, below = requested.partition(".")
-    if name.casefold() == guide.FILE:
-        from nutdamp.views.file_guide import file_topic
 
-        return file_topic(below)
-    return guide.found(requested)
+def _read(screen: RenderableType) -> None:
+    """Show a screen; where it is longer than the terminal, in a pager."""
+    shown = console()
+    if not (shown.is_terminal and on_keyboard()):
+        show(screen)
+        return
+    with shown.capture() as captured:
+        shown.print(screen)
+    if captured.get().count("\n") < shown.height:
+        show(screen)
+    else:
+        click.echo_via_pager(captured.get())

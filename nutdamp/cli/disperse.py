@@ -77,7 +77,7 @@ def disperse_loop(job: Job, requested: Requested) -> None:
 
 
 def _loop_picture(results: LoopResults) -> Figure:
-    from nutdamp.figures.loop_cases import loop_cases_figure
+    from nutdamp.figures.dispersion import loop_cases_figure
 
     return loop_cases_figure(results)
 
@@ -114,7 +114,7 @@ def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
     job.deliver([(json, partial(loop_case_json, study, case, flown))], partial(loop_case_screen, study, case, flown))
 
 
-FIGURES = ("overview", "cases", "momentum", "budget")
+FIGURES = ("overview", "cases", "momentum")
 """Figures that ``--plot`` draws."""
 
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 DEFAULT_FILE = "spacecraft.yaml"
 
-FIGURES = ("overview", "motion", "sphere", "history", "timeline")
+FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
 DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:

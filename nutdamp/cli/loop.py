@@ -157,6 +157,6 @@ def budget_command(
 
 
 def _budget_picture(core: HoldingBudget) -> Figure:
-    from nutdamp.figures.budget import budget_figure
+    from nutdamp.figures.loop import budget_figure
 
     return budget_figure(core)

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft
 
 
-SCHEMES, PRIMER = "schemes", "primer"
-"""The pictures of all plans and of the certificate; the others are of one plan."""
+PRIMER = "primer"
+"""The picture of the certificate; the others are of one plan."""
 
 
 @click.command("plan", cls=PlanningCommand)
@@ -60,7 +60,7 @@ SCHEMES, PRIMER = "schemes", "primer"
 @click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=FILE, help="Write all plans and residuals.")
 @click.option("--certificate", type=FILE, help="Write the proof of the least cost (JSON).")
-@plot_options((*FIGURES, SCHEMES, PRIMER))
+@plot_options((*FIGURES, PRIMER))
 @click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
 def command(
@@ -86,7 +86,7 @@ def command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    one_plan, all_plans, curve = (plot if here else None for here in _pictured(figure))
+    one_plan, curve = (None, plot) if figure == PRIMER else (plot, None)
     _expect_one_scheme(names, csv=csv, plot=one_plan)
     files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "certificate": certificate, "plot": plot}
     job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
@@ -113,7 +113,6 @@ def command(
     outputs: list[Output] = [
         (json, partial(_data, compared, decided, dispersed)),
         (table, lambda: scheme_table(compared, chosen).csv()),
-        (all_plans, partial(_schemes_picture, compared, decided)),
         *_outputs_of_proof(proof, certificate, curve),
         *_outputs_of(chosen, csv, one_plan, figure),
         *_outputs_of_blocks(compared, chosen, blocks, job.remark),
@@ -161,11 +160,6 @@ def _outputs_of_blocks(
     from nutdamp.views.pulses import block_table
 
     return [(path, lambda: block_table(source.flight).csv())]
-
-
-def _pictured(figure: str) -> tuple[bool, bool, bool]:
-    """True for pictures of one plan, of all plans, and of the certificate, in this order."""
-    return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
 
 
 def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
@@ -226,15 +220,9 @@ def _data(compared: Comparison, decided: Decision | None, dispersed: RobustCompa
 
 
 def _picture(chosen: Plan, figure: str) -> Figure:
-    from nutdamp.figures import export, overview
+    from nutdamp.figures import overview
 
-    return overview.flight_figure(figure, *export.shown(chosen))
-
-
-def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
-    from nutdamp.figures import schemes
-
-    return schemes.schemes_figure(compared, decided)
+    return overview.flight_figure(figure, *overview.shown(chosen))
 
 
 def _screen(

@@ -106,10 +106,10 @@ class Tabled(Shown):
         write_csv(self, path)
 
     def figure(self, name: str | None = None) -> Figure:
-        """Matplotlib figure: of a comparison ``schemes``, else ``overview`` (the default) or one of the motion.
+        """Matplotlib figure ``overview`` (the default), ``motion``, ``sphere`` or ``history``.
 
-        That is ``motion``, ``sphere``, ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra
-        without matplotlib, Infeasible for a plan without a schedule.
+        Of a comparison that of the recommended plan. Raises BadRequest for other names, MissingExtra without
+        matplotlib, Infeasible where there is no schedule.
         """
         return figure(self, name)
 

@@ -34,7 +34,7 @@ from nutdamp.page.document import (
 from nutdamp.page.manoeuvre import manoeuvre_section
 from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.page.moving import moving_of
-from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
+from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, trade_picture_of
 from nutdamp.page.sheets import aspects_sheet
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
 from nutdamp.planning.plan import Plan, unrounded
@@ -78,7 +78,7 @@ def report_page(
     sections = [
         PageSection("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         PageSection("method", "Method", tuple(method_blocks(compared))),
-        _schemes(compared, decided),
+        _schemes(compared),
     ]
     if traded:
         sections.append(_trade(compared, traded))
@@ -175,7 +175,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
     yield Figure("nutation at t = 0", degrees(body.tilt))
 
 
-def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
+def _schemes(compared: Comparison) -> PageSection:
     """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
@@ -183,8 +183,6 @@ def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     blocks: list[Block] = [sheet(table.title, table), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
-    if decided is not None and len(compared) > 1:
-        blocks.append(schemes_picture_of(compared, decided))
     return PageSection("schemes", "Schemes compared", tuple(blocks))
 
 

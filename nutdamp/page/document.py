@@ -14,6 +14,7 @@ from nutdamp.views.tables import DataTable, Heading
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
+    from nutdamp.page.workbench import Workbench
     from nutdamp.spacecraft.model import Vector
 
 
@@ -121,8 +122,8 @@ class NamedDirection(NamedTuple):
 class Moving:
     """Fixed parts of the moving view, and its moving parts as the JSON ``data``.
 
-    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``command``: that which writes
-    the same rows.
+    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``: the reason for
+    which there is no ``workbench``; ``command``: that which writes the same rows.
     """
 
     panels: tuple[Panel, ...]
@@ -135,6 +136,8 @@ class Moving:
     longitude: str
     steep: bool
     how: str
+    workbench: Workbench | None
+    absent: str
     command: tuple[str, ...]
     data: str
 

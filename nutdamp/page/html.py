@@ -47,8 +47,8 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
     moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
     style, script = (
-        "\n".join(map(_part, (name, *[view] * moves)))
-        for name, view in (("page.css", "view.css"), ("sort.js", "view.js"))
+        "\n".join(map(_part, (name, *views * moves)))
+        for name, views in (("page.css", ["view.css"]), ("sort.js", ["motion.js", "bench.js", "view.js"]))
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)

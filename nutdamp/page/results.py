@@ -82,25 +82,24 @@ def _(flight: Flight, path: str | PathLike[str]) -> None:
 
 @results.figure.register(Flight)
 def _(flight: Flight, name: str | None) -> Figure:
-    from nutdamp.figures import export
+    from nutdamp.figures import overview
 
-    return _drawn(name, flight, flight.sampled(flight.samples, export.until(flight)))
+    return _drawn(name, flight, flight.sampled(flight.samples, overview.until(flight)))
 
 
 @results.figure.register(Plan)
 def _(plan: Plan, name: str | None) -> Figure:
-    from nutdamp.figures import export
+    from nutdamp.figures import overview
 
-    return _drawn(name, *export.shown(feasible(plan)))
+    return _drawn(name, *overview.shown(feasible(plan)))
 
 
 @results.figure.register(Comparison)
 def _(compared: Comparison, name: str | None) -> Figure:
-    from nutdamp.figures import schemes
-
-    if name not in (None, "schemes"):
-        raise BadRequest(f"there is no figure {name!r}; expected 'schemes'")
-    return schemes.schemes_figure(compared, decide(compared))
+    decided = decide(compared)
+    if decided is None:
+        raise Infeasible(compared.reason)
+    return decided.plan.figure(name)
 
 
 def _drawn(name: str | None, flight: Flight, track: Track) -> Figure:
@@ -111,7 +110,7 @@ def _drawn(name: str | None, flight: Flight, track: Track) -> Figure:
     try:
         return overview.flight_figure(chosen, flight, track)
     except KeyError:
-        raise BadRequest(f"there is no figure {name!r}") from None
+        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 
 
 @results.line.register

@@ -209,7 +209,7 @@ def test_what_a_file_lacks_and_what_does_not_go_together_is_said(run: Run, stage
         ("disperse", "exact.yaml", "--loop"),
         (*disperse, "--loop", "--scheme", "two-pulse"),
         (*disperse, "--loop", "--threads", "2"),
-        (*disperse, "--loop", "--plot", "x.svg", "--figure", "budget"),
+        (*disperse, "--loop", "--plot", "x.svg", "--figure", "cases"),
         (*disperse, "--until", "9s"),
         (*disperse, "--loop", "--until", "0s"),
         ("budget", "bare.yaml"),

@@ -23,7 +23,7 @@ from support.places import CASES, case
 from support.process import Run
 
 from nutdamp.common import numerics
-from nutdamp.figures import export, overview
+from nutdamp.figures import overview
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Residual
@@ -353,8 +353,8 @@ def test_dates_that_no_calendar_has_are_left_out() -> None:
 def test_a_steering_angle_is_the_same_everywhere() -> None:
     body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = overview.flight_figure("timeline", *export.shown(planning.Plan(body, "x", Schedule((pulse,)))))
-    assert any("289.88°" in text.get_text() for text in figure.axes[0].texts)
+    figure = overview.flight_figure("history", *overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    assert any("289.88°" in text.get_text() for text in figure.axes[1].texts)
 
 
 def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
