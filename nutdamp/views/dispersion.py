@@ -178,17 +178,19 @@ def _percentiles(results: Results) -> DataTable:
     rows = []
     nominal = results.study.outputs_of({}).tolist()
     for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, NAMES, nominal, strict=True):
-        distribution, signs = results.distribution(output), {"": False}
+        distribution, signs = results.distribution(output), [""]
         if distribution is not None and distribution.minimum < 0.0:
-            signs = {" ≤": False, " ≥": True} if distribution.maximum > 0.0 else {" ≥": True}
-        for sign, lower in signs.items():
+            signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
+        for sign in signs:
+            lower = sign == " ≥"
             given = percentiles_json(column, plan, distribution, lower=lower)
             values = {key: math.nan if value is None else scale * value for key, value in given.items()}
             largest = max(abs(values["min"]), abs(values["max"]))
             row = {key: None if math.isnan(value) else beside(value, largest) for key, value in values.items()}
             if distribution is not None:  # the nominal value has digits of its own: other places show it alone
                 row["nominal"] = "0" if abs(values["nominal"]) < NOTHING else digits(values["nominal"], 4)
-            rows.append({**row, "": f"{name}{sign}, {unit}", "max": row["min" if lower else "max"]})
+            row[""], row["max"] = f"{name}{sign}, {unit}", row["min" if lower else "max"]
+            rows.append(row)
     return DataTable("Percentiles", PERCENTILES, rows)
 
 

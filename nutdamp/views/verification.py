@@ -96,19 +96,18 @@ def _difference(value: float | None) -> str:
     return "0" if value == 0.0 else "< 1e-12" if value < 1e-12 else f"{value:.1e}"
 
 
-BOTH = "json screen"
 METHODS = (
-    Column("name", "method", "", attrgetter("name"), where=BOTH, kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, BOTH),
-    Column("momentum_shift_deg", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, BOTH),
-    Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, BOTH),
-    Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, BOTH),
-    Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, BOTH),
+    Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, "json screen"),
+    Column("momentum_shift_deg", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, "json screen"),
+    Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
+    Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"),
+    Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
     Column("missing", "", "", lambda row: row.missing or None, where="json", kind=TEXT),
 )
 IMPERFECTIONS = (
-    Column("imperfection", "imperfection", "", attrgetter("name"), where=BOTH, kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, BOTH),
+    Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
+    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, "json screen"),
     Column("momentum_shift_deg", "", "", _angle("momentum_shift"), where="json"),
     Column("", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),

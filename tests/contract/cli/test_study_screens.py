@@ -27,7 +27,7 @@ DISPERSED = [path for path in FILES if "\ndispersions:" in path.read_text(encodi
 COMMANDS = [
     *(f"disperse {path} --samples 200" for path in DISPERSED),
     *(f"verify {path}" for path in FILES),
-    *(f"trade {path} --points 3" for path in FILES),
+    *(f"trade {path} --points 2" for path in FILES),
 ]
 
 
