@@ -303,7 +303,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     distribution = results.distribution("nutation")
     assert distribution is not None
     assert float(first["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
-    assert float(first["all"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
+    assert float(first["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
     kinds = [node.attributes["class"] for node in part.all("table")]
     assert kinds[0] == "sheet"  # each row has a unit of its own: nothing to sort
     assert "sheet sortable" in kinds
