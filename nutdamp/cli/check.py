@@ -8,31 +8,23 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
+from nutdamp.cli.flown import flown_options, plan_or_read
 from nutdamp.cli.job import (
     DEFAULT_FILE,
     FileInput,
     Job,
-    begin,
     deliver,
     expect_outputs,
-    parsed,
     quiet_option,
-    remarks,
-    require_loop,
     set_option,
-    source,
     spacecraft_argument,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
-from nutdamp.cli.options import FILE, Aim, PlanningCommand, goal_options
+from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, goal_options
 from nutdamp.cli.screen import console, say, show
-from nutdamp.errors import printable
-from nutdamp.schemes.catalogue import Options
+from nutdamp.errors import nearest, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.console import RenderableType
 
     from nutdamp.errors import Fault
@@ -42,101 +34,70 @@ if TYPE_CHECKING:
 @click.command("check")
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
 @set_option
-@click.option("--json", type=FILE, help="Write derived quantities and faults.")
+@click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @quiet_option
 def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, quiet: bool) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
+    from nutdamp.views.check_json import check_json, checked, failed_json
+    from nutdamp.views.check_tables import check_screen
 
-    silent = expect_outputs(*(FileInput(file) for file in files or (None,)), json=json)
+    inputs = [FileInput(file, settings) for file in files or (None,)]
+    silent = expect_outputs(*(given.read for given in inputs), json=json)
+    remark = (lambda _: None) if quiet else say
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
-    for name in files or (None,):
+    for given in inputs:
         doubts: list[Fault] = []
         try:
-            report, screen = _looked_into(FileInput(name, settings), remarks(quiet), doubts)
+            result = checked(given.source(remark), given.path, doubts, lambda doubt: say(doubt.as_warning))
         except (FaultyFile, CannotRead) as wrong:
-            from nutdamp.views.check_json import failed_json
-
             tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
-            reports.append(failed_json(name, wrong, doubts))
+            reports.append(failed_json(given.path, wrong, doubts))
             continue
-        reports.append(report)
+        reports.append(result.to_dict())
         if not silent:
-            show(screen)
+            show(check_screen(result.spacecraft))
             if len(files) > 1:
                 click.echo()
-    if json is not None:
-        from nutdamp.views.check_json import check_json
-
-        try:
-            deliver([(json, lambda: check_json(reports))])
-        except CannotWrite as wrong:
-            tell(wrong)
-            failures.add(UNREADABLE)
+    try:
+        deliver([(json, lambda: check_json(reports))])
+    except CannotWrite as wrong:
+        tell(wrong)
+        failures.add(UNREADABLE)
     if failures:
         sys.exit(max(failures))
 
 
-def _looked_into(
-    given: FileInput, remark: Callable[[str], None], doubts: list[Fault]
-) -> tuple[dict[str, Any], RenderableType]:
-    """Results of the check of a file, for JSON and for the screen; warnings are added to ``doubts``.
-
-    Raises CannotRead, and FaultyFile, also for faults that appear only in derived quantities.
-    """
-    from nutdamp.errors import Fault, FaultyFile, NutdampError
-    from nutdamp.views.check_json import checked_json
-    from nutdamp.views.check_tables import check_screen
-
-    spacecraft = parsed(source(given.path, remark), given.settings, remark, doubts=doubts)
-    try:
-        return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft)
-    except NutdampError as wrong:
-        raise FaultyFile([Fault(given.path or DEFAULT_FILE, 1, 1, "", str(wrong))]) from wrong
-
-
-@click.command("verify", cls=PlanningCommand)
+@click.command("verify", cls=SessionCommand)
 @spacecraft_argument
 @flown_options("Verify")
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
-@click.option("--json", type=FILE, help="Write methods, differences and error budget.")
+@click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
 @click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
-def verify_command(
-    spacecraft: FileInput,
-    flown: FlownChoice,
-    options: Options,
-    aim: Aim,
-    looped: bool,
-    json: str | None,
-    verbose: bool,
-    quiet: bool,
-) -> None:
+def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
     Shows the largest differences and what is conserved, with -v what each imperfection alone leaves. Motions too long
     for DOP853 and Basilisk are not confirmed: exit status 3.
     """
-    if looped and flown != (None, None, None):
+    if looped and any(job.flown):
         raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, json=json)
+    job.begin()
     if looped:
-        _verify_loop(job, json)
+        _verify_loop(job)
         return
 
     from nutdamp.api import verify
-    from nutdamp.cli.job import working
-    from nutdamp.views.verification import verification_brief, verification_screen
 
-    plan = plan_or_read(job, flown, options)
-    with working("verifying", quiet=quiet):
+    plan = plan_or_read(job)
+    with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    screen = verification_screen if verbose else verification_brief
-    job.deliver([(json, verified.to_dict)], lambda: screen(plan, core))
+    job.deliver(verified, verbose=verbose)
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
@@ -147,17 +108,13 @@ def verify_command(
     leave(failed=bool(core.disagreeing or core.drifting), infeasible=not core.checks)
 
 
-def _verify_loop(job: Job, json: str | None) -> None:
+def _verify_loop(job: Job) -> None:
     """The closed loop of the file against the same by DOP853."""
-    from nutdamp.cli.job import working
-    from nutdamp.control_loop.evaluation import verify_loop
-    from nutdamp.views.loop_json import verified_json
-    from nutdamp.views.loop_tables import verification_screen
+    from nutdamp.api import verify_loop
 
-    require_loop(job.spacecraft)
-    with working("verifying", quiet=job.quiet):
+    with job.working("verifying"):
         comparison = verify_loop(job.spacecraft)
-    job.deliver([(json, lambda: verified_json(comparison))], lambda: verification_screen(comparison))
+    job.deliver(comparison)
     if comparison.missing:
         say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
         leave(infeasible=True)
@@ -197,13 +154,12 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
     if file != STDOUT and check_place(file).exists() and not force:
         raise CannotWrite(file, "it is already there; --force replaces it")
     write_whole(file, text)
-    if file != STDOUT:
-        remarks(quiet)(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
+    if file != STDOUT and not quiet:
+        say(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
 
 
 def _list() -> None:
     """Print the examples."""
-    from nutdamp.cli.screen import show
     from nutdamp.files.reader import example_names, example_subject
     from nutdamp.views.explain_tables import examples_screen
 
@@ -213,7 +169,6 @@ def _list() -> None:
 
 def _known(name: str) -> str:
     """The ``name`` if there is such an example; a usage error suggests the nearest one to a misspelt name."""
-    from nutdamp.errors import nearest
     from nutdamp.files.reader import example_names
 
     names = example_names()
@@ -228,7 +183,7 @@ def _known(name: str) -> str:
 
 
 @click.command("schema")
-@click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
+@click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 def schema_command(output: str) -> None:
     """Print the JSON Schema of the spacecraft file, for editors that complete and check YAML."""
     from nutdamp.files.reader import json_schema

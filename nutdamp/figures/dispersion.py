@@ -155,7 +155,7 @@ def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: 
 def momentum_cases(results: Results) -> Vector:
     """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial direction.
 
-    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the shift of H.
+    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the momentum shift.
     """
     model = results.study.model
     vectors = results.early[VECTORS[requirements.aim(model.spacecraft).value], : min(results.done, EARLY)].T

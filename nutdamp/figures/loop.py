@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.control_loop.budget import DAY, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, Budget, HeldNutation
 from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import labels, style
@@ -144,7 +144,7 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
 
 
 @style.styled
-def budget_figure(budget: HoldingBudget) -> Figure:
+def budget_figure(budget: Budget) -> Figure:
     """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
     body, held = budget.spacecraft, [row for row in budget.held if row.cycle is not None]
     figure = style.sheet(7.4, 4.0)
@@ -177,7 +177,7 @@ def _named(row: HeldNutation) -> str:
     return f"{style.angle(row.thresholds.start)} to {style.angle(row.thresholds.stop)}"
 
 
-def _shown(budget: HoldingBudget, held: Sequence[HeldNutation]) -> float:
+def _shown(budget: Budget, held: Sequence[HeldNutation]) -> float:
     """End of the time axis, s: some cycles, and the time until damping must begin."""
     size = max([PERIODS / _pace(row) + _begins(row) for row in held], default=0.0)
     until = budget.until_largest

@@ -13,6 +13,8 @@ from rich.console import Group
 
 from nutdamp import __version__
 from nutdamp.errors import listed, printable
+from nutdamp.files.reader import Source
+from nutdamp.files.yaml import dotted
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.verification import verify
 from nutdamp.page.craft import ends_note, ends_sheet, spacecraft_blocks
@@ -64,6 +66,19 @@ class Repeat(NamedTuple):
     name: str
     text: str
     settings: tuple[tuple[str, str], ...] = ()
+
+
+def called(body: Spacecraft, how: str) -> Repeat:
+    """The call in Python that makes a page again; where fields were replaced, no file stands for the spacecraft."""
+    if not isinstance(body.source, Source):
+        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
+    return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+
+
+def repeated(command: str, source: Source) -> Repeat:
+    """The command or call that makes a page again from a file."""
+    settings = tuple((dotted(setting.path), str(setting.value)) for setting in source.settings)
+    return Repeat(command, source.name, source.text, settings)
 
 
 def report_page(

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading
 
 if TYPE_CHECKING:
@@ -175,6 +178,23 @@ class Control(NamedTuple):
         """Names and values of the entries given, but for the title."""
         pairs = zip(self._fields[1:], self[1:], strict=True)
         return tuple((name, value) for name, value in pairs if value)
+
+
+def controlled(**given: str) -> Control:
+    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where that is set.
+
+    Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
+    """
+    unknown = sorted({*given} - {*Control._fields})
+    if unknown:
+        raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
+    control, epoch = Control(**given), os.environ.get("SOURCE_DATE_EPOCH", "")
+    if control.date or not epoch:
+        return control
+    try:
+        return control._replace(date=datetime.fromtimestamp(int(epoch), UTC).date().isoformat())
+    except (ValueError, OverflowError, OSError):
+        raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
 
 
 UNCONTROLLED = Control()

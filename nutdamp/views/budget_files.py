@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.views.plan_json import heading
 
@@ -50,13 +50,13 @@ def _other(held: HeldNutation) -> dict[str, float | None] | None:
     return {name: numbers[name] for name in ("pulses_per_day", "cycles_per_day", "propellant_kg_per_year")}
 
 
-def budget_csv(budget: HoldingBudget) -> str:
+def budget_csv(budget: Budget) -> str:
     """One row for each pair of thresholds; unknown values stay empty."""
     rows = ([*(number(value) for value in _numbers(row)), truth(row.meets_requirement), row.why] for row in budget.held)
     return csv_text((*HEADER, "meets_requirement", "why"), rows)
 
 
-def budget_json(budget: HoldingBudget) -> dict[str, Any]:
+def budget_json(budget: Budget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
     body = budget.spacecraft
     return {

@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
 from nutdamp.control_loop.limit_cycle import Cycle
 from nutdamp.views.layout import columns, facts
 from nutdamp.views.loop_tables import described, warnings
@@ -21,7 +21,7 @@ SLOW = 0.1
 """Share of its spin by which a year may change it before figures of the present spin mislead."""
 
 
-def budget_screen(budget: HoldingBudget) -> RenderableType:
+def budget_screen(budget: Budget) -> RenderableType:
     """All tables and notes of ``budget``."""
     body = budget.spacecraft
     parts: list[RenderableType] = [header(body), Text()]
@@ -34,7 +34,7 @@ def budget_screen(budget: HoldingBudget) -> RenderableType:
     return Group(*parts)
 
 
-def _outlook(budget: HoldingBudget) -> Iterator[str]:
+def _outlook(budget: Budget) -> Iterator[str]:
     """Course of the nutation without firing, and the time when damping must begin."""
     body, limit = budget.spacecraft, budget.largest
     now = degrees(body.nutation)
@@ -59,12 +59,12 @@ def _outlook(budget: HoldingBudget) -> Iterator[str]:
         yield "Pulses a day and propellant a year need a closed loop: the key loop of the file (nutdamp explain loop)."
 
 
-def _falls(budget: HoldingBudget, limit: float) -> str:
+def _falls(budget: Budget, limit: float) -> str:
     time = budget.until_largest
     return f"; it is below {most(limit)}" + (" already" if time == 0.0 else f" in {lasting(time)}")
 
 
-def _warnings(budget: HoldingBudget) -> Iterator[str]:
+def _warnings(budget: Budget) -> Iterator[str]:
     """Warnings of thresholds that waste propellant, of the present spin, and of a missing limit cycle."""
     body, seen = budget.spacecraft, set()
     for row in budget.held:
@@ -111,7 +111,7 @@ def _pair(row: HeldNutation) -> str:
     return f"{most(row.thresholds.start)} to {most(row.thresholds.stop)}"
 
 
-def _table(budget: HoldingBudget) -> Table:
+def _table(budget: Budget) -> Table:
     """A row for each pair of thresholds."""
     tank, required = budget.spacecraft.tank is not None, budget.meets_requirement is not None
     names = [
@@ -145,7 +145,7 @@ def _days(time: float | None) -> str:
     return quantity(None if time is None else time / DAY, "").strip()
 
 
-def _notes(budget: HoldingBudget) -> Table:
+def _notes(budget: Budget) -> Table:
     """Notes on the bounds of the limit cycle, and on the accuracy of the figures."""
     table = facts()
     band = next((row.band for row in budget.held if row.band is not None), None)

@@ -34,7 +34,7 @@ from support.shown import (
     points,
 )
 
-import nutdamp.page.results  # noqa: F401 - figures of flights are declared there
+import nutdamp.api  # noqa: F401 - figures of flights are declared there
 from nutdamp.figures import geometry, overview, sphere, style
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between

@@ -18,8 +18,9 @@ from support.cases import spread
 from support.commands import call
 from support.process import Run
 
-from nutdamp.cli import job
-from nutdamp.cli.job import progress, stoppable, working
+from nutdamp.cli import screen
+from nutdamp.cli.main import stoppable
+from nutdamp.cli.screen import progress, working
 from nutdamp.views.layout import NARROW, columns
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -122,11 +123,11 @@ class Terminal(io.StringIO):
 
 def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float, *, quiet: bool = False) -> str:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(job, "PATIENCE", patience)
+    monkeypatch.setattr(screen, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
-    with progress("flying", 1_000, quiet=quiet) as tell:
+    with progress("flying", quiet=quiet) as tell:
         for count in (200, 500, 900):
-            tell(count)
+            tell(count, 1_000)
     return stream.getvalue()
 
 
@@ -141,7 +142,7 @@ def test_a_terminal_is_shown_share_rate_and_time_left_of_a_long_run(monkeypatch:
 def test_elsewhere_one_line_says_how_far_long_work_is(
     monkeypatch: pytest.MonkeyPatch, long: float, quiet: bool, lines: int
 ) -> None:
-    monkeypatch.setattr(job, "LONG", long)
+    monkeypatch.setattr(screen, "LONG", long)
     text = shown(monkeypatch, io.StringIO(), 0.0, quiet=quiet)
     assert text.count("\n") == lines
     assert not lines or text.startswith("flying: 200 of 1,000 done after 0 s, about 0 s left")
@@ -157,7 +158,7 @@ def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
 ) -> None:
     err = stream()
     monkeypatch.setattr(sys, "stderr", err)
-    monkeypatch.setattr(job, "PATIENCE", patience)
+    monkeypatch.setattr(screen, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning", quiet=quiet):
         while seen and "planning" not in err.getvalue():  # until the timer has had its turn

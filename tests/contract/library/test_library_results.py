@@ -79,6 +79,8 @@ def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkey
         monkeypatch.setitem(sys.modules, "pandas", None)
         with refused(nutdamp.NutdampError, "library.no-pandas"):
             made.to_pandas()
+        with pytest.raises(ImportError):
+            made.to_pandas()
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:
@@ -245,6 +247,18 @@ def test_flights_comparisons_and_plans_draw_themselves() -> None:
             compared.figure(name)
     with refused(Infeasible, "library.no-figure-infeasible"):
         nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}), "two-pulse").figure()
+
+
+@pytest.mark.deep
+def test_studies_draw_themselves_and_write_their_rows(tmp_path: Path) -> None:
+    stage, plan = nutdamp.example("upper-stage"), nutdamp.plan(CRAFT, "two-pulse")
+    budget, simulated = nutdamp.budget(stage), nutdamp.simulate(plan, 20.0, samples=50)
+    for result in (budget, simulated, nutdamp.loop(stage, 60.0), nutdamp.disperse(plan, 50)):
+        assert result.figure().axes
+    for rows in (budget, simulated):
+        rows.to_csv(tmp_path / "rows.csv")
+        assert (tmp_path / "rows.csv").read_text().count("\n") > 1
+    assert len(simulated.to_numpy()) == (tmp_path / "rows.csv").read_text().count("\n") - 1
 
 
 class Tags(HTMLParser):

@@ -15,7 +15,7 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.control_loop.budget import DAY, YEAR, HeldNutation, HoldingBudget, Thresholds, budget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation, Thresholds, budget
 from nutdamp.control_loop.first_passage import Odds, Transfer, transfer
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.limit_cycle import Cycle, Map
@@ -274,7 +274,7 @@ def test_noise_above_a_tenth_of_start_widens_what_is_known(monkeypatch: pytest.M
     for share, noisy in ((0.05, False), (0.2, True)):
         held, cycle = held_by(craft(loop=loop(gyro(noise=share * start))))
         assert (held.noisy, cycle.doubt >= 0.2) == (noisy, noisy)
-        warnings = list(_warnings(HoldingBudget(held.spacecraft, None, (held,))))
+        warnings = list(_warnings(Budget(held.spacecraft, None, (held,))))
         assert any("above 10 % of loop.start" in warning for warning in warnings) is noisy
     check_text("budget.noisy", "\n".join(warnings))
 
@@ -325,7 +325,7 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
     follow_few_cycles(monkeypatch)
     made = nutdamp.budget(STAGE, [(rad(0.5), rad(0.1))])
     (row,) = made.to_dict()["thresholds"]
-    cycle = made.core.held[0].cycle
+    cycle = made.held[0].cycle
     assert cycle is not None
     assert cycle.propellant is not None
     assert row["pulses_per_day"] == cycle.pulses * DAY
@@ -341,7 +341,7 @@ def test_the_library_gives_what_the_command_writes(monkeypatch: pytest.MonkeyPat
 
 def test_the_table_says_what_its_columns_are() -> None:
     body = craft(loop=loop(gyro()))
-    named = [str(cell) for cell in _notes(HoldingBudget(body, None, ())).columns[0].cells]
+    named = [str(cell) for cell in _notes(Budget(body, None, ())).columns[0].cells]
     assert "low, high" in named
     assert ("tank" in named) is (body.tank is not None)
 
@@ -355,7 +355,7 @@ def test_the_picture_shows_what_is_held() -> None:
         for start, cycle in zip((0.5, 1.0), cycles, strict=True)
     )
     lost = HeldNutation(body, Thresholds(rad(3.0), rad(0.1)), math.inf, why="a reason")
-    (courses,) = budget_figure(HoldingBudget(body, rad(2.0), (*held, lost))).axes
+    (courses,) = budget_figure(Budget(body, rad(2.0), (*held, lost))).axes
     names = ["no firing", "0.500° to 0.100°", "1.00° to 0.100°", "largest allowed"]
     assert [str(line.get_label()) for line in courses.lines] == names
     free, first, second = (np.asarray(line.get_xydata()) for line in courses.lines[:3])
@@ -368,5 +368,5 @@ def test_the_picture_shows_what_is_held() -> None:
     assert first[:3, 1] == pytest.approx([0.05, 0.05, 0.5])
     assert first[0, 0] * hours == pytest.approx(50.0)
     assert second[:3, 0] * hours == pytest.approx([100.0, 1100.0 - math.log(10.0) / body.growth, 1100.0])
-    (alone,) = budget_figure(HoldingBudget(replace(body, loop=None), None, ())).axes
+    (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1

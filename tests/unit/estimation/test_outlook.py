@@ -16,10 +16,10 @@ from support.golden import check_text, refused
 from support.synthetic import motion
 
 import nutdamp
-from nutdamp.api import Fitted, fit
+from nutdamp.api import fit
 from nutdamp.errors import BadRequest
 from nutdamp.estimation import forecast
-from nutdamp.estimation.forecast import Outlook, Prospect
+from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.planning import decision
 from nutdamp.views.fit_tables import _table, advice, fit_screen
