@@ -18,6 +18,7 @@ from nutdamp.cli.job import (
     quiet_option,
     set_option,
     spacecraft_argument,
+    verbose_option,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
 from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, goal_options
@@ -76,7 +77,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
-@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
+@verbose_option
 @quiet_option
 def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
@@ -92,12 +93,13 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
         return
 
     from nutdamp.api import verify
+    from nutdamp.views.verification import verification_brief
 
     plan = plan_or_read(job)
     with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    job.deliver(verified, verbose=verbose)
+    job.deliver(verified, *([] if verbose else [lambda: verification_brief(plan, core)]))
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")

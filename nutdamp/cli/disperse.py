@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.flown import flown_options, plan_or_read
-from nutdamp.cli.job import Job, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Job, plot_options, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave, stoppable
 from nutdamp.cli.options import END, OUTPUT, SAMPLES, Count, SessionCommand, goal_options
 from nutdamp.cli.screen import say
@@ -44,7 +44,7 @@ FIGURES = ("overview", "cases", "momentum")
 @click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
-@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
+@verbose_option
 @quiet_option
 def command(
     job: Job,
@@ -74,6 +74,7 @@ def command(
 
     from nutdamp import api
     from nutdamp.spacecraft.requirements import expect_dispersions, expect_loop
+    from nutdamp.views.dispersion import dispersion_brief
 
     if looped:
         expect_loop(body)
@@ -83,14 +84,16 @@ def command(
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
+    brief: list[Callable[[], RenderableType]] = []
     hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"]}
     with stoppable() as stopped, job.progress("flying") as step:
         hooks |= {"progress": step, "stopped": stopped}
         if plan is None:
             flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
         else:
-            flown = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
-    job.deliver(flown, unsaved=[flown.unsaved], verbose=verbose, worst=worst)
+            flown = study = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
+            brief += [partial(dispersion_brief, study.core, scheme=plan.scheme)] * (not verbose)
+    job.deliver(flown, *brief, unsaved=[flown.unsaved], worst=worst)
     if stopped.number is not None and flown.core.done < samples:
         say(f"interrupted: {flown.core.done} of {samples} cases are done")
         sys.exit(128 + stopped.number)

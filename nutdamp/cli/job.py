@@ -38,6 +38,7 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
 
 
@@ -261,14 +262,12 @@ class Job:
         more: Files | None = None,
         files: Sequence[Output] = (),
         unsaved: Sequence[CannotWrite | None] = (),
-        verbose: bool = True,
         **shown: Any,
     ) -> None:
         """Write the files that are requested of a result, and show it, unless a file goes to standard output.
 
         ``more``: content of files by their options, else the views of the result make it, as its screen where none is
-        given, the brief one unless ``verbose``; ``shown`` are options of these views. ``files``: further ones.
-        Raises as `deliver` does.
+        given; ``shown`` are options of these views. ``files``: further ones. Raises as `deliver` does.
         """
         from nutdamp.common import results
 
@@ -278,9 +277,7 @@ class Job:
                 names = [self.figure] if what == "figure" and self.figure is not None else []
                 contents[option] = partial(results.view, result, what, *names, **shown if what == "data" else {})
         outputs = [(self.written.get(option), make) for option, make in contents.items()]
-        brief = not verbose and results.has(result, "brief")
-        screen = partial(results.view, result, "brief") if brief else partial(results.view, result, "screen", **shown)
-        usual = screens or (screen,)
+        usual = screens or (partial(results.view, result, "screen", **shown),)
         failures = [wrong for wrong in unsaved if wrong is not None]
         deliver([*outputs, *files], *usual * (not self.silent), unsaved=failures)
 

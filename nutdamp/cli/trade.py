@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import fronts_of
-from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
     FOLDER,
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
 @click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
-@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
+@verbose_option
 @quiet_option
 def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
@@ -63,7 +63,7 @@ def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedul
     """
     from nutdamp.planning.decision import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade import schedule_paths
+    from nutdamp.views.trade import schedule_paths, trade_brief
 
     allowed = allow or (0.0, math.inf)
     for shift in allow:
@@ -76,7 +76,8 @@ def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedul
         if point.plan.cut:
             job.remark(f"point {index}: {CUT}")
     files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
-    job.deliver(traded, files=files, unsaved=unsaved, verbose=verbose)
+    brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
+    job.deliver(traded, *brief, files=files, unsaved=unsaved)
     leave(infeasible=not traded.plans)
 
 

@@ -52,7 +52,7 @@ class BudgetRow(NamedTuple):
     bias: bool
 
 
-def budget_rows(study: Study) -> list[BudgetRow]:
+def _budget_rows(study: Study) -> list[BudgetRow]:
     """The inputs that count most, the largest first, and the others together; none where nothing varies."""
     inputs, first = study.model.inputs.drawn, study.first_order
     if not any(entry.sigma for entry in inputs):
@@ -90,7 +90,7 @@ def _named(entries: list[DispersedInput]) -> tuple[str, str]:
 
 def tolerance_budget(results: Results) -> list[RenderableType]:
     """Shares of the variance by input, by first order and by the cases, and the tolerances that count most."""
-    study, rows = results.study, budget_rows(results.study)
+    study, rows = results.study, _budget_rows(results.study)
     if not rows:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
     inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
