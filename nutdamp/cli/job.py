@@ -39,6 +39,7 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
 
 

@@ -180,7 +180,7 @@ def _screen(
     from nutdamp.views.glance import glance
 
     if dispersed is not None:
-        from nutdamp.views.robust_tables import robust_screen
+        from nutdamp.views.robust import robust_screen
 
         return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, dispersed.name)
     if verbose:

@@ -53,8 +53,8 @@ from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import mass, quantity, sentence
-from nutdamp.views.trade_tables import apart, beats, front_parts
-from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
+from nutdamp.views.trade import apart, beats, front_parts
+from nutdamp.views.verification import BUDGET, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
@@ -205,7 +205,7 @@ def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Co
 
 def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
     """Verdict, distributions and percentiles of the cases; budget and worst cases behind a title."""
-    from nutdamp.views.dispersion_tables import cone_lines, dispersion_screen, requirement_lines
+    from nutdamp.views.dispersion import cone_lines, dispersion_screen, requirement_lines
 
     lines = [Prose(plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
     if note := dispersed.study.lightening_error:
@@ -249,10 +249,9 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
     yield Prose(f"{verdict(verified)} {conservation(verified)}")
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
-    note = budget_note(verified, aimed=body.goal.axis is not None)
     flights = sheet_of("Differences from the flown motion are the largest on the way", methods_table(verified))
     blocks: list[Block] = [flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified))]
-    blocks += [Prose(note)] * bool(note)
+    blocks.append(Prose(BUDGET_NOTE))
     yield Details("Independent flights and error budget", tuple(blocks))
 
 

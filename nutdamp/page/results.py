@@ -53,13 +53,13 @@ VIEWS = {
     **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
     **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
     **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
-    "Trade.data": "views.trade_files:trade_json spacecraft fronts",
-    "Trade.csv": "views.trade_files:trade_csv fronts",
+    "Trade.data": "views.trade:trade_json spacecraft fronts",
+    "Trade.csv": "views.trade:trade_csv fronts",
     "Trade.figure": "figures.trade:trade_figure spacecraft fronts",
-    "Trade.screen": "views.trade_tables:trade_screen spacecraft fronts",
-    "Dispersion.data": "views.dispersion_json:dispersion_json core scheme=scheme",
+    "Trade.screen": "views.trade:trade_screen spacecraft fronts",
+    "Dispersion.data": "views.dispersion:dispersion_json core scheme=scheme",
     "Dispersion.figure": "page.results:dispersion_figure",
-    "Dispersion.screen": "views.dispersion_tables:dispersion_screen core scheme=scheme nominal=core.study.nominal",
+    "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
     "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
     "LoopDispersion.figure": "figures.dispersion:loop_cases_figure core",
     "LoopDispersion.screen": "views.loop_cases_tables:loop_cases_screen core",
@@ -72,8 +72,8 @@ VIEWS = {
     "Fitted.figure": "figures.fit:fit_figure core",
     "Fitted.text": "files.editing:fitted_file core",
     "Fitted.spacecraft": "files.editing:fitted_spacecraft",
-    "Verified.data": "views.verification_json:verification_json plan.flight plan.scheme core",
-    "Verified.screen": "views.verify_tables:verification_screen plan.spacecraft plan.scheme core",
+    "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
+    "Verified.screen": "views.verification:verification_screen plan core",
     "Budget.data": "views.budget_files:budget_json",
     "Budget.csv": "views.budget_files:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
@@ -109,7 +109,7 @@ def comparison_reason(compared: Comparison) -> str:
 
 def robust_data(robust: RobustComparison) -> dict[str, Any]:
     """The object of ``plan --robust --json``."""
-    from nutdamp.views.robust_json import robust_json
+    from nutdamp.views.robust import robust_json
     from nutdamp.views.robust_verdicts import robust_reason
 
     data = _decided(robust.comparison, robust.decision)

@@ -220,7 +220,7 @@ def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
     from nutdamp.montecarlo.inputs import reachable
 
     inputs, unused = reachable(spacecraft)
-    from nutdamp.views.dispersion_json import correlation_json
+    from nutdamp.views.dispersion import correlation_json
 
     return {
         "inputs": [entry._asdict() for entry in inputs],

@@ -217,8 +217,7 @@ def _loop(spacecraft: Spacecraft) -> Iterator[RenderableType]:
 def _dispersions(spacecraft: Spacecraft) -> Iterator[RenderableType]:
     """Differences allowed between true values and the file's, and tolerances without effect on any actuator."""
     from nutdamp.montecarlo.inputs import reachable
-    from nutdamp.views.dispersion_tables import unused_table
-    from nutdamp.views.tolerance_tables import in_words, size_text
+    from nutdamp.views.tolerances import in_words, size_text, unused_table
 
     inputs, unused = reachable(spacecraft)
     alike: dict[tuple[str, str, str], list[str]] = {}

@@ -15,7 +15,7 @@ from nutdamp.files.samples import column, cone_columns
 from nutdamp.files.tabular import csv_text, number
 from nutdamp.montecarlo.statistics import Array
 from nutdamp.montecarlo.study import CONFIDENCE
-from nutdamp.views.dispersion_json import (
+from nutdamp.views.dispersion import (
     angles_json,
     cones_json,
     correlation_json,

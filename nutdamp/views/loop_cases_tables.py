@@ -15,7 +15,7 @@ from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.montecarlo.statistics import Exact
 from nutdamp.views import verdicts
-from nutdamp.views.dispersion_tables import (
+from nutdamp.views.dispersion import (
     PERCENTS,
     add_angles,
     angles_note,
@@ -23,14 +23,12 @@ from nutdamp.views.dispersion_tables import (
     bounded,
     bounded_heads,
     cone_lines,
-    inputs_table,
     requirement_lines,
-    unused_table,
 )
 from nutdamp.views.layout import columns
 from nutdamp.views.loop_tables import described
 from nutdamp.views.text import MISSING, degrees, duration
-from nutdamp.views.tolerance_tables import MOST_ROWS, in_words, size_text
+from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
 NAMES = {
     "settled": ("first quiet, s", 1.0),

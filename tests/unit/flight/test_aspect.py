@@ -262,7 +262,7 @@ def test_no_dispersed_case_complies_where_a_cone_is_broken() -> None:
 @pytest.mark.deep
 def test_disperse_shows_one_angle_of_the_nominal_case_and_no_warning_of_numpy(run: Run) -> None:
     """Thrust alone is dispersed: derivatives are of the pulses, and not of body or rates."""
-    shown = run("disperse", "-", "--scheme", "one-pulse", "--samples", "2", stdin=BROKEN)
+    shown = run("disperse", "-", "--scheme", "one-pulse", "--samples", "2", "-v", stdin=BROKEN)
     text = " ".join(shown.stdout.split())
     assert "ComplexWarning" not in shown.stderr
     least, largest = re.findall(r"axis from Star ✗ (\S+) deg at \S+ s to (\S+) deg", text)[0]
