@@ -229,14 +229,14 @@ class Budget:
 
     def to_dict(self) -> dict[str, Any]:
         """The object of ``budget --json``."""
-        from nutdamp.views.budget_files import budget_json
+        from nutdamp.views.budget import budget_json
 
         return finite(budget_json(self.core))
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the file of ``budget --csv``; raises CannotWrite."""
         from nutdamp.files.tabular import write_whole
-        from nutdamp.views.budget_files import budget_csv
+        from nutdamp.views.budget import budget_csv
 
         write_whole(units.path("path", path), budget_csv(self.core))
 
@@ -392,7 +392,7 @@ class Fitted:
 
     def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
         """The object of ``fit --json``; with the forecast ``ahead``, that of ``fit --next --json``."""
-        from nutdamp.views.fit_json import fit_json
+        from nutdamp.views.fit import fit_json
 
         return finite(fit_json(self.core, results.carried(self.core, at), ahead, self.warnings))
 

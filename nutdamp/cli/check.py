@@ -23,6 +23,7 @@ from nutdamp.cli.job import (
     set_option,
     source,
     spacecraft_argument,
+    verbose_option,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
 from nutdamp.cli.options import FILE, Aim, PlanningCommand, goal_options
@@ -44,8 +45,11 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
 @set_option
 @click.option("--json", type=FILE, help="Write derived quantities and faults.")
+@verbose_option
 @quiet_option
-def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, quiet: bool) -> None:
+def command(
+    files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
+) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
 
@@ -55,9 +59,9 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
     for name in files or (None,):
         doubts: list[Fault] = []
         try:
-            report, screen = _looked_into(FileInput(name, settings), remarks(quiet), doubts)
+            report, screen = _looked_into(FileInput(name, settings), remarks(quiet), doubts, verbose)
         except (FaultyFile, CannotRead) as wrong:
-            from nutdamp.views.check_json import failed_json
+            from nutdamp.views.check import failed_json
 
             tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
@@ -69,7 +73,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
             if len(files) > 1:
                 click.echo()
     if json is not None:
-        from nutdamp.views.check_json import check_json
+        from nutdamp.views.check import check_json
 
         try:
             deliver([(json, lambda: check_json(reports))])
@@ -81,19 +85,18 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
 
 
 def _looked_into(
-    given: FileInput, remark: Callable[[str], None], doubts: list[Fault]
+    given: FileInput, remark: Callable[[str], None], doubts: list[Fault], verbose: bool
 ) -> tuple[dict[str, Any], RenderableType]:
     """Results of the check of a file, for JSON and for the screen; warnings are added to ``doubts``.
 
     Raises CannotRead, and FaultyFile, also for faults that appear only in derived quantities.
     """
     from nutdamp.errors import Fault, FaultyFile, NutdampError
-    from nutdamp.views.check_json import checked_json
-    from nutdamp.views.check_tables import check_screen
+    from nutdamp.views.check import check_screen, checked_json
 
     spacecraft = parsed(source(given.path, remark), given.settings, remark, doubts=doubts)
     try:
-        return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft)
+        return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft, verbose=verbose)
     except NutdampError as wrong:
         raise FaultyFile([Fault(given.path or DEFAULT_FILE, 1, 1, "", str(wrong))]) from wrong
 
@@ -149,8 +152,7 @@ def _verify_loop(job: Job, json: str | None) -> None:
     """The closed loop of the file against the same by DOP853."""
     from nutdamp.cli.job import working
     from nutdamp.control_loop.evaluation import verify_loop
-    from nutdamp.views.loop_json import verified_json
-    from nutdamp.views.loop_tables import verification_screen
+    from nutdamp.views.loop import verification_screen, verified_json
 
     require_loop(job.spacecraft)
     with working("verifying", quiet=job.quiet):

@@ -55,8 +55,7 @@ def disperse_loop(job: Job, requested: Requested) -> None:
     require_dispersions(job.spacecraft)
 
     from nutdamp.control_loop.dispersion import loop_study
-    from nutdamp.views.loop_cases import loop_cases_json
-    from nutdamp.views.loop_cases_tables import loop_cases_screen
+    from nutdamp.views.loop_cases import loop_cases_json, loop_cases_screen
 
     study = loop_study(job.spacecraft, requested.until, seed=requested.seed)
     if requested.case is not None:
@@ -107,8 +106,7 @@ def _flown(study: LoopStudy, requested: Requested, quiet: bool) -> tuple[LoopRes
 
 def _one(job: Job, study: LoopStudy, case: int, json: str | None) -> None:
     """Show a single case."""
-    from nutdamp.views.loop_cases import loop_case_json
-    from nutdamp.views.loop_cases_tables import loop_case_screen
+    from nutdamp.views.loop_cases import loop_case_json, loop_case_screen
 
     flown = study.fly([study.case(case)])
     job.deliver([(json, partial(loop_case_json, study, case, flown))], partial(loop_case_screen, study, case, flown))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nutdamp.cli.job import FileInput, Output, begin, quiet_option, spacecraft_argument, working
+from nutdamp.cli.job import FileInput, Output, begin, quiet_option, spacecraft_argument, verbose_option, working
 from nutdamp.cli.options import FILE, UnitType
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.option("--json", type=FILE, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=FILE, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
+@verbose_option
 @quiet_option
 def command(
     telemetry: str,
@@ -38,6 +39,7 @@ def command(
     json: str | None,
     plot: str | None,
     ahead: bool,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
@@ -61,8 +63,7 @@ def command(
     from nutdamp.files.editing import fitted_text, notes
     from nutdamp.files.schedules import read_pulses
     from nutdamp.files.telemetry import read_telemetry
-    from nutdamp.views.fit_json import fit_json
-    from nutdamp.views.fit_tables import fit_screen
+    from nutdamp.views.fit import fit_json, fit_screen
 
     fired = None
     if schedule is not None:
@@ -80,7 +81,7 @@ def command(
         (json, partial(fit_json, estimate, now, prospects, read)),
         (plot, partial(_picture, estimate)),
     ]
-    job.deliver(outputs, partial(fit_screen, estimate, at, prospects))
+    job.deliver(outputs, partial(fit_screen, estimate, at, prospects, verbose=verbose))
 
 
 def _outlook(estimate: Fit, at: float, quiet: bool) -> Outlook:

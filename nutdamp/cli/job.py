@@ -65,6 +65,7 @@ loop:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
 
 

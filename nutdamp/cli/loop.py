@@ -16,6 +16,7 @@ from nutdamp.cli.job import (
     require_dispersions,
     require_loop,
     spacecraft_argument,
+    verbose_option,
 )
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import FILE, Angles, Count, Direction, EndTime, UnitType
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 @click.option("--track", type=FILE, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=FILE, help="Write firings, dead band, margins.")
 @click.option("--plot", type=FILE, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
+@verbose_option
 @quiet_option
 def command(
     spacecraft: FileInput,
@@ -53,6 +55,7 @@ def command(
     track: str | None,
     json: str | None,
     plot: str | None,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
@@ -69,8 +72,7 @@ def command(
     from nutdamp.cli.job import working
     from nutdamp.control_loop.evaluation import loop_of
     from nutdamp.files.tabular import write_track
-    from nutdamp.views.loop_json import loop_json
-    from nutdamp.views.loop_tables import loop_screen, stopped, warnings
+    from nutdamp.views.loop import loop_json, loop_screen, stopped, warnings
     from nutdamp.views.pulses import pulse_table
 
     with working("flying", quiet=quiet):
@@ -84,7 +86,7 @@ def command(
         (json, lambda: loop_json(plan)),
         (plot, partial(_picture, plan)),
     ]
-    job.deliver(outputs, lambda: loop_screen(plan))
+    job.deliver(outputs, lambda: loop_screen(plan, verbose=verbose))
     if run.stop.fault:
         say(f"nutdamp: the loop was stopped {stopped(run)}")
     leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
@@ -110,6 +112,7 @@ def _picture(plan: LoopPlan) -> Figure:
 @click.option("--csv", type=FILE, help="Write a row for each two thresholds.")
 @click.option("--json", type=FILE, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+@verbose_option
 @quiet_option
 def budget_command(
     spacecraft: FileInput,
@@ -119,6 +122,7 @@ def budget_command(
     csv: str | None,
     json: str | None,
     plot: str | None,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.
@@ -141,8 +145,7 @@ def budget_command(
 
     from nutdamp.api import budget
     from nutdamp.cli.job import progress
-    from nutdamp.views.budget_files import budget_csv
-    from nutdamp.views.budget_tables import budget_screen
+    from nutdamp.views.budget import budget_csv, budget_screen
 
     with progress("following cycles", max(len(thresholds), 1), quiet=quiet) as step:
         result = budget(job.spacecraft, thresholds, largest=largest, seed=seed, progress=step)
@@ -152,7 +155,7 @@ def budget_command(
         (json, result.to_dict),
         (plot, partial(_budget_picture, core)),
     ]
-    job.deliver(outputs, lambda: budget_screen(core))
+    job.deliver(outputs, lambda: budget_screen(core, verbose=verbose))
     leave(infeasible=not core.feasible, missed=core.meets_requirement is False)
 
 

@@ -18,6 +18,7 @@ from nutdamp.cli.job import (
     progress,
     quiet_option,
     spacecraft_argument,
+    verbose_option,
 )
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import FILE, Aim, EndTime, PlanningCommand, goal_options
@@ -108,6 +109,7 @@ PICTURED = 100_000
 @click.option("--json", type=FILE, help="Write pulses, how both models end, and extremes.")
 @plot_options(FIGURES)
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
+@verbose_option
 @quiet_option
 def command(
     spacecraft: FileInput,
@@ -122,6 +124,7 @@ def command(
     plot: str | None,
     figure: str,
     drawn: bool,
+    verbose: bool,
     quiet: bool,
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
@@ -140,7 +143,7 @@ def command(
     from nutdamp.files.tabular import write_track
     from nutdamp.planning.decision import Simulation
     from nutdamp.views.decisions import verdict
-    from nutdamp.views.simulation_json import simulation_json
+    from nutdamp.views.simulation import simulation_json
     from nutdamp.views.verdicts import model_warnings
 
     body, pulses = plan.spacecraft, plan.pulses
@@ -155,7 +158,7 @@ def command(
         (json, lambda: simulation_json(simulation, verdict(simulation.decision))),
         (plot, partial(_picture, simulation, track, figure)),
     ]
-    job.deliver(outputs, partial(_screen, simulation), *[partial(_drawing, simulation, track)] * drawn)
+    job.deliver(outputs, partial(_screen, simulation, verbose), *[partial(_drawing, simulation, track)] * drawn)
     leave(missed=simulation.decision.met is False and len(simulation.flown.schedule) == len(pulses))
 
 
@@ -166,10 +169,10 @@ def _picture(simulation: Simulation, track: Track | None, figure: str) -> Figure
     return overview.flight_figure(figure, simulation.shown, track)
 
 
-def _screen(simulation: Simulation) -> RenderableType:
-    from nutdamp.views.simulate_tables import simulation_screen
+def _screen(simulation: Simulation, verbose: bool) -> RenderableType:
+    from nutdamp.views.simulation import simulation_screen
 
-    return simulation_screen(simulation)
+    return simulation_screen(simulation, verbose=verbose)
 
 
 def _drawing(simulation: Simulation, track: Track | None) -> RenderableType:

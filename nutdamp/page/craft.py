@@ -10,15 +10,22 @@ import numpy as np
 from nutdamp.flight.propagation import Flight
 from nutdamp.page.document import Block, FactList, Prose, Sheet, facts_of, sheet_of
 from nutdamp.physics import attitude
+from nutdamp.planning import capability
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
-from nutdamp.views import survey
-from nutdamp.views.check_tables import channel_table, disturbance_table, sun_pulse_facts, thrust_changes, valve_table
+from nutdamp.views.check import (
+    channel_table,
+    cold_text,
+    disturbance_table,
+    sun_pulse_facts,
+    tank_table,
+    valve_table,
+)
 from nutdamp.views.end_tables import FRAME_N, angle_names, angle_texts
 from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.tables import Heading
-from nutdamp.views.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, vector
+from nutdamp.views.text import MISSING, RPM, degrees, digits, duration, mass, moment, quantity, sentence, vector
 from nutdamp.views.verdicts import exact_percent
 
 
@@ -28,12 +35,17 @@ def spacecraft_blocks(body: Spacecraft) -> Iterator[Block]:
     if body.channels:
         yield thruster_sheet(body)
         steps = "Channels, and the nutation that their shortest and longest pulse takes"
-        yield sheet_of(steps, channel_table(body))
-    if survey.acting(body):
-        yield sheet_of("Valves: what the shortest and the longest command of each channel give", valve_table(body))
-    yield from map(Prose, thrust_changes(body))
+        yield sheet_of(steps, channel_table(body).screen("screen"))
+    if capability.acting(body):
+        yield sheet_of(
+            "Valves: what the shortest and the longest command of each channel give", valve_table(body).screen("screen")
+        )
+    if body.cold is not None:
+        yield Prose(sentence(cold_text(body)))
+    if body.tank is not None:
+        yield sheet_of("Tank", tank_table(body.tank).screen("screen"))
     if body.disturbances:
-        yield sheet_of("Disturbances, and what each does alone", disturbance_table(body))
+        yield sheet_of("Disturbances, and what each does alone", disturbance_table(body).screen("screen"))
 
 
 def spacecraft_facts(

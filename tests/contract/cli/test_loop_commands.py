@@ -98,7 +98,7 @@ def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, s
     stopped = next(line for line in screen.stdout.splitlines() if line.startswith("Stopped"))
     checked = run("check", file, "--set", setting)
     assert checked.returncode == 0
-    warning = "".join(flat(checked.stdout).partition("Warning: loop")[1:]).partition(" the nutation")[0]
+    warning = "".join(flat(checked.stdout).partition("warning: loop")[1:]).partition(" the nutation")[0]
     wired = "channel" if "faults" in setting else "sensor"
     check_text(f"loop.wired-{wired}", "\n".join([screen.stderr, stopped, warning]))
     assert json.loads((tmp_path / "loop.json").read_text())["meets_requirement"] is False
@@ -109,7 +109,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
     screen = run("loop", file, *late)
     assert (screen.returncode, screen.stdout) == (3, "")
     check_text("loop.refused-too-late", screen.stderr)
-    assert "Warning: the loop does not damp" in flat(run("check", file, *late).stdout)
+    assert "warning: the loop does not damp" in flat(run("check", file, *late).stdout)
     margins = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
     assert {each["damps"] for each in margins} == {False}
     assert margins[0]["delay_margin_s"] < 0.0

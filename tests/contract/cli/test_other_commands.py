@@ -21,8 +21,8 @@ from support.process import Run
 from nutdamp import __version__, errors
 from nutdamp.cli.main import COMMANDS, group
 from nutdamp.cli.options import FileName
+from nutdamp.planning import capability
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import survey
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -100,14 +100,14 @@ def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
 
 
 def test_check_goes_on_after_what_turns_out_late(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spin_axis, problem = survey.spin_axis, "the motion changes too fast to be integrated"
+    spin_axis, problem = capability.spin_axis, "the motion changes too fast to be integrated"
 
-    def late(spacecraft: Spacecraft) -> survey.SpinAxis:
+    def late(spacecraft: Spacecraft) -> capability.SpinAxis:
         if spacecraft.name == "Late":
             raise errors.Infeasible(problem)
         return spin_axis(spacecraft)
 
-    monkeypatch.setattr(survey, "spin_axis", late)
+    monkeypatch.setattr(capability, "spin_axis", late)
     written(tmp_path, good_yaml=GOOD, late_yaml=GOOD.replace("Good", "Late"))
     ended = call(run, "check late.yaml good.yaml --json check.json")
     assert (ended.returncode, ended.stderr) == (2, f"late.yaml:1:1: {problem}\n")

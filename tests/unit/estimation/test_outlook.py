@@ -22,7 +22,7 @@ from nutdamp.estimation import forecast
 from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.planning import decision
-from nutdamp.views.fit_tables import _table, advice, fit_screen
+from nutdamp.views.fit import advice, estimate_table, fit_screen
 
 SPIN, LENGTH = math.pi, 30.0
 
@@ -86,8 +86,10 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
         return Estimate("x", f"{value:g} ± {sigma:g}", "m", 1.0, value, sigma, 1.0, 0.5)
 
     pairs = ((1.23456789, 1e-4), (1.23456789, 2.0), (1.23456789, 1.2), (0.0, 0.1), (1e-9, 1.0), (1.0, math.inf))
-    check_text("estimation.digits", shown(_table(tuple(row(*pair) for pair in pairs))))
-    (scaled,) = shown(_table((Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3),))).splitlines()[-1:]
+    check_text("estimation.digits", shown(estimate_table([row(*pair) for pair in pairs]).screen("screen")))
+    (scaled,) = shown(
+        estimate_table([Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3)]).screen("screen")
+    ).splitlines()[-1:]
     assert scaled.split()[:6] == ["x", "12.3", "0.1", "mm", "12", "+0.3"]
 
 
