@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -142,7 +144,7 @@ class MissingExtra(NutdampError):
         return f"{self.purpose} needs the extra '{self.extra}': pip install 'nutdamp[{self.extra}]'"
 
 
-class MissingPandas(NutdampError):
+class MissingPandas(NutdampError, ImportError):
     """pandas is needed and not installed."""
 
     def __str__(self) -> str:
@@ -172,3 +174,11 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 def span(least: float, most: float, unit: str) -> str:
     """``0.2 s to 5 s``, or ``at least 0.2 s`` where there is no ``most``."""
     return f"at least {least:.4g} {unit}" if math.isinf(most) else f"{least:.4g} {unit} to {most:.4g} {unit}"
+
+
+def warn(text: str) -> None:
+    """Python warning at the line that called the library."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("nutdamp."):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, stacklevel=level)

@@ -69,6 +69,9 @@ KINDS: dict[str, Kind] = {
 LARGEST = 1e15
 """Largest magnitude in SI: nothing physical is larger, and results of larger values could overflow."""
 
+LARGEST_SEED = 2**64 - 1
+"""Largest seed of random numbers."""
+
 _QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 _TURNS = re.compile(r"k?hz|rev.*|r/(s|min)|cps|turns?.*", re.IGNORECASE)
 
@@ -199,6 +202,20 @@ def end_of_flight(value: Any) -> float:
     if is_number(value) and value > 0.0:
         return float(value)
     raise BadRequest(f"until = {as_given(value)}: expected a time after t = 0, in s")
+
+
+def seed(value: Any) -> int:
+    """Seed of random numbers; raises BadRequest."""
+    if not 0 <= instance("seed", value, int, "a whole number") <= LARGEST_SEED:
+        raise BadRequest(f"seed = {value}: expected a whole number from 0 to 2**64 - 1")
+    return int(value)
+
+
+def tilt(value: Any, name: str = "largest") -> float:
+    """An angle in rad between 0 and a right angle; raises BadRequest."""
+    if is_number(value) and 0.0 < value < 0.5 * math.pi:
+        return float(value)
+    raise BadRequest(f"{name} = {as_given(value)}: expected an angle in rad between 0 and a right angle")
 
 
 def rows(value: Any) -> int:

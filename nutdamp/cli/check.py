@@ -8,43 +8,34 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
+from nutdamp.cli.flown import flown_options, plan_or_read
 from nutdamp.cli.job import (
     DEFAULT_FILE,
     FileInput,
     Job,
-    begin,
     deliver,
     expect_outputs,
-    parsed,
     quiet_option,
-    remarks,
-    require_loop,
     set_option,
-    source,
     spacecraft_argument,
     verbose_option,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
-from nutdamp.cli.options import FILE, Aim, PlanningCommand, goal_options
-from nutdamp.cli.screen import say, show
-from nutdamp.errors import printable
-from nutdamp.schemes.catalogue import Options
+from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, goal_options
+from nutdamp.cli.screen import console, say, show
+from nutdamp.errors import nearest, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rich.console import RenderableType
 
     from nutdamp.errors import Fault
     from nutdamp.files.overrides import Setting
-    from nutdamp.views.guide import Topic
 
 
 @click.command("check")
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
 @set_option
-@click.option("--json", type=FILE, help="Write derived quantities and faults.")
+@click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @verbose_option
 @quiet_option
 def command(
@@ -52,92 +43,63 @@ def command(
 ) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
+    from nutdamp.views.check import check_json, check_screen, checked, failed_json
 
-    silent = expect_outputs(*(FileInput(file) for file in files or (None,)), json=json)
+    inputs = [FileInput(file, settings) for file in files or (None,)]
+    silent = expect_outputs(*(given.read for given in inputs), json=json)
+    remark = (lambda _: None) if quiet else say
     reports: list[dict[str, Any]] = []
     failures: set[int] = set()
-    for name in files or (None,):
+    for given in inputs:
         doubts: list[Fault] = []
         try:
-            report, screen = _looked_into(FileInput(name, settings), remarks(quiet), doubts, verbose)
+            result = checked(given.source(remark), given.path, doubts, lambda doubt: say(doubt.as_warning))
         except (FaultyFile, CannotRead) as wrong:
-            from nutdamp.views.check import failed_json
-
             tell(wrong)
             failures.add(BAD_INPUT if isinstance(wrong, FaultyFile) else UNREADABLE)
-            reports.append(failed_json(name, wrong, doubts))
+            reports.append(failed_json(given.path, wrong, doubts))
             continue
-        reports.append(report)
+        reports.append(result.to_dict())
         if not silent:
-            show(screen)
+            show(check_screen(result.spacecraft, verbose=verbose))
             if len(files) > 1:
                 click.echo()
-    if json is not None:
-        from nutdamp.views.check import check_json
-
-        try:
-            deliver([(json, lambda: check_json(reports))])
-        except CannotWrite as wrong:
-            tell(wrong)
-            failures.add(UNREADABLE)
+    try:
+        deliver([(json, lambda: check_json(reports))])
+    except CannotWrite as wrong:
+        tell(wrong)
+        failures.add(UNREADABLE)
     if failures:
         sys.exit(max(failures))
 
 
-def _looked_into(
-    given: FileInput, remark: Callable[[str], None], doubts: list[Fault], verbose: bool
-) -> tuple[dict[str, Any], RenderableType]:
-    """Results of the check of a file, for JSON and for the screen; warnings are added to ``doubts``.
-
-    Raises CannotRead, and FaultyFile, also for faults that appear only in derived quantities.
-    """
-    from nutdamp.errors import Fault, FaultyFile, NutdampError
-    from nutdamp.views.check import check_screen, checked_json
-
-    spacecraft = parsed(source(given.path, remark), given.settings, remark, doubts=doubts)
-    try:
-        return checked_json(given.path, spacecraft, doubts), check_screen(spacecraft, verbose=verbose)
-    except NutdampError as wrong:
-        raise FaultyFile([Fault(given.path or DEFAULT_FILE, 1, 1, "", str(wrong))]) from wrong
-
-
-@click.command("verify", cls=PlanningCommand)
+@click.command("verify", cls=SessionCommand)
 @spacecraft_argument
 @flown_options("Verify")
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
-@click.option("--json", type=FILE, help="Write methods, differences and error budget.")
+@click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
 @quiet_option
-def verify_command(
-    spacecraft: FileInput,
-    flown: FlownChoice,
-    options: Options,
-    aim: Aim,
-    looped: bool,
-    json: str | None,
-    quiet: bool,
-) -> None:
+def verify_command(job: Job, looped: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
     Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
     DOP853 and Basilisk are not confirmed: exit status 3.
     """
-    if looped and flown != (None, None, None):
+    if looped and any(job.flown):
         raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, json=json)
+    job.begin()
     if looped:
-        _verify_loop(job, json)
+        _verify_loop(job)
         return
 
     from nutdamp.api import verify
-    from nutdamp.cli.job import working
-    from nutdamp.views.verify_tables import verification_screen
 
-    plan = plan_or_read(job, flown, options)
-    with working("verifying", quiet=quiet):
+    plan = plan_or_read(job)
+    with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    job.deliver([(json, verified.to_dict)], lambda: verification_screen(job.spacecraft, plan.scheme, core))
+    job.deliver(verified)
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")
@@ -148,16 +110,13 @@ def verify_command(
     leave(failed=bool(core.disagreeing or core.drifting), infeasible=not core.checks)
 
 
-def _verify_loop(job: Job, json: str | None) -> None:
+def _verify_loop(job: Job) -> None:
     """The closed loop of the file against the same by DOP853."""
-    from nutdamp.cli.job import working
-    from nutdamp.control_loop.evaluation import verify_loop
-    from nutdamp.views.loop import verification_screen, verified_json
+    from nutdamp.api import verify_loop
 
-    require_loop(job.spacecraft)
-    with working("verifying", quiet=job.quiet):
+    with job.working("verifying"):
         comparison = verify_loop(job.spacecraft)
-    job.deliver([(json, lambda: verified_json(comparison))], lambda: verification_screen(comparison))
+    job.deliver(comparison)
     if comparison.missing:
         say(f"nutdamp: DOP853 did not fly the loop to its end, so it is not confirmed: {comparison.missing}")
         leave(infeasible=True)
@@ -197,13 +156,12 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
     if file != STDOUT and check_place(file).exists() and not force:
         raise CannotWrite(file, "it is already there; --force replaces it")
     write_whole(file, text)
-    if file != STDOUT:
-        remarks(quiet)(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
+    if file != STDOUT and not quiet:
+        say(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
 
 
 def _list() -> None:
     """Print the examples."""
-    from nutdamp.cli.screen import show
     from nutdamp.files.reader import example_names, example_subject
     from nutdamp.views.explain_tables import examples_screen
 
@@ -213,7 +171,6 @@ def _list() -> None:
 
 def _known(name: str) -> str:
     """The ``name`` if there is such an example; a usage error suggests the nearest one to a misspelt name."""
-    from nutdamp.errors import nearest
     from nutdamp.files.reader import example_names
 
     names = example_names()
@@ -228,7 +185,7 @@ def _known(name: str) -> str:
 
 
 @click.command("schema")
-@click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
+@click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 def schema_command(output: str) -> None:
     """Print the JSON Schema of the spacecraft file, for editors that complete and check YAML."""
     from nutdamp.files.reader import json_schema
@@ -238,38 +195,44 @@ def schema_command(output: str) -> None:
 
 
 def _completed_topics(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG001
-    from nutdamp.views.guide import SUMMARIES
+    from nutdamp.views.guide import NAMES, page_or_topic
 
-    topics = [topic for _, group in SUMMARIES for topic in group]
-    return [CompletionItem(name, help=text) for name, text in topics if name.startswith(incomplete)]
+    return [CompletionItem(name, help=page_or_topic(name).summary) for name in NAMES if name.startswith(incomplete)]
 
 
 @click.command("explain")
 @click.argument("topic", nargs=-1, metavar="[TOPIC]", shell_complete=_completed_topics)
 def explain_command(topic: tuple[str, ...]) -> None:
-    """Explain a scheme, an equation of the sources, the motion, or the keys of the spacecraft file.
+    """Explain a page of the guide, a scheme, an equation, a heading of a table, or a key of the spacecraft file.
 
-    TOPIC is a scheme; a number such as 17, K7 or 24.4, or `equations` for all; `nutation`, `dissipation`, `figures`;
-    `file`, `file.thrusters`, `units`. Without it the topics are listed.
+    TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
+    or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain_tables
+    from nutdamp.views import explain_tables, guide, topics
 
-    requested = " ".join(topic)
-    if not requested.strip():
-        show(explain_tables.topics_screen())
-    elif requested.strip().casefold() == "equations":
-        show(explain_tables.equations_screen())
+    requested = " ".join(topic).strip()
+    if not requested:
+        _read(explain_tables.topics_screen())
+    elif requested.casefold() == guide.OVERVIEW:
+        _read(explain_tables.equations_screen())
     else:
-        show(explain_tables.topic_screen(_topic(requested.strip())))
+        _read(explain_tables.topic_screen(topics.explained(requested)))
 
 
-def _topic(requested: str) -> Topic:
-    """The topic of that name; those on the spacecraft file are made from its models, which take longer to load."""
-    from nutdamp.views import guide
+def on_keyboard() -> bool:
+    """True where someone can leave a pager."""
+    return sys.stdin.isatty()
 
-    name, _, below = requested.partition(".")
-    if name.casefold() == guide.FILE:
-        from nutdamp.views.file_guide import file_topic
 
-        return file_topic(below)
-    return guide.found(requested)
+def _read(screen: RenderableType) -> None:
+    """Show a screen; where it is longer than the terminal, in a pager."""
+    shown = console()
+    if not (shown.is_terminal and on_keyboard()):
+        show(screen)
+        return
+    with shown.capture() as captured:
+        shown.print(screen)
+    if captured.get().count("\n") < shown.height:
+        show(screen)
+    else:
+        click.echo_via_pager(captured.get())

@@ -6,17 +6,16 @@ import shlex
 
 import click
 
-from nutdamp.cli.flown import FlownChoice, flown_options, plan_or_read
-from nutdamp.cli.job import FileInput, begin, deliver, expect_outputs, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.flown import flown_options, plan_or_read
+from nutdamp.cli.job import FileInput, Job, deliver, expect_outputs, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, Aim, EndTime, NameType, PlanningCommand, goal_options
+from nutdamp.cli.options import END, FILE, OUTPUT, NameType, SessionCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.errors import printable
-from nutdamp.schemes.catalogue import Options
-from nutdamp.views.exchange import FORMATS, expect_possible, export_text, lacking
+from nutdamp.views.exchange import FORMATS, expect_possible, lacking
 
 
-@click.command("export", cls=PlanningCommand, context_settings={"allow_extra_args": True})
+@click.command("export", cls=SessionCommand, context_settings={"allow_extra_args": True})
 @spacecraft_argument
 @click.option(
     "--format",
@@ -29,40 +28,30 @@ from nutdamp.views.exchange import FORMATS, expect_possible, export_text, lackin
 @goal_options
 @click.option(
     "--until",
-    type=EndTime(),
+    type=END,
     help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
 )
-@click.option("-o", "--output", type=FILE, default="-", help="Where to write it; default standard output.")
+@click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 @quiet_option
 @click.pass_context
-def command(
-    ctx: click.Context,
-    spacecraft: FileInput,
-    form: str | None,
-    xml: bool,
-    flown: FlownChoice,
-    options: Options,
-    aim: Aim,
-    until: float | None,
-    output: str,
-    quiet: bool,
-) -> None:
+def command(ctx: click.Context, job: Job, form: str | None, xml: bool, until: float | None) -> None:
     """Write a schedule in a format that other tools read.
 
     The CCSDS messages and stk need attitude.epoch and attitude.frame in the spacecraft file; opm also mass, and orbit
     for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
+    from nutdamp.api import export
     from nutdamp.planning.decision import Decision
 
-    form = _format(form, spacecraft, ctx.args)
+    form, output = _format(form, job.given, ctx.args), job.written["output"] or "-"
     notation = xml or (FORMATS[form].message and output.lower().endswith(".xml"))
     expect_possible(form, xml=notation, until=until)
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
-    plan = plan_or_read(job, flown, options)
-    deliver([(output, lambda: export_text(plan, form, xml=notation, until=until))])
+    job.begin()
+    plan = plan_or_read(job)
+    export(plan, form, output, until=until, xml=notation)
     missing = lacking(plan, form)
     if missing is not None:
-        job.doubt([missing])
+        job.doubt(missing)
     if output != "-":
         job.remark(f"wrote {printable(output)}: {plan.scheme}, {len(plan.pulses)} pulses")
     if Decision(plan).met is False:
@@ -84,12 +73,12 @@ def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
     raise click.UsageError(f"the format is an option: nutdamp export {shlex.join([*named, '--format', meant])}")
 
 
-@click.command("import")
+@click.command("import", cls=SessionCommand)
 @click.argument("given", nargs=-1, required=True, type=FILE, metavar="[apm] FILE")
-@click.option("-o", "--output", type=FILE, default="-", help="Spacecraft file to write; default standard output.")
-@click.option("--schedule", type=FILE, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
+@click.option("-o", "--output", type=OUTPUT, default="-", help="Spacecraft file to write; default standard output.")
+@click.option("--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
-def import_command(given: tuple[str, ...], output: str, schedule: str | None, quiet: bool) -> None:
+def import_command(job: Job, given: tuple[str, ...]) -> None:
     """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, in KVN).
 
     The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
@@ -99,6 +88,7 @@ def import_command(given: tuple[str, ...], output: str, schedule: str | None, qu
     *form, file = given
     if form not in ([], ["apm"]):
         raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
+    output, schedule = job.written["output"], job.written["schedule"]
     expect_outputs(file, output=output, schedule=schedule)
 
     from nutdamp.files.ccsds.read import contradictions, imported, read_apm
@@ -108,10 +98,9 @@ def import_command(given: tuple[str, ...], output: str, schedule: str | None, qu
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
     deliver([(output, lambda: text), (schedule, lambda: pulse_table(flown(body, pulses)).csv())])
-    remark = remarks(quiet)
     for entry in contents.remarks:
-        remark(f"{file}: {entry}")
+        job.remark(f"{file}: {entry}")
     for entry in contradictions(contents, body):
         say(f"{file}: warning: {entry}")
     if pulses.pulses and schedule is None:
-        remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")
+        job.remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")

@@ -1,69 +1,42 @@
-"""A command from its spacecraft file to its results: input and output files, screen, progress, interruption.
+"""A command from its spacecraft file to its results: input and output files, and what is shown.
 
 No output file may take the place of an input, or of another output.
 """
 
 from __future__ import annotations
 
-import functools
 import os
-import signal
 import stat
-import sys
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from types import FrameType
-from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar, cast
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.options import FILE, NameType
-from nutdamp.cli.screen import say, show
-from nutdamp.common.work import BudgetMonitor, watched
+from nutdamp.cli.options import FILE, Aim, Command, FileName, NameType, OutputName, options_in
+from nutdamp.cli.screen import progress, say, show, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
+from nutdamp.schemes.catalogue import Options
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
 
     from matplotlib.figure import Figure
     from rich.console import RenderableType
-    from rich.progress import Progress, TaskID
-    from rich.status import Status
 
-    from nutdamp.cli.options import Aim
     from nutdamp.errors import CannotWrite
     from nutdamp.files.overrides import Setting
+    from nutdamp.files.reader import Source
     from nutdamp.spacecraft.model import Spacecraft
 
 
 DEFAULT_FILE = "spacecraft.yaml"
 
-FIGURES = ("overview", "motion", "sphere", "history", "timeline")
+FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
-
-DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
-
-dispersions:
-  A: {normal: 2 %}
-  C: {normal: 2 %}
-  omega0: {normal: 0.1 deg/s}
-  thrust: {normal: 3 %}
-  timing: {uniform: 5 ms}"""
-"""Message for a file that should have dispersions."""
-
-LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
-
-loop:
-  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
-  law: four-pulse
-  start: 0.5 deg
-  stop: 0.05 deg"""
-"""Message for a file that should have a loop."""
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
@@ -74,6 +47,24 @@ class FileInput(NamedTuple):
 
     path: str | None
     settings: tuple[Setting, ...] = ()
+
+    @property
+    def read(self) -> str | None:
+        """The file that is read, if any."""
+        return DEFAULT_FILE if self.path is None and Path(DEFAULT_FILE).exists() else self.path
+
+    def source(self, remark: Callable[[str], None]) -> Source:
+        """The text of the file, else of the built-in example, and its name."""
+        from nutdamp.files.reader import Source, example_text
+        from nutdamp.files.yaml import read_text
+
+        path = self.read
+        if path is not None:
+            if self.path is None:
+                remark(f"reading {path}")
+            return Source(read_text(Path(path)), path, self.settings)
+        remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
+        return Source(example_text(), "example.yaml", self.settings)
 
 
 def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
@@ -98,18 +89,8 @@ set_option = click.option(
 
 
 def spacecraft_argument(command: Command) -> Command:
-    """The spacecraft file and ``--set``, gathered into ``spacecraft`` (`FileInput`) for `job.begin`."""
-
-    @functools.wraps(command)
-    def gathered(*args: Any, spacecraft: str | None, settings: tuple[Setting, ...], **parameters: Any) -> Any:
-        given = FileInput(spacecraft, settings)
-        try:
-            return command(*args, spacecraft=given, **parameters)
-        except Unsuitable as wrong:
-            raise placed(wrong, given) from None
-
-    argument = click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")
-    return cast(Command, argument(set_option(gathered)))
+    """The spacecraft file and ``--set``, of a `SessionCommand`."""
+    return click.argument("spacecraft", required=False, type=FILE, metavar="[SPACECRAFT]")(set_option(command))
 
 
 def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
@@ -118,230 +99,25 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
         return wrong
     from nutdamp.files.yaml import dotted, read_tree
 
-    text, name = source(given.path, lambda _: None)
+    text, name, _ = given.source(lambda _: None)
     place = read_tree(text, name)[0].place_of(wrong.where)
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
-def plot_options(names: tuple[str, ...]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
     which = click.option(
         "--figure", type=NameType(names), default=names[0], show_default=True, help="What --plot draws."
     )
-    where = click.option("--plot", type=FILE, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+    where = click.option("--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot).")
     return lambda command: where(which(command))
-
-
-def parsed(
-    text: tuple[str, str],
-    settings: tuple[Setting, ...],
-    remark: Callable[[str], None],
-    aim: Aim | None = None,
-    doubts: list[Fault] | None = None,
-) -> Spacecraft:
-    """The spacecraft in the text of `source`; ``aim`` replaces its goal, warnings are added to ``doubts``."""
-    from nutdamp.files.reader import read_spacecraft
-
-    def warn(doubt: Fault) -> None:
-        say(doubt.as_warning)
-        if doubts is not None:
-            doubts.append(doubt)
-
-    body = read_spacecraft(*text, settings, warn)
-    return body if aim is None else aim.applied(body, remark)
-
-
-def source(path: str | None, remark: Callable[[str], None]) -> tuple[str, str]:
-    """The text of the spacecraft file that `load` reads, and its name."""
-    from pathlib import Path
-
-    from nutdamp.files.reader import example_text
-    from nutdamp.files.yaml import read_text
-
-    if path is None and Path(DEFAULT_FILE).exists():
-        remark(f"reading {DEFAULT_FILE}")
-        path = DEFAULT_FILE
-    if path is not None:
-        return read_text(Path(path)), path
-    remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
-    return example_text(), "example.yaml"
-
-
-def require_dispersions(body: Spacecraft) -> None:
-    """Raise BadRequest, with an example to write, for a spacecraft without dispersions."""
-    from nutdamp.errors import BadRequest
-
-    if body.dispersions is None:
-        raise BadRequest(DISPERSIONS)
-
-
-def require_loop(body: Spacecraft) -> None:
-    """Raise BadRequest, with an example to write, for a spacecraft without a closed loop."""
-    from nutdamp.errors import BadRequest
-
-    if body.loop is None:
-        raise BadRequest(LOOP)
-
-
-PATIENCE = 1.0
-"""Seconds that pass before a bar appears."""
-
-LONG = 10.0
-"""Seconds after which a line gives the progress, where standard error is no terminal."""
-
-
-@contextmanager
-def progress(what: str, total: int, *, quiet: bool = False) -> Iterator[Callable[[int], None]]:
-    """A function to be called now and then with the number done of ``total``.
-
-    It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
-    behind. Elsewhere one line says how far it is, after `LONG`.
-    """
-    shown = _Bar(what, total) if sys.stderr.isatty() else _ProgressLine(what, total)
-    try:
-        yield (lambda _: None) if quiet else shown.update
-    finally:
-        shown.close()
-
-
-@contextmanager
-def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show ``what`` is under way, with the search that runs and the share spent of its work budget.
-
-    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
-    """
-    if quiet or not sys.stderr.isatty():
-        yield
-        return
-    shown: list[Status] = []
-
-    def show() -> None:
-        from rich.console import Console
-
-        shown.append(Console(stderr=True).status(_Doing(what, watch)))
-        shown[0].start()
-
-    with watched() as watch:
-        timer = threading.Timer(PATIENCE, show)
-        timer.daemon = True
-        timer.start()
-        try:
-            yield
-        finally:
-            timer.cancel()
-            timer.join()
-            for status in shown:
-                status.stop()
-
-
-class _Doing:
-    """Text of ``what`` is under way, with the search that a ``watch`` sees and its progress when shown."""
-
-    def __init__(self, what: str, watch: BudgetMonitor) -> None:
-        self.what, self.watch = what, watch
-
-    def __rich__(self) -> str:
-        budget = self.watch.budget
-        if budget is None:
-            return self.what
-        return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
-
-
-class _ProgressLine:
-    """Progress where there is no terminal: one line, once, that names the share done and the time left."""
-
-    def __init__(self, what: str, total: int) -> None:
-        self.what, self.total = what, total
-        self.began, self.said = time.monotonic(), False
-
-    def update(self, done: int) -> None:
-        passed = time.monotonic() - self.began
-        if self.said or passed < LONG:
-            return
-        self.said = True
-        left = passed * (self.total - done) / max(done, 1)
-        rest = f", about {left:.0f} s left" if left > 0.0 else ""
-        say(f"{self.what}: {min(done, self.total):,} of {self.total:,} done after {passed:.0f} s{rest}")
-
-    def close(self) -> None:
-        """Do nothing: there is no bar to clear."""
-
-
-class _Bar:
-    def __init__(self, what: str, total: int) -> None:
-        self.what, self.total = what, total
-        self.began = time.monotonic()
-        self.bar: Progress | None = None
-        self.task: TaskID | None = None
-
-    def update(self, done: int) -> None:
-        passed = time.monotonic() - self.began
-        if passed < PATIENCE:
-            return
-        if self.bar is None:
-            self._open()
-        assert self.bar is not None
-        assert self.task is not None
-        rate = done / passed
-        self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
-
-    def _open(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-        self.bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=None),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self.task = self.bar.add_task(self.what, total=self.total, rate="")
-        self.bar.start()
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.stop()
-
-
-class Interruption:
-    """Request to stop a run, and the signal that made it."""
-
-    number: int | None = None
-
-    def __call__(self) -> bool:
-        """True where a stop was requested."""
-        return self.number is not None
-
-
-@contextmanager
-def stoppable() -> Iterator[Interruption]:
-    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run can end in order.
-
-    A second Ctrl-C interrupts at once.
-    """
-    stop = Interruption()
-
-    def ask(number: int, _: FrameType | None) -> None:
-        if stop() and number == signal.SIGINT:
-            raise KeyboardInterrupt
-        stop.number = number
-
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 STANDARD = "-"
 """File name that means standard input or standard output."""
 
 
-def expect_outputs(*read: FileInput | str | None, **written: str | Sequence[str] | None) -> bool:
+def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> bool:
     """True where an output file is standard output, so that nothing else may go there.
 
     A usage error where an output, given by its option, is one of the files ``read`` or another output, under whatever
@@ -358,23 +134,14 @@ def expect_outputs(*read: FileInput | str | None, **written: str | Sequence[str]
     taken: dict[Hashable, str] = {}
     if not standard:
         taken[_identity(STANDARD, 1)] = "standard output goes to this file"
-    for given in read:
-        path = _path_of(given)
-        if path is not None:
-            taken[_identity(path, 0)] = "this command reads this file"
+    for path in filter(None, read):
+        taken[_identity(path, 0)] = "this command reads this file"
     for option, path in outputs:
         identity = _identity(path, 1)
         if identity is not None and identity in taken:
             raise click.UsageError(f"{option} {path}: {taken[identity]}; name another")
         taken[identity] = f"{option} goes to this file"
     return bool(standard)
-
-
-def _path_of(given: FileInput | str | None) -> str | None:
-    """The file that is read, if any."""
-    if not isinstance(given, FileInput):
-        return given
-    return DEFAULT_FILE if given.path is None and Path(DEFAULT_FILE).exists() else given.path
 
 
 def _identity(path: str, standard: int) -> Hashable:
@@ -389,70 +156,145 @@ def _identity(path: str, standard: int) -> Hashable:
     return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None
 
 
-File: TypeAlias = "str | bytes | Callable[[IO[bytes]], object]"
-"""Content that `write_whole` takes."""
+Content: TypeAlias = "str | bytes | Callable[[IO[bytes]], object] | dict[str, Any] | Figure"
+"""Content of a file: text or what writes it, dict for JSON, figure."""
 
-Output = tuple[str | None, Callable[[], "File | dict[str, Any] | Figure"]]
-"""Path of a file to write, if one is requested, and the function of its content: dict for JSON, figure, or text."""
+Files = dict[str, Callable[[], Content]]
+"""Content of files by their options."""
 
+Output = tuple[str | None, Callable[[], Content]]
+"""Path of a file to write, if one is requested, and the function of its content."""
 
 UNDER_WAY = "nutdamp.cli.job"
 """Key of the JSON file and the spacecraft of the job that has begun, in the context of a command line."""
 
+KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))
+"""Options of files that a result writes, and the views that they hold."""
 
-class Job(NamedTuple):
-    """The spacecraft that a command works on, text and name of its file; where remarks go; ``silent``: no screens."""
 
-    spacecraft: Spacecraft
-    source: tuple[str, str]
-    remark: Callable[[str], None]
-    silent: bool
+class FlownChoice(NamedTuple):
+    """Source of the pulses that a command flies: the plan of a ``scheme``, a ``schedule`` file, the command blocks of a
+    file, else the recommended plan.
+    """
+
+    scheme: str | None = None
+    schedule: str | None = None
+    blocks: str | None = None
+
+
+@dataclass
+class Job:
+    """Request of a command line, and from `begin` on the ``spacecraft``, its ``source``, and ``silent``: no screens.
+
+    ``read``: files; ``written``: files by their options; ``figure``: the picture of ``plot``, None for the only one;
+    ``usual`` is its default.
+    """
+
+    given: FileInput
+    read: tuple[str | None, ...]
+    written: dict[str, str | None]
+    flown: FlownChoice
+    options: Options
+    aim: Aim
+    figure: str | None
+    usual: str | None
     quiet: bool
+    spacecraft: Spacecraft = field(init=False)
+    source: Source = field(init=False)
+    silent: bool = field(init=False)
+
+    def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
+        """Check the files of the command line and load its spacecraft, before any work.
+
+        ``folder``: files that ``--schedules`` may write. Raises as `expect_outputs` and `Source.read` do.
+        """
+        self.silent = expect_outputs(self.given.read, *self.read, **self.written, schedules=[*folder])
+        self._expect_picture()
+        self.source = self.given.source(self.remark)
+        body = self.source.read(lambda doubt: say(doubt.as_warning))
+        self.spacecraft = self.aim.applied(body, self.remark) if any(self.aim) else body
+        from nutdamp.files.tabular import check_place
+
+        for path in filter(None, self.written.values()):
+            check_place(path)
+        context = click.get_current_context(silent=True)
+        if context is not None and self.written.get("json") is not None:
+            context.meta[UNDER_WAY] = self.written["json"], self.spacecraft
+        return self.spacecraft
+
+    def _expect_picture(self) -> None:
+        """Refuse a picture that cannot be made before the work; a usage error for a figure without file."""
+        path = self.written.get("plot")
+        if path is not None:
+            from nutdamp.figures import image
+
+            image.ending(path)
+        elif self.figure != self.usual:
+            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
+
+    def remark(self, text: str) -> None:
+        """Print a remark on standard error, unless quiet."""
+        if not self.quiet:
+            say(text)
 
     def warn(self, warnings: Iterable[str]) -> None:
         """Print warnings about results on standard error, unless quiet."""
         for warning in warnings:
             self.remark(f"warning: {warning}")
 
-    def doubt(self, warnings: Iterable[str]) -> None:
+    def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""
         for warning in warnings:
             say(f"warning: {warning}")
 
+    def progress(self, what: str) -> AbstractContextManager[Callable[[int, int], None]]:
+        """Hook of `screen.progress`."""
+        return progress(what, quiet=self.quiet)
+
+    def working(self, what: str) -> AbstractContextManager[None]:
+        """Show that ``what`` is under way."""
+        return working(what, quiet=self.quiet)
+
     def deliver(
         self,
-        outputs: Sequence[Output],
+        result: object,
         *screens: Callable[[], RenderableType],
-        unsaved: Sequence[CannotWrite] = (),
+        more: Files | None = None,
+        files: Sequence[Output] = (),
+        unsaved: Sequence[CannotWrite | None] = (),
+        **shown: Any,
     ) -> None:
-        """`deliver`, without the screens where a file goes to standard output."""
-        deliver(outputs, *screens * (not self.silent), unsaved=unsaved)
+        """Write the files that are requested of a result, and show it, unless a file goes to standard output.
+
+        ``more``: content of files by their options, else the views of the result make it, as its screen where none is
+        given; ``shown`` are options of these views. ``files``: further ones. Raises as `deliver` does.
+        """
+        from nutdamp.common import results
+
+        contents = dict(more or {})
+        for option, what in KINDS:
+            if option not in contents and results.has(result, what):
+                names = [self.figure] if what == "figure" and self.figure is not None else []
+                contents[option] = partial(results.view, result, what, *names, **shown if what == "data" else {})
+        outputs = [(self.written.get(option), make) for option, make in contents.items()]
+        usual = screens or (partial(results.view, result, "screen", **shown),)
+        failures = [wrong for wrong in unsaved if wrong is not None]
+        deliver([*outputs, *files], *usual * (not self.silent), unsaved=failures)
 
 
-def begin(
-    given: FileInput,
-    *read: str | None,
-    aim: Aim | None = None,
-    quiet: bool = False,
-    figure: str = FIGURES[0],
-    **written: str | Sequence[str] | None,
-) -> Job:
-    """Check the files of a command line and load its spacecraft, before any work.
-
-    ``read``: further files to read; ``written``: by option, the files to write; ``plot`` is a picture, the ``figure``.
-    Raises as `expect_outputs`, `expect_picture`, `parsed` and `expect_places` do.
-    """
-    silent = expect_outputs(given, *read, **written)
-    plot = written.get("plot")
-    expect_picture(plot if isinstance(plot, str) else None, figure)
-    remark = remarks(quiet)
-    text = source(given.path, remark)
-    spacecraft = parsed(text, given.settings, remark, aim)
-    expect_places(*(path for path in written.values() if isinstance(path, str)))
-    context = click.get_current_context(silent=True)
-    if context is not None and isinstance(written.get("json"), str):
-        context.meta[UNDER_WAY] = written["json"], spacecraft
-    return Job(spacecraft, text, remark, silent, quiet)
+def job_of(command: click.Command, parameters: dict[str, Any]) -> Job:
+    """The job of a command line; the ``parameters`` that belong to it are taken from them."""
+    types = {each.name: each.type for each in command.params if each.name in parameters}
+    given = FileInput(parameters.pop("spacecraft", None), parameters.pop("settings", ()))
+    written = {name: parameters.pop(name) for name, kind in types.items() if isinstance(kind, OutputName) and name}
+    inputs = tuple(parameters[name] for name, kind in types.items() if type(kind) is FileName and name in parameters)
+    read = tuple(path for paths in inputs for path in (paths if isinstance(paths, tuple) else (paths,)))
+    flown = FlownChoice(*(parameters.pop(name, None) for name in FlownChoice._fields))
+    options = options_in(command, parameters)
+    aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
+    usual = next((str(each.default) for each in command.params if each.name == "figure"), None)
+    figure, quiet = parameters.pop("figure", None), parameters.pop("quiet", False)
+    return Job(given, read, written, flown, options, aim, figure, usual, quiet)
 
 
 def write_infeasible(context: click.Context, reason: Exception) -> None:
@@ -463,30 +305,6 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
 
     path, spacecraft = context.meta[UNDER_WAY]
     deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
-
-
-def expect_picture(path: str | None, figure: str = FIGURES[0]) -> None:
-    """Refuse a picture that cannot be made before the work; a usage error for a ``figure`` without file."""
-    if path is None:
-        if figure != FIGURES[0]:
-            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
-        return
-    from nutdamp.figures import image
-
-    image.ending(path)
-
-
-def remarks(quiet: bool) -> Callable[[str], None]:
-    """Print remarks on standard error, unless ``quiet``."""
-    return (lambda _: None) if quiet else say
-
-
-def expect_places(*paths: str) -> None:
-    """Refuse at once, not after the work, a file that cannot be written at its place."""
-    from nutdamp.files.tabular import check_place
-
-    for path in paths:
-        check_place(path)
 
 
 def deliver(
@@ -500,7 +318,7 @@ def deliver(
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
     contents = [(path, _file_of(make(), path)) for path, make in outputs if path is not None]
-    results = [make() for make in screens]
+    shown = [make() for make in screens]
     if contents:
         from nutdamp.errors import CannotWrite
         from nutdamp.files.tabular import write_whole
@@ -510,7 +328,7 @@ def deliver(
                 write_whole(path, content)
             except CannotWrite as wrong:
                 failures.append(wrong)
-    for result in results:
+    for result in shown:
         show(result)
     for failure in failures[:-1]:
         say(f"nutdamp: {failure}")
@@ -518,7 +336,7 @@ def deliver(
         raise failures[-1]
 
 
-def _file_of(content: File | dict[str, Any] | Figure, path: str) -> File:
+def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]], object]:
     if isinstance(content, dict):
         from nutdamp.files.tabular import json_text
 

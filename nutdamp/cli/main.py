@@ -10,6 +10,8 @@ import io
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -81,9 +83,37 @@ def leave(*, failed: bool = False, infeasible: bool = False, missed: bool = Fals
             sys.exit(status)
 
 
-def interruption(number: int) -> BaseException:
-    """The exception that ends a run after a signal."""
-    return Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
+class Interruption:
+    """Request to stop a run, and the signal that made it."""
+
+    number: int | None = None
+
+    def __call__(self) -> bool:
+        """True where a stop was requested."""
+        return self.number is not None
+
+
+@contextmanager
+def stoppable() -> Iterator[Interruption]:
+    """An `Interruption` set by Ctrl-C or SIGTERM, so that a run can end in order.
+
+    A second Ctrl-C interrupts at once. A KeyboardInterrupt after SIGTERM becomes `Terminated`.
+    """
+    stop = Interruption()
+
+    def ask(number: int, _: FrameType | None) -> None:
+        if stop() and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        stop.number = number
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    except KeyboardInterrupt:
+        raise Terminated() if stop.number == signal.SIGTERM else KeyboardInterrupt from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of handlers

@@ -10,13 +10,14 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
+from nutdamp import units
 from nutdamp.cli.screen import debug_option
-from nutdamp.errors import SenselessOption, nearest
+from nutdamp.errors import BadRequest, SenselessOption, Unsuitable, nearest
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, SchemeOptions, names_of
 
 if TYPE_CHECKING:
@@ -102,26 +103,37 @@ class FolderName(FileName):
 SAMPLES = 20_000
 """Default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
 
+
+class OutputName(FileName):
+    """The name of a file to write."""
+
+
 FILE = FileName()
+OUTPUT = OutputName()
 FOLDER = FolderName()
 
 
 class UnitType(ParamType[float]):
-    """A number in SI or a text with a unit, as in a spacecraft file."""
+    """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or one of ``words``."""
 
     name = "quantity"
 
-    def __init__(self, kind: str) -> None:
-        self.kind = kind
+    def __init__(
+        self, kind: str, check: Callable[[float], object] = float, problem: str = "", **words: float | str
+    ) -> None:
+        self.kind, self.check, self.problem, self.words = kind, check, problem, words
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The SI value; a usage error for anything else."""
-        from nutdamp.units import parse
-
+        """The SI value, or that of a word; a usage error for anything else."""
+        if value in self.words:
+            return self.words[value]  # type: ignore[return-value]
         try:
-            number = parse(value, self.kind, bare=True)
+            number = units.parse(value, self.kind, bare=True)
+            self.check(number)
         except ValueError as wrong:
             self.fail(str(wrong), param, ctx)
+        except BadRequest:
+            self.fail(self.problem, param, ctx)
         return Bare(number) if isinstance(value, str) and is_number(value) else number
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
@@ -129,26 +141,7 @@ class UnitType(ParamType[float]):
         return self.kind.upper()
 
 
-class EndTime(UnitType):
-    """A time after t = 0."""
-
-    def __init__(self) -> None:
-        super().__init__("time")
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The time in s; a usage error for anything else."""
-        time = super().convert(value, param, ctx)
-        if time <= 0.0:
-            self.fail("expected a time after t = 0", param, ctx)
-        return time
-
-
-class FinalSpin(UnitType):
-    """A rate, or ``keep``."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The rate in rad/s, or ``keep`` as it is."""
-        return value if value == "keep" else super().convert(value, param, ctx)
+END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
 
 
 def reading_of(value: float, kind: str, meant: str) -> str:
@@ -173,9 +166,12 @@ class Angles(NamedTuple):
 
 
 class Direction(ParamType[Angles]):
-    """Two angles with a comma between them."""
+    """Two angles with a comma between them, of which a ``check`` holds."""
 
     name = "angle,angle"
+
+    def __init__(self, check: Callable[[list[Angles]], object] = len, problem: str = "") -> None:
+        self.check, self.problem = check, problem
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Angles:
         """Both in rad; a usage error for anything else."""
@@ -185,6 +181,10 @@ class Direction(ParamType[Angles]):
         if len(parts) != 2:
             self.fail(f"{value!r} is not two angles, such as 10deg,45deg", param, ctx)
         first, second = (UnitType("angle").convert(part, param, ctx) for part in parts)
+        try:
+            self.check([Angles(first, second)])
+        except BadRequest:
+            self.fail(self.problem, param, ctx)
         return Angles(first, second)
 
 
@@ -236,8 +236,21 @@ class Grouped(click.Option):
         self.group = group
 
 
-class PlanningCommand(click.Command):
-    """A command whose help page has headings, and whose errors say where the options of the schemes are."""
+class SessionCommand(click.Command):
+    """A command whose help page has headings, and whose errors say where the options of the schemes are.
+
+    The parameters that commands share are gathered into ``job``.
+    """
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an unsuitable value of the spacecraft file is a fault with its place there."""
+        from nutdamp.cli.job import job_of, placed
+
+        ctx.params = {"job": (job := job_of(self, ctx.params)), **ctx.params}
+        try:
+            return super().invoke(ctx)
+        except Unsuitable as wrong:
+            raise placed(wrong, job.given) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The options under their headings, those without one first."""
@@ -249,7 +262,7 @@ class PlanningCommand(click.Command):
         for heading, records in groups.items():
             if records:
                 with formatter.section(heading):
-                    formatter.write_dl(records, col_max=WIDEST)
+                    formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse as click does; the error for an option of a scheme that is not taken here says where to give it."""
@@ -257,11 +270,11 @@ class PlanningCommand(click.Command):
             return super().parse_args(ctx, args)
         except click.NoSuchOption as wrong:
             name = wrong.option_name.removeprefix("--").replace("-", "_")
+            readers = SUNLIT if name == "sun" else [each for each in SCHEMES if name in names_of(SCHEMES[each].options)]
+            if not readers or all(parameter.name != "target" for parameter in self.params):
+                raise
             if name == "sun":
                 raise click.UsageError(NO_SUN, ctx) from None
-            readers = [scheme for scheme, entry in SCHEMES.items() if name in names_of(entry.options)]
-            if not readers:
-                raise
             message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
             if any(parameter.name == "schedule" for parameter in self.params):
                 message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
@@ -269,19 +282,10 @@ class PlanningCommand(click.Command):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """The goal, gathered into ``aim`` for `load`, and ``options`` of every scheme.
+    """The goal, and the options of every scheme; `Aim` and ``options`` of the job.
 
     ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
     """
-
-    @functools.wraps(command)
-    def gathered(*args: Any, with_disturbances: bool, **parameters: Any) -> Any:
-        own = parameters.pop("options", Options())
-        options = Options(**own.chosen, with_disturbances=with_disturbances)
-        aim = Aim(**{name: parameters.pop(name) for name in Aim._fields if name in parameters})
-        return command(*args, options=options, aim=aim, **parameters)
-
-    wrapped: Any = gathered
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     sun = option(
         "--sun",
@@ -295,7 +299,7 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
         *((sun,) if several else ()),
         option(
             "--spin",
-            type=FinalSpin("rate"),
+            type=UnitType("rate", keep="keep"),
             metavar="RATE|keep",
             help="Final spin rate, such as 30rpm; optimal can set it.",
         ),
@@ -306,26 +310,12 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
             help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
         ),
     ):
-        wrapped = add(wrapped)
-    return cast(Command, wrapped)
+        command = add(command)
+    return command
 
 
 def scheme_options(command: Command) -> Command:
-    """The options of all schemes, gathered into ``options``."""
-    names = [name for name, _, _ in _fields()]
-
-    @functools.wraps(command)
-    def gathered(*args: Any, **parameters: Any) -> Any:
-        taken = {name: parameters.pop(name) for name in names}
-        given = {name: value for name, value in taken.items() if value is not False}  # flags that were not given
-        try:
-            options = Options(**given)
-        except SenselessOption as wrong:
-            hint = f"--{wrong.name.replace('_', '-')}"
-            raise click.BadParameter(wrong.problem, param_hint=hint) from None
-        return command(*args, options=options, **parameters)
-
-    wrapped: Any = gathered
+    """The options of all schemes."""
     for name, field, schemes in reversed(list(_fields())):
         kind: OptionKind = field.metadata["kind"]
         settings: dict[str, Any] = {"is_flag": True} if kind.flag else {"type": _type(kind), "default": field.default}
@@ -333,14 +323,22 @@ def scheme_options(command: Command) -> Command:
             settings["show_default"] = True
         if settings.get("type") is COUNT_FROM_ONE:
             settings["metavar"] = "N"
-        wrapped = click.option(
-            f"--{name.replace('_', '-')}",
-            cls=Grouped,
-            group=f"Scheme {' and '.join(schemes)}",
-            help=field.metadata["help"],
-            **settings,
-        )(wrapped)
-    return cast(Command, wrapped)
+        group, text = f"Scheme {' and '.join(schemes)}", field.metadata["help"]
+        option = click.option(f"--{name.replace('_', '-')}", cls=Grouped, group=group, help=text, **settings)
+        command = option(command)
+    return command
+
+
+def options_in(command: click.Command, parameters: dict[str, Any]) -> Options:
+    """Options of the schemes among ``parameters``, from which they are taken; a usage error for a senseless one."""
+    known = {*SHARED, *(name for name, _, _ in _fields())}
+    names = [each.name for each in command.params if isinstance(each, Grouped) and each.name in known]
+    taken = {name: parameters.pop(name) for name in names if name is not None}
+    try:
+        return Options(**{name: value for name, value in taken.items() if value is not False})  # flags not given
+    except SenselessOption as wrong:
+        hint = f"--{wrong.name.replace('_', '-')}"
+        raise click.BadParameter(wrong.problem, click.get_current_context(), param_hint=hint) from None
 
 
 def _fields() -> Iterator[tuple[str, dataclasses.Field[Any], list[str]]]:

@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from nutdamp.cli.flown import compared_with, robust_of
-from nutdamp.cli.job import (
-    FIGURES,
-    FileInput,
-    Output,
-    begin,
-    plot_options,
-    quiet_option,
-    require_dispersions,
-    spacecraft_argument,
-)
+from nutdamp.cli.job import FIGURES, Files, Job, plot_options, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, Aim, PlanningCommand, SchemeName, goal_options, scheme_options
+from nutdamp.cli.options import OUTPUT, SchemeName, SessionCommand, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, listed, printable
-from nutdamp.schemes.catalogue import PLANNED, Options
+from nutdamp.schemes.catalogue import PLANNED
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from nutdamp.errors import CannotWrite
@@ -37,11 +27,11 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft
 
 
-SCHEMES, PRIMER = "schemes", "primer"
-"""The pictures of all plans and of the certificate; the others are of one plan."""
+PRIMER = "primer"
+"""The picture of the certificate; the others are of one plan."""
 
 
-@click.command("plan", cls=PlanningCommand)
+@click.command("plan", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
     "--scheme",
@@ -55,72 +45,53 @@ SCHEMES, PRIMER = "schemes", "primer"
 @click.option("--robust", is_flag=True, help="Cheapest plan with which enough cases comply.")
 @click.option("--nominal", is_flag=True, help="Judge nominal values alone, no dispersed cases.")
 @click.option("--timed", is_flag=True, help="Recommend pulses no command block fires, too.")
-@click.option("--csv", type=FILE, help="Write the pulses of the plan to fly.")
-@click.option("--blocks", type=FILE, help="Write its command blocks (CSV).")
-@click.option("--table", type=FILE, help="Write the comparison of schemes (CSV).")
-@click.option("--json", type=FILE, help="Write all plans and residuals.")
-@click.option("--certificate", type=FILE, help="Write the proof of the least cost (JSON).")
-@plot_options((*FIGURES, SCHEMES, PRIMER))
+@click.option("--csv", type=OUTPUT, help="Write the pulses of the plan to fly.")
+@click.option("--blocks", type=OUTPUT, help="Write its command blocks (CSV).")
+@click.option("--table", type=OUTPUT, help="Write the comparison of schemes (CSV).")
+@click.option("--json", type=OUTPUT, help="Write all plans and residuals.")
+@click.option("--certificate", type=OUTPUT, help="Write the proof of the least cost (JSON).")
+@plot_options((*FIGURES, PRIMER))
 @click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
-def command(
-    spacecraft: FileInput,
-    names: tuple[str, ...],
-    options: Options,
-    aim: Aim,
-    robust: bool,
-    nominal: bool,
-    timed: bool,
-    csv: str | None,
-    blocks: str | None,
-    table: str | None,
-    json: str | None,
-    certificate: str | None,
-    plot: str | None,
-    figure: str,
-    verbose: bool,
-    quiet: bool,
-) -> None:
+def command(job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, verbose: bool) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    one_plan, all_plans, curve = (plot if here else None for here in _pictured(figure))
-    _expect_one_scheme(names, csv=csv, plot=one_plan)
-    files = {"csv": csv, "blocks": blocks, "table": table, "json": json, "certificate": certificate, "plot": plot}
-    job = begin(spacecraft, aim=aim, quiet=quiet, figure=figure, **files)
+    figure, plot = job.figure or FIGURES[0], job.written["plot"]
+    csv, blocks, certificate = (job.written[name] for name in ("csv", "blocks", "certificate"))
+    _expect_one_scheme(names, csv=csv, plot=plot if figure in FIGURES else None)
+    body = job.begin()
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
-    if robust:
-        require_dispersions(job.spacecraft)
-    if certificate is not None or curve is not None:
-        _expect_certified(names, job.spacecraft)
 
     from nutdamp.planning.decision import decide
+    from nutdamp.spacecraft.requirements import expect_dispersions
     from nutdamp.views import verdicts
     from nutdamp.views.schemes import scheme_table
 
-    compared = compared_with(job, names, options, 0 if nominal else None, timed=timed)
-    dispersed = robust_of(job, compared, options) if robust else None
+    if robust:
+        expect_dispersions(body)
+    proofs = [path for path in (certificate, plot if figure == PRIMER else None) if path is not None]
+    if proofs:
+        _expect_certified(names, body)
+    compared = compared_with(job, names, 0 if nominal else None, timed=timed)
+    dispersed = robust_of(job, compared) if robust else None
     decided = decide(compared) if dispersed is None else dispersed.decision
     chosen = None if decided is None else decided.plan
-    for path in filter(None, () if chosen else (csv, blocks, one_plan)):
+    for path in filter(None, () if chosen else (csv, blocks, plot if figure in FIGURES else None)):
         say(f"{printable(path)} was not written: no plan is feasible")
-    proof, unproved = _certified(compared, [certificate, curve])
+    proof, unproved = _certified(compared, proofs)
     if proof is not None and proof.plan is not chosen:
         job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
-    outputs: list[Output] = [
-        (json, partial(_data, compared, decided, dispersed)),
-        (table, lambda: scheme_table(compared, chosen).csv()),
-        (all_plans, partial(_schemes_picture, compared, decided)),
-        *_outputs_of_proof(proof, certificate, curve),
-        *_outputs_of(chosen, csv, one_plan, figure),
-        *_outputs_of_blocks(compared, chosen, blocks, job.remark),
-    ]
+    result = dispersed or compared
+    more: Files = {"json": result.to_dict, "table": lambda: scheme_table(compared, chosen).csv()}
+    more |= _schedule_files(chosen, figure) | _proof_files(proof, figure)
+    more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.warn(verdicts.warnings(compared))
-    job.deliver(outputs, partial(_screen, compared, decided, dispersed, verbose), unsaved=unproved)
+    job.deliver(None, partial(_screen, compared, decided, dispersed, verbose), more=more, unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
 
@@ -134,38 +105,32 @@ def _expect_one_scheme(names: Sequence[str], **written: str | None) -> None:
             )
 
 
-def _outputs_of(chosen: Plan | None, csv: str | None, plot: str | None, figure: str) -> list[Output]:
+def _schedule_files(chosen: Plan | None, figure: str) -> Files:
     """The files of the plan to fly, if there is one."""
     if chosen is None:
-        return []
+        return {}
     from nutdamp.views.pulses import pulse_table
 
-    return [(csv, lambda: pulse_table(chosen.flight).csv()), (plot, partial(_picture, chosen, figure))]
+    drawn: Files = {"plot": partial(chosen.figure, figure)} if figure in FIGURES else {}
+    return {"csv": lambda: pulse_table(chosen.flight).csv(), **drawn}
 
 
-def _outputs_of_blocks(
-    compared: Comparison, chosen: Plan | None, path: str | None, remark: Callable[[str], None]
-) -> list[Output]:
+def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
     """The file of command blocks: of the plan to fly, or else of one that was compared; none without any plan.
 
     Raises BadRequest where plans have pulses, but no blocks.
     """
     plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
-    if path is None or not plans:
-        return []
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
-        raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
+        if plans:
+            raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
+        return {}
     if source is not chosen:
-        remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
+        job.remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
     from nutdamp.views.pulses import block_table
 
-    return [(path, lambda: block_table(source.flight).csv())]
-
-
-def _pictured(figure: str) -> tuple[bool, bool, bool]:
-    """True for pictures of one plan, of all plans, and of the certificate, in this order."""
-    return figure not in (SCHEMES, PRIMER), figure == SCHEMES, figure == PRIMER
+    return {"blocks": lambda: block_table(source.flight).csv()}
 
 
 def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
@@ -182,13 +147,12 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
         raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
 
 
-def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certificate | None, list[CannotWrite]]:
+def _certified(compared: Comparison, paths: Sequence[str]) -> tuple[Certificate | None, list[CannotWrite]]:
     """The certificate of the plan of optimal; where it has none, the errors of the ``paths`` that are not written.
 
     None where no path is named.
     """
-    files = [path for path in paths if path is not None]
-    if not files:
+    if not paths:
         return None, []
     from nutdamp.errors import CannotWrite
     from nutdamp.planning.tradeoff import SCHEME, certificate
@@ -196,45 +160,18 @@ def _certified(compared: Comparison, paths: Sequence[str | None]) -> tuple[Certi
     try:
         return certificate(next(plan for plan in compared if plan.scheme == SCHEME)), []
     except BadRequest as reason:
-        return None, [CannotWrite(path, f"there is no certificate: {reason}") for path in files]
+        return None, [CannotWrite(path, f"there is no certificate: {reason}") for path in paths]
 
 
-def _outputs_of_proof(proof: Certificate | None, path: str | None, plot: str | None) -> list[Output]:
+def _proof_files(proof: Certificate | None, figure: str) -> Files:
     """The files of a certificate, if there is one."""
     if proof is None:
-        return []
+        return {}
+    from nutdamp.figures.certificate import certificate_figure
     from nutdamp.views.certificate_json import certificate_json
 
-    def picture() -> Figure:
-        from nutdamp.figures import certificate
-
-        return certificate.certificate_figure(proof)
-
-    return [(path, partial(certificate_json, proof)), (plot, picture)]
-
-
-def _data(compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None) -> dict[str, Any]:
-    from nutdamp.page.results import comparison_data
-
-    data = comparison_data(compared, decided)
-    if dispersed is None:
-        return data
-    from nutdamp.views import robust_verdicts
-    from nutdamp.views.robust_json import robust_json
-
-    return {**data, "robust": robust_json(dispersed, robust_verdicts.robust_reason(dispersed))}
-
-
-def _picture(chosen: Plan, figure: str) -> Figure:
-    from nutdamp.figures import export, overview
-
-    return overview.flight_figure(figure, *export.shown(chosen))
-
-
-def _schemes_picture(compared: Comparison, decided: Decision | None) -> Figure:
-    from nutdamp.figures import schemes
-
-    return schemes.schemes_figure(compared, decided)
+    drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}
+    return {"certificate": partial(certificate_json, proof), **drawn}
 
 
 def _screen(

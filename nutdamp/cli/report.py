@@ -10,13 +10,23 @@ from typing import Any
 
 import click
 
-from nutdamp.cli.flown import FlownChoice, compared_with, fronts_of, plan_or_read, robust_of
-from nutdamp.cli.job import FileInput, begin, deliver, quiet_option, require_dispersions, spacecraft_argument, working
+from nutdamp.cli.flown import compared_with, fronts_of, plan_or_read, robust_of
+from nutdamp.cli.job import Job, deliver, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import FILE, SAMPLES, Aim, Count, Grouped, PlanningCommand, SchemeName, goal_options, is_number
+from nutdamp.cli.options import (
+    FILE,
+    OUTPUT,
+    SAMPLES,
+    Count,
+    Grouped,
+    SchemeName,
+    SessionCommand,
+    goal_options,
+    is_number,
+)
 from nutdamp.cli.screen import show_failures
 from nutdamp.errors import printable
-from nutdamp.schemes.catalogue import LEAST, PLANNED, Options
+from nutdamp.schemes.catalogue import LEAST, PLANNED
 
 POINTS = 6
 """Horizons tried for each front where no number follows ``--trade``."""
@@ -25,7 +35,7 @@ COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
 """Options that may come without a number, and their values then."""
 
 
-class ReportCommand(PlanningCommand):
+class ReportCommand(SessionCommand):
     """``report``, in which the options of `COUNTS` may come without a number."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -69,7 +79,7 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option(
     "-o",
     "--output",
-    type=FILE,
+    type=OUTPUT,
     default="report.html",
     show_default=True,
     help="HTML file to write, one page with its pictures inside; a browser prints it as PDF.",
@@ -90,18 +100,12 @@ def control_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @control_options
 @quiet_option
 def command(
-    spacecraft: FileInput,
+    job: Job,
     names: tuple[str, ...],
-    schedule: str | None,
-    blocks: str | None,
     robust: bool,
-    options: Options,
-    aim: Aim,
-    output: str,
     disperse: int | None,
     nominal: bool,
     trade: int | None,
-    quiet: bool,
     **control: str | None,
 ) -> None:
     """Write a report: decision, spacecraft, method, schemes, schedule, manoeuvre sheet, verification, how to repeat it.
@@ -109,37 +113,33 @@ def command(
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output. Needs the extra plot.
     """
-    from nutdamp.page.html import expect_html
+    from nutdamp.page.document import controlled
+    from nutdamp.page.html import expect_html, made_of
 
+    output = job.written["output"] or ""
     expect_html(output)
-    flown = FlownChoice(names[0] if names else None, schedule, blocks)
-    if flown.count(None) < 2 or (flown.file is not None and robust):
+    job.flown = job.flown._replace(scheme=names[0] if names else None)
+    read = job.flown.schedule or job.flown.blocks
+    if job.flown.count(None) < 2 or (read and robust):
         raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
-    job = begin(spacecraft, flown.file, aim=aim, quiet=quiet, output=output)
+    body = job.begin()
 
-    from nutdamp.api import controlled, made_of
-    from nutdamp.files.yaml import dotted
-    from nutdamp.page.content import Repeat
+    from nutdamp.page.content import repeated
     from nutdamp.planning.decision import compare_plans
+    from nutdamp.spacecraft.requirements import expect_dispersions
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
-    set_to = tuple((dotted(setting.path), str(setting.value)) for setting in spacecraft.settings)
-    text, name = job.source
-    repeat = Repeat(shlex.join(["nutdamp", *sys.argv[1:]]), name, text, set_to)
     if disperse is not None or robust:
-        require_dispersions(job.spacecraft)
+        expect_dispersions(body)
         if nominal:
             raise click.UsageError("--disperse and --robust fly dispersed cases, which --nominal leaves out")
     samples = 0 if nominal else disperse
-    if flown.file is None:
-        compared = compared_with(job, names, options, samples)
-    else:
-        compared = compare_plans((plan_or_read(job, flown, options),), samples=samples)
+    compared = compare_plans((plan_or_read(job),), samples=samples) if read else compared_with(job, names, samples)
     if robust:
-        compared = robust_of(job, compared, options).joined
-    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0], options).fronts
-    with working("writing the page", quiet=quiet):
-        report = made_of(compared, repeat, kept, fronts)
+        compared = robust_of(job, compared).joined
+    fronts = () if trade is None else fronts_of(job, trade, (0.0, math.inf), LEAST[0]).fronts
+    with job.working("writing the page"):
+        report = made_of(compared, repeated(shlex.join(["nutdamp", *sys.argv[1:]]), job.source), kept, fronts)
     deliver([(output, lambda: report.content)])
     if not report.good:
         job.remark(report.verdict)

@@ -1,4 +1,4 @@
-"""Output to the terminal: results on standard output, messages on standard error, no control characters in either.
+"""Output to the terminal: results on standard output, messages and progress on standard error, no control characters.
 
 Names of files, channels or units come from elsewhere; on a terminal their control characters could clear the screen,
 change its title or pass for output of this program.
@@ -6,6 +6,11 @@ change its title or pass for output of this program.
 
 from __future__ import annotations
 
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import click
@@ -14,7 +19,10 @@ from nutdamp.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+    from rich.progress import Progress, TaskID
+    from rich.status import Status
 
+    from nutdamp.common.work import BudgetMonitor
     from nutdamp.planning.decision import Comparison
 
 
@@ -95,3 +103,126 @@ def show_failures(compared: Comparison) -> bool:
             say("".join(traceback.format_exception(plan.failure)).rstrip("\n"))
         say(f"nutdamp: {plan.scheme}: {plan.refusal} (--debug shows the traceback)")
     return bool(compared.failed)
+
+
+PATIENCE = 1.0
+"""Seconds that pass before a bar appears."""
+
+LONG = 10.0
+"""Seconds after which a line gives the progress, where standard error is no terminal."""
+
+
+@contextmanager
+def progress(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """A function to be called now and then with the number done, and that of all.
+
+    It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
+    behind. Elsewhere one line says how far it is, after `LONG`.
+    """
+    shown = _Bar(what) if sys.stderr.isatty() else _ProgressLine(what)
+    try:
+        yield (lambda _done, _all: None) if quiet else shown.update
+    finally:
+        shown.close()
+
+
+@contextmanager
+def working(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Show ``what`` is under way, with the search that runs and the share spent of its work budget.
+
+    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from nutdamp.common.work import watched
+
+    shown: list[Status] = []
+
+    def appear() -> None:
+        from rich.console import Console
+
+        shown.append(Console(stderr=True).status(_Doing(what, watch)))
+        shown[0].start()
+
+    with watched() as watch:
+        timer = threading.Timer(PATIENCE, appear)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()
+            for status in shown:
+                status.stop()
+
+
+class _Doing:
+    """Text of ``what`` is under way, with the search that a ``watch`` sees and its progress when shown."""
+
+    def __init__(self, what: str, watch: BudgetMonitor) -> None:
+        self.what, self.watch = what, watch
+
+    def __rich__(self) -> str:
+        budget = self.watch.budget
+        if budget is None:
+            return self.what
+        return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
+
+
+class _ProgressLine:
+    """Progress where there is no terminal: one line, once, that names the share done and the time left."""
+
+    def __init__(self, what: str) -> None:
+        self.what, self.began, self.said = what, time.monotonic(), False
+
+    def update(self, done: int, total: int) -> None:
+        passed = time.monotonic() - self.began
+        if self.said or passed < LONG:
+            return
+        self.said = True
+        left = passed * (total - done) / max(done, 1)
+        rest = f", about {left:.0f} s left" if left > 0.0 else ""
+        say(f"{self.what}: {min(done, total):,} of {total:,} done after {passed:.0f} s{rest}")
+
+    def close(self) -> None:
+        """Do nothing: there is no bar to clear."""
+
+
+class _Bar:
+    def __init__(self, what: str) -> None:
+        self.what, self.began = what, time.monotonic()
+        self.bar: Progress | None = None
+        self.task: TaskID | None = None
+
+    def update(self, done: int, total: int) -> None:
+        passed = time.monotonic() - self.began
+        if passed < PATIENCE:
+            return
+        if self.bar is None:
+            self._open(total)
+        assert self.bar is not None
+        assert self.task is not None
+        rate = done / passed
+        self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
+
+    def _open(self, total: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        self.bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=None),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self.task = self.bar.add_task(self.what, total=total, rate="")
+        self.bar.start()
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.stop()

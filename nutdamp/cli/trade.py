@@ -10,44 +10,32 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import fronts_of
-from nutdamp.cli.job import FileInput, Output, begin, quiet_option, remarks, spacecraft_argument
+from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
-    FILE,
     FOLDER,
-    Aim,
+    OUTPUT,
     Bare,
     NameType,
-    PlanningCommand,
+    SessionCommand,
     UnitType,
     expect_read,
     goal_options,
     reading_of,
 )
-from nutdamp.schemes.catalogue import LEAST, OPTIMAL, Options
+from nutdamp.schemes.catalogue import LEAST, OPTIMAL
+from nutdamp.units import shifts
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from rich.console import RenderableType
-
-    from nutdamp.api import Trade
     from nutdamp.errors import CannotWrite
     from nutdamp.planning.tradeoff import Front
 
 
-class Allowance(UnitType):
-    """An angle, or ``any``."""
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The angle in rad, infinite for ``any``."""
-        return float("inf") if value == "any" else super().convert(value, param, ctx)
-
-
-@click.command("trade", cls=PlanningCommand)
+@click.command("trade", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
     "--allow",
-    type=Allowance("angle"),
+    type=UnitType("angle", lambda shift: shifts([shift]), "expected an angle of at least 0, or any", any=math.inf),
     multiple=True,
     metavar="ANGLE|any",
     help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
@@ -61,56 +49,34 @@ class Allowance(UnitType):
     help="What is traded against time; impulse where propellant is unknown.",
 )
 @partial(goal_options, several=False)
-@click.option("--csv", type=FILE, help="Write the points.")
-@click.option("--json", type=FILE, help="Write the points with their pulses.")
-@click.option("--plot", type=FILE, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
+@click.option("--csv", type=OUTPUT, help="Write the points.")
+@click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
+@click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
 @quiet_option
-def command(
-    spacecraft: FileInput,
-    allow: tuple[float, ...],
-    points: int,
-    least: str,
-    options: Options,
-    aim: Aim,
-    csv: str | None,
-    json: str | None,
-    plot: str | None,
-    schedules: str | None,
-    quiet: bool,
-) -> None:
+def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
     Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
     in both. SPACECRAFT and FILE are as for `nutdamp plan`.
     """
-    if any(shift < 0.0 for shift in allow):
-        raise click.BadParameter("expected an angle of at least 0, or any", param_hint="--allow")
     from nutdamp.planning.decision import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade_files import schedule_paths, trade_csv
+    from nutdamp.views.trade_files import schedule_paths
 
-    shifts = allow or (0.0, math.inf)
-    most = points * len(set(shifts))
+    allowed = allow or (0.0, math.inf)
     for shift in allow:
         if isinstance(shift, Bare) and shift:
-            remarks(quiet)(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
-    paths = [] if schedules is None else schedule_paths(schedules, most)
-    job = begin(spacecraft, aim=aim, quiet=quiet, csv=csv, json=json, plot=plot, schedules=paths)
-    expect_read((OPTIMAL.name,), options, job.spacecraft, job.remark)
-    traded = fronts_of(job, points, shifts, least, options)
-    fronts = traded.fronts
-    for index, _, point in numbered(fronts):
+            job.remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
+    job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
+    expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.remark)
+    traded = fronts_of(job, points, allowed, least)
+    for index, _, point in numbered(traded.fronts):
         if point.plan.cut:
             job.remark(f"point {index}: {CUT}")
-    outputs: list[Output] = [
-        (csv, lambda: trade_csv(fronts)),
-        (json, traded.to_dict),
-        (plot, partial(_picture, traded)),
-    ]
-    files, unsaved = ([], []) if schedules is None else _schedules(fronts, schedules)
-    job.deliver([*outputs, *files], partial(_screen, traded), unsaved=unsaved)
-    leave(infeasible=not any(front.points for front in fronts))
+    files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
+    job.deliver(traded, files=files, unsaved=unsaved)
+    leave(infeasible=not traded.plans)
 
 
 def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
@@ -124,15 +90,3 @@ def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list
     except CannotWrite as wrong:
         return [], [wrong]
     return [(path, partial(str, text)) for path, text in schedule_files(fronts, folder)], []
-
-
-def _picture(traded: Trade) -> Figure:
-    from nutdamp.figures import trade
-
-    return trade.trade_figure(traded.spacecraft, traded.fronts)
-
-
-def _screen(traded: Trade) -> RenderableType:
-    from nutdamp.views.trade_tables import trade_screen
-
-    return trade_screen(traded.spacecraft, traded.fronts)

@@ -1,12 +1,13 @@
-"""Public interface of results (to_dict, to_csv, figure ...), implemented per type in `nutdamp.page.results`.
+"""Public interface of results (to_dict, to_csv, figure ...), whose functions `nutdamp.api` registers.
 
-A `Plan` thus writes itself as CSV although its module knows no files. The implementations are registered as soon as a
-public name of `nutdamp` is used; without them these functions raise TypeError.
+A `Plan` thus writes itself as CSV although its module knows no files. The functions are there as soon as a public name
+of `nutdamp` is used; without them these methods raise TypeError.
 """
 
 from __future__ import annotations
 
-from functools import singledispatch
+from importlib import import_module
+from operator import attrgetter
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -24,98 +25,95 @@ if TYPE_CHECKING:
 Table = NDArray[np.void]
 """Structured array: one row per pulse or sample, fields named as the columns of the CSV files."""
 
-
-@singledispatch
-def data(result: object) -> dict[str, Any]:
-    """Contents of the JSON file."""
-    raise _missing(result)
+_home: list[str] = []
+"""Module that has the table of `view`."""
 
 
-@singledispatch
-def table(result: object) -> Table:
-    """Rows of the CSV file."""
-    raise _missing(result)
+def register(module: str) -> None:
+    """Take the functions of `view` from the table ``VIEWS`` of a module, which is loaded when it is needed first.
+
+    Its keys are the class of a result and a subject (``Trade.csv``). Its values are ``module:function`` of the package,
+    which takes the result, or ``module:function name key=name``, which takes these attributes of it.
+    """
+    _home[:] = [module]
 
 
-@singledispatch
-def write_csv(result: object, path: str | PathLike[str]) -> None:  # noqa: ARG001
-    """Write the rows as CSV."""
-    raise _missing(result)
+def _entry(result: object, what: str) -> str | None:
+    views: dict[str, str] = import_module(_home[0]).VIEWS if _home else {}
+    keys = (f"{kind.__name__}.{what}" for kind in type(result).__mro__)
+    return next((views[key] for key in keys if key in views), None)
 
 
-@singledispatch
-def html(result: object) -> str | None:
-    """Small HTML table for notebooks; None without the extra plot, so that they show a line."""
-    raise _missing(result)
+def view(result: object, what: str, *arguments: Any, **options: Any) -> Any:
+    """Value of the function for a result and a subject; TypeError where its class and its bases have none."""
+    entry = _entry(result, what)
+    if entry is None:
+        raise TypeError(f"expected a result with {what}, got a {type(result).__qualname__}")
+    place, *names = entry.split()
+    module, _, function = place.partition(":")
+    keyed = [name.split("=") for name in names if "=" in name]
+    parts = [attrgetter(name)(result) for name in names if "=" not in name]
+    named = {key: attrgetter(name)(result) for key, name in keyed}
+    call = getattr(import_module(f"nutdamp.{module}"), function)
+    return call(*(parts if names else [result]), *arguments, **named, **options)
 
 
-@singledispatch
-def figure(result: object, name: str | None) -> Figure:  # noqa: ARG001
-    """Figure called ``name``."""
-    raise _missing(result)
-
-
-@singledispatch
-def sentences(result: object) -> tuple[str, ...]:
-    """Notes for the reader."""
-    raise _missing(result)
-
-
-@singledispatch
-def reason(result: object) -> str:
-    """Reason for the outcome."""
-    raise _missing(result)
-
-
-@singledispatch
-def line(result: object) -> str:
-    """Summary in one line."""
-    return object.__repr__(result)
-
-
-def _missing(result: object) -> TypeError:
-    return TypeError(f"expected what nutdamp.page.results can show, got a {type(result).__qualname__}")
+def has(result: object, what: str) -> bool:
+    """True if there is a `view` of a result."""
+    return _entry(result, what) is not None
 
 
 class Shown:
     """Mixin of results that show themselves at a prompt and in notebooks."""
 
     def __repr__(self) -> str:
-        return line(self)
+        return str(view(self, "line")) if _home else object.__repr__(self)
 
     def _repr_html_(self) -> str | None:
-        return html(self)
+        shown: str | None = view(self, "html")
+        return shown
 
 
 class Data:
     """Mixin of results that are written as JSON."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Contents of the file that ``plan --json`` writes, or the part of it that holds this result."""
-        return finite(data(self))
+        """Contents of the file that the command of this result writes with ``--json``, or the part that holds it."""
+        return finite(view(self, "data"))
 
 
-class Tabled(Shown):
-    """Mixin of results with rows."""
+class Drawn:
+    """Mixin of results that are drawn."""
+
+    def figure(self, name: str | None = None) -> Figure:
+        """Matplotlib figure that the command of this result draws with ``--plot``, by its name if it has several.
+
+        Of a comparison that is ``schemes``; of plans and flights ``overview`` (the default), ``motion``, ``sphere``,
+        ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra without matplotlib, Infeasible for
+        a plan without a schedule.
+        """
+        drawn: Figure = view(self, "figure", *([] if name is None else [name]))
+        return drawn
+
+
+class Written(Drawn):
+    """Mixin of results that are written as CSV, too."""
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write the rows as the command of this result does with ``--csv`` (a comparison: ``--table``).
 
         Raises CannotWrite, and Infeasible for a plan without a schedule.
         """
-        write_csv(self, path)
+        view(self, "save", path)
 
-    def figure(self, name: str | None = None) -> Figure:
-        """Matplotlib figure: of a comparison ``schemes``, else ``overview`` (the default) or one of the motion.
 
-        That is ``motion``, ``sphere``, ``history`` or ``timeline``. Raises BadRequest for other names, MissingExtra
-        without matplotlib, Infeasible for a plan without a schedule.
-        """
-        return figure(self, name)
+class Tabled(Shown, Written):
+    """Mixin of results with rows."""
 
     def to_numpy(self) -> Table:
         """Rows with the columns of `to_csv` as fields: ``flight.to_numpy()["nutation_deg"]``."""
-        return table(self)
+        rows: Table = view(self, "table")
+        return rows
 
     def to_pandas(self) -> DataFrame:
         """`to_numpy` as a DataFrame; raises MissingPandas where pandas is not installed."""
@@ -123,5 +121,5 @@ class Tabled(Shown):
             import pandas
         except ImportError:
             raise MissingPandas from None
-        rows = table(self)
+        rows = self.to_numpy()
         return pandas.DataFrame({name: rows[name] for name in rows.dtype.names or ()})

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from nutdamp.common import results
 from nutdamp.control_loop.limit_cycle import Cycle, Map
 from nutdamp.control_loop.stability import Band, dead_band, feeding, margins, too_late
 from nutdamp.errors import BadRequest, Infeasible
@@ -72,8 +73,8 @@ class HeldNutation:
         return None if self.cycle is None else self.cycle.spin_rate * YEAR / self.spacecraft.spin
 
 
-@dataclass(frozen=True, eq=False)
-class HoldingBudget:
+@dataclass(frozen=True, eq=False, repr=False)
+class Budget(results.Data, results.Written):
     """Growth of nutation in a ``spacecraft``, and the cost of holding it, for each pair of thresholds in ``held``.
 
     ``largest``: θ_max, rad, of which `until_largest` tells when it is reached; None where none is named.
@@ -82,6 +83,9 @@ class HoldingBudget:
     spacecraft: Spacecraft
     largest: float | None
     held: tuple[HeldNutation, ...]
+
+    def __repr__(self) -> str:
+        return f"<Budget of {self.spacecraft.name}, pairs of thresholds: {len(self.held)}>"
 
     @property
     def until_largest(self) -> float | None:
@@ -116,7 +120,7 @@ def budget(
     *,
     seed: int = 1,
     progress: Callable[[int], None] = lambda _: None,
-) -> HoldingBudget:
+) -> Budget:
     """Budget of a ``spacecraft`` with dissipation, for ``pairs`` of thresholds, default those of its loop.
 
     ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
@@ -128,12 +132,12 @@ def budget(
         largest = required.nutation
     loop = spacecraft.loop
     if loop is None or spacecraft.growth <= 0.0:
-        return HoldingBudget(spacecraft, largest, ())
+        return Budget(spacecraft, largest, ())
     held = []
     for done, pair in enumerate(pairs or [Thresholds(loop.start, loop.stop)], start=1):
         held.append(_held(spacecraft, replace(loop, start=pair.start, stop=pair.stop), seed))
         progress(done)
-    return HoldingBudget(spacecraft, largest, tuple(held))
+    return Budget(spacecraft, largest, tuple(held))
 
 
 def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:

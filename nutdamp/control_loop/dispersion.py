@@ -38,7 +38,7 @@ from nutdamp.montecarlo.inputs import (
     of_sensor,
 )
 from nutdamp.montecarlo.statistics import Exact, Worst, angle
-from nutdamp.montecarlo.study import KEPT_WORST, Counted
+from nutdamp.montecarlo.study import KEPT_WORST, Counted, Dispersed
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor, Thruster
@@ -429,14 +429,12 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
 
     Raises Infeasible as `plan.loop_of` does.
     """
-    if spacecraft.loop is None:
-        raise BadRequest("the spacecraft has no loop")
-    if spacecraft.dispersions is None:
-        raise BadRequest("the spacecraft has no dispersions")
-    late = feeding(spacecraft, spacecraft.loop)
+    loop = requirements.expect_loop(spacecraft)
+    requirements.expect_dispersions(spacecraft)
+    late = feeding(spacecraft, loop)
     if late is not None:
         raise Infeasible(too_late(late))
-    return LoopStudy(spacecraft, until_default(spacecraft, spacecraft.loop) if until is None else until, seed)
+    return LoopStudy(spacecraft, until_default(spacecraft, loop) if until is None else until, seed)
 
 
 @dataclass(eq=False)
@@ -525,6 +523,18 @@ class LoopResults(Counted):
         chance = 1.0 / (len(rows) - 1)
         squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
         return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoopDispersion(Dispersed):
+    """Closed loop of a file flown in dispersed cases."""
+
+    core: LoopResults
+
+    @property
+    def settled_fraction(self) -> float:
+        """Share of the cases that fall quiet, and are not stopped."""
+        return self.core.settled / self.core.done
 
 
 def run(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from nutdamp.common import results
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
 from nutdamp.errors import Infeasible
@@ -20,6 +21,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.flight.verification import EulerEquations
 from nutdamp.physics.taylor import NOTHING
 from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.requirements import Left
 
@@ -76,7 +78,7 @@ class _Independent(Dynamics):
 
 
 @dataclass(frozen=True, eq=False)
-class LoopVerification:
+class LoopVerification(results.Data):
     """A loop and the same by DOP853; ``missing`` is why that was not flown to the end."""
 
     run: LoopRun
@@ -105,8 +107,7 @@ class LoopVerification:
 
 def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = SEED) -> LoopVerification:
     """Fly the loop of the file in closed form and by DOP853; raises Infeasible where it cannot be flown at all."""
-    loop = spacecraft.loop
-    assert loop is not None
+    loop = requirements.expect_loop(spacecraft)
     run = fly(spacecraft, loop, until, seed=seed)
     equations, inertia = EulerEquations(spacecraft, EVALUATIONS), spacecraft.inertia
     mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
@@ -194,8 +195,7 @@ def loop_of(
 
     Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
     """
-    loop = spacecraft.loop
-    assert loop is not None
+    loop = requirements.expect_loop(spacecraft)
     late = feeding(spacecraft, loop)
     if late is not None:
         raise Infeasible(too_late(late))

@@ -10,14 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Any
 
 import numpy as np
 
+from nutdamp.common import results
+from nutdamp.common.numerics import finite
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.fit import Fit, estimated
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import AXIS, SUN_PULSE, Record
-from nutdamp.estimation.results import Carried, carried, posterior, replaced
+from nutdamp.estimation.results import Carried, Estimate, carried, estimates, posterior, replaced
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.study import Results, run
 from nutdamp.physics import attitude
@@ -187,3 +191,45 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
     thinned = math.sqrt(model.record.interval / interval)
     noise = np.array([fitted.noise[model.signals.index(name)] * thinned for name in imagined.signals])
     return estimated(imagined, np.array([values[parameter.name] for parameter in imagined.parameters]), noise)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fitted(results.Data, results.Drawn):
+    """Spacecraft estimated from telemetry; ``core`` holds parameters, covariance, noise and residuals.
+
+    ``warnings`` are those of reading the record.
+    """
+
+    core: Fit
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Fitted {self.core.model.spacecraft.name}: {len(self.core.named)} parameters>"
+
+    def estimates(self, at: float = 0.0) -> tuple[Estimate, ...]:
+        """Estimates with their sigmas; the motion is that at ``at`` s."""
+        return estimates(self.core, at)
+
+    def outlook(self, at: float = 0.0) -> Outlook:
+        """Forecast of longer coasts and probe pulses for a plan from ``at`` s, as ``fit --next`` does."""
+        return outlook(self.core, at)
+
+    def text(self, at: float = 0.0) -> str:
+        """Spacecraft file with the estimates in it and t = 0 at ``at`` s, as ``fit -o`` writes it.
+
+        Raises BadRequest for a spacecraft that was not read from a file.
+        """
+        return str(results.view(self, "text", carried(self.core, at)))
+
+    def spacecraft(self, at: float = 0.0) -> Spacecraft:
+        """Spacecraft of that file."""
+        body: Spacecraft = results.view(self, "spacecraft", self.text(at))
+        return body
+
+    def write(self, path: str | PathLike[str], at: float = 0.0) -> None:
+        """Write `text` to a file, as ``fit -o`` does; raises BadRequest or CannotWrite."""
+        results.view(self, "write", path, self.text(at))
+
+    def to_dict(self, at: float = 0.0, ahead: Outlook | None = None) -> dict[str, Any]:
+        """Contents of the file of ``fit --json``; with the forecast ``ahead``, that of ``fit --next --json``."""
+        return finite(results.view(self, "data", carried(self.core, at), ahead, self.warnings))

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import BadRequest, CannotWrite
 from nutdamp.figures import geometry, history, sphere, style
-from nutdamp.figures.legends import legend, short_name
 from nutdamp.figures.style import INK, MOTION
 from nutdamp.flight.propagation import Flight
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -189,10 +188,10 @@ class Scene:
         style.square(self.sky, shown, margin=0.06)
         sky = geometry.sky_names(flight)
         self.sky.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H(0)\n{sky.view}")
-        history.cone_history(self.strip, flight, self.path)
-        self.strip.set(xlabel="time, s", ylabel="deg")
+        history.nutation_history(self.strip, flight, self.path)
+        self.strip.set(xlabel=history.TIME)
         sphere.name_directions(self.sky)
-        legend(figure, [self.sky, self.strip], 5)
+        style.legend(figure, [self.sky, self.strip], 5)
         self.title = figure.suptitle(self.caption(0.0))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # from now on nothing may move but the motion
@@ -235,7 +234,9 @@ class Scene:
             for number, pulse in enumerate(self.flight.schedule, start=1)
             if pulse.start <= now <= pulse.end + HELD * self.timed.pace
         ]
-        return f"{short_name(self.flight.spacecraft)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
+        return (
+            f"{style.short_name(self.flight.spacecraft)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
+        )
 
     @property
     def _digits(self) -> int:

@@ -1,15 +1,15 @@
-"""The picture of ``fit``: data and fit of each signal, residuals, and their autocorrelation."""
+"""The picture of ``fit``: residuals of each signal, their autocorrelation, and what the data change of the file."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.results import Estimate, estimates
 from nutdamp.figures import style
-from nutdamp.figures.legends import heading, legend
-from nutdamp.figures.style import GREY, INK, MOTION, PULSE
+from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION
 from nutdamp.views.fit import in_shown
 
 if TYPE_CHECKING:
@@ -17,86 +17,63 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-PERIODS = 4.0
-"""Nutation periods of data that are drawn."""
-
 SPREAD = 6.0
 """Standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge."""
 
 ROUNDING = 1e-3
 """Share of the noise taken for the digits below which all residuals are rounding: of real noise some are above it."""
 
-DIFFERENCES = ("axis", "sun_pulse")
-"""Signals that are compared as differences: data less fit is all there is of them."""
+LOOKS = tuple((colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY))
+"""Colour and line of the signals in turn."""
+
+FARTHEST = 6.0
+"""Pulls beyond are drawn at the edge."""
 
 
 @style.styled
 def fit_figure(fit: Fit) -> Figure:
-    """A row for each signal: data and fit over the first periods, residuals, autocorrelations."""
-    model = fit.model
-    count = len(model.signals)
-    figure = style.sheet(7.4, 0.7 + 1.75 * count)
-    grid = figure.subplots(count, 3, squeeze=False, width_ratios=[1.25, 1.25, 0.9])
-    for index, (name, row) in enumerate(zip(model.signals, grid, strict=True)):
-        unit, factor = in_shown(name)
-        _data(row[0], fit, index, factor, f"{name}, {unit}")
-        _residuals(row[1], fit, index, factor, f"residual, {unit}")
-        unseen = _no_correlation(fit, index)
-        if unseen:
-            style.words(row[2], unseen)
-        else:
-            _white(row[2], fit, index)
-        for axes in row:
-            axes.grid()
-    for column, text in zip(grid.T, ("time, s", "time, s", "lag, samples"), strict=True):
-        for axes in [axes for axes in column if axes.has_data()][-1:]:  # words have no scale
-            axes.set_xlabel(text)
-    legend(figure, list(grid.ravel()))
-    heading(figure, model.spacecraft, "telemetry and fit, what is left, and whether that is white")
+    """Residuals of the signals below each other; beside them autocorrelations, and pulls of the parameters."""
+    signals = fit.model.signals
+    figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
+    sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])
+    rows, others = sides[0].subgridspec(len(signals), 1), sides[1].subgridspec(2, 1)
+    left: list[Axes] = []
+    for index in range(len(signals)):
+        left.append(figure.add_subplot(rows[index], sharex=left[0] if left else None))
+        _residuals(left[-1], fit, index)
+        left[-1].tick_params(labelbottom=index + 1 == len(signals))
+    left[0].set_title("Residuals: data less fit")
+    left[-1].set_xlabel("time, s")
+    white, pulls = figure.add_subplot(others[0]), figure.add_subplot(others[1])
+    _autocorrelation(white, fit)
+    _pulls(pulls, [row for row in estimates(fit, 0.0) if row.change is not None and row.prior])
+    style.legend(figure, [*left, white])
+    shape = "symmetric" if fit.model.body(fit.named).symmetric else "triaxial"
+    count = int(np.count_nonzero(fit.used))
+    style.heading(figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples")
     return figure
 
 
-def _data(axes: Axes, fit: Fit, index: int, factor: float, name: str) -> None:
-    model = fit.model
-    values = fit.named
-    period = 2.0 * np.pi / max(abs((1.0 - values["C/A"]) * values.get("omega_3", model.spacecraft.spin)), 1e-12)
-    end = model.start + min(PERIODS * period, model.record.length)
-    rows = (model.signal == index) & (model.times <= end)
-    times, measured = model.times[rows], model.measured[rows]
-    axes.set_ylabel(name)
-    if model.signals[index] in DIFFERENCES and _rounding(fit, index):
-        style.words(axes, "data and fit are the same\nbut for rounding")
-        return
-    if model.signals[index] in DIFFERENCES:
-        axes.plot(times, factor * measured, color=INK, label="fit")
-        shown = fit.residuals[rows]
-    else:
-        shown = measured
-        fitted = measured - fit.residuals[rows]
-        order = np.argsort(times)
-        axes.plot(times[order], factor * fitted[order], color=INK, label="fit")
-        margin = 0.15 * float(np.ptp(fitted)) + SPREAD * float(fit.noise[index])
-        axes.set_ylim(factor * (float(fitted.min()) - margin), factor * (float(fitted.max()) + margin))
-    axes.plot(times, factor * shown, color=MOTION, linestyle="", marker=".", markersize=2.5, label="data")
-    axes.set_xlim(model.start, end)
-
-
-def _residuals(axes: Axes, fit: Fit, index: int, factor: float, name: str) -> None:
-    model, noise = fit.model, float(fit.noise[index])
-    rows = model.signal == index
+def _residuals(axes: Axes, fit: Fit, index: int) -> None:
+    """Residuals of a signal with three sigma of its noise."""
+    unit, factor = in_shown(fit.model.signals[index])
+    unit = unit.replace("deg", "°")
+    rows, noise = fit.model.signal == index, float(fit.noise[index])
+    axes.set_ylabel(f"{fit.model.signals[index]}, {unit}")
     if _rounding(fit, index):
-        style.words(axes, "residuals: only rounding")
+        axes.text(0.5, 0.5, "only rounding", transform=axes.transAxes, ha="center", va="center")
+        axes.set_yticks([])
         return
     limit = factor * SPREAD * noise
-    left = np.clip(factor * fit.residuals[rows], -limit, limit)
-    kept = fit.used[rows]
-    axes.plot(model.times[rows][kept], left[kept], color=MOTION, linestyle="", marker=".", markersize=2.0)
+    left, kept = np.clip(factor * fit.residuals[rows], -limit, limit), fit.used[rows]
+    times = fit.model.times[rows]
+    axes.plot(times[kept], left[kept], color=LOOKS[index % len(LOOKS)][0], linestyle="", marker=".", markersize=2.0)
     if not kept.all():
-        axes.plot(model.times[rows][~kept], left[~kept], color=PULSE, linestyle="", marker="x", label="left out")
+        axes.plot(times[~kept], left[~kept], color=INK, linestyle="", marker="x", label="left out")
     for side in (-3.0, 3.0):
         axes.axhline(side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma")
     axes.set_ylim(-1.08 * limit, 1.08 * limit)
-    axes.set_ylabel(name)
+    axes.grid()
 
 
 def _rounding(fit: Fit, index: int) -> bool:
@@ -106,23 +83,40 @@ def _rounding(fit: Fit, index: int) -> bool:
     return bool(largest <= ROUNDING * float(fit.noise[index]))
 
 
-def _no_correlation(fit: Fit, index: int) -> str:
-    """The reason why there are no autocorrelations to be drawn; "" where there are."""
-    if len(fit.whiteness(index)) == 0:
-        return "too few samples for\nautocorrelation"
-    if _rounding(fit, index):
-        return "only rounding:\nno autocorrelation"
-    return ""
+def _autocorrelation(axes: Axes, fit: Fit) -> None:
+    """Autocorrelation of the residuals of all signals, with the band of white noise."""
+    axes.set_title("Autocorrelation of the residuals")
+    bands = []
+    for index, (name, (colour, line)) in enumerate(zip(fit.model.signals, LOOKS, strict=False)):
+        correlations = fit.whiteness(index)
+        if len(correlations) and not _rounding(fit, index):
+            lags = np.arange(1, len(correlations) + 1)
+            axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
+            bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
+    if not bands:
+        style.words(axes, "too few samples, or only rounding")
+        return
+    axes.axhspan(-max(bands), max(bands), facecolor=GREY, alpha=0.25, linewidth=0.0, label="95 % of white noise")
+    most = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
+    size = min(1.0, 1.15 * max(most, 2.0 * max(bands)))
+    axes.set(xlabel="lag, samples", ylim=(-size, size))
+    axes.grid()
 
 
-def _white(axes: Axes, fit: Fit, index: int) -> None:
-    correlations = fit.whiteness(index)
-    lags = np.arange(1, len(correlations) + 1)
-    count = int((fit.used & (fit.model.signal == index)).sum())
-    axes.vlines(lags, 0.0, correlations, color=MOTION, linewidth=1.2)
-    for side in (-1.0, 1.0):
-        axes.axhline(
-            side * 1.96 / np.sqrt(count), color=GREY, linewidth=0.9, linestyle=":", label="95 % of white noise"
-        )
-    axes.set_ylim(-1.0, 1.0)
-    axes.set_ylabel("autocorrelation")
+def _pulls(axes: Axes, rows: list[Estimate]) -> None:
+    """Value less that of the file, with one sigma after the fit, both over the sigma of the file."""
+    axes.set_title("Pulls: change from the file")
+    if not rows:
+        style.words(axes, "the file has no tolerances of what is fitted")
+        return
+    places = -np.arange(len(rows), dtype=float)
+    changes = np.clip([row.change or 0.0 for row in rows], -FARTHEST, FARTHEST)
+    sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]
+    axes.axvspan(-1.0, 1.0, facecolor=GREY, alpha=0.25, linewidth=0.0)
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    look: dict[str, Any] = {"fmt": "o", "color": MOTION, "markersize": 4, "elinewidth": 1.2, "capsize": 2.0}
+    axes.errorbar(changes, places, xerr=sigmas, **look)
+    reach = max(2.0, 1.1 * float((np.abs(changes) + sigmas).max()))
+    axes.set(xlabel="sigmas of the file", xlim=(-reach, reach), ylim=(0.6 - len(rows), 0.6))
+    axes.set_yticks(places, [row.label for row in rows])
+    axes.grid(axis="x")

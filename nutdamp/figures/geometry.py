@@ -164,8 +164,8 @@ class Sky(NamedTuple):
 def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
     """The names for a view centred on ``centre``."""
     if flight.spacecraft.attitude is None:
-        return Sky("towards inertial x, deg", "towards inertial y, deg", "H towards you, inertial x to the right")
-    return Sky(f"east of {centre}, deg", f"north of {centre}, deg", "H towards you, east to the right")
+        return Sky("towards inertial x, °", "towards inertial y, °", "H towards you, inertial x to the right")
+    return Sky(f"east of {centre}, °", f"north of {centre}, °", "H towards you, east to the right")
 
 
 def on_sky(plane: Vector, directions: Vector) -> Vector:

@@ -42,9 +42,9 @@ def add(
 ) -> None:
     """A label near a point. `settle` moves it to where there is room, by its role, or takes it out.
 
-    ``label`` goes anywhere around its point and may be left out; ``number`` stays where it is put, along the edge of a
-    panel; ``vital`` is never left out; ``bar`` is above the bar of a firing, and reads ``short`` where not all of
-    them have room. The point ``meant`` is nearest to the label, or joined to it by a thin line.
+    ``label`` goes anywhere around its point and may be left out; ``vital`` is never left out; ``bar`` is above the bar
+    of a firing, and reads ``short`` where not all of them have room. The point ``meant`` is nearest to the label, or
+    joined to it by a thin line.
     """
     note = axes.annotate(
         text,
@@ -54,7 +54,7 @@ def add(
         color=colour,
         fontsize=SMALL,
         ha="center",
-        va="bottom" if role in ("bar", "number") else "center_baseline",
+        va="bottom" if role == "bar" else "center_baseline",
         annotation_clip=False,
     )
     note.set_label(f"_{role}{short}")  # begins so that no legend shows it
@@ -81,13 +81,18 @@ _FAR = [
 _OFFSETS = {
     "_vital": [*_AROUND, *_FAR],
     "_label": _AROUND[:16],
-    "_number": [(0.0, 3.0)],
 }
 FAR = 15.0
 """Points from which a line leads from a label to its point."""
 
-_COVERED = {"_vital": np.inf, "_label": 14.0, "_number": np.inf}
+_COVERED = {"_vital": np.inf, "_label": 14.0}
 """Points of curves, 4 pixels apart, that a label may cover."""
+
+
+def panels(figure: Figure) -> list[Axes]:
+    """The panels of a figure, and those inset in them."""
+    inset: list[Any] = [panel for axes in figure.axes for panel in axes.child_axes]
+    return [*figure.axes, *inset]
 
 
 def _lay_out(figure: Figure) -> None:
@@ -95,11 +100,15 @@ def _lay_out(figure: Figure) -> None:
     figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
     for axes in figure.axes:
         axes.apply_aspect()
+    for axes in panels(figure):
+        locator = axes.get_axes_locator()
+        if locator is not None:  # an inset lies in its panel
+            axes.apply_aspect(locator(axes, None))  # type: ignore[arg-type]
 
 
 def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
-    for axes in figure.axes:  # drawn later outside this style, as many ticks fit between labels of the same size
+    for axes in panels(figure):  # drawn later outside this style, as many ticks fit between labels of the same size
         axes.tick_params(labelsize=TICK_SIZE)
     before = np.zeros(1)
     for _ in range(PASSES):
@@ -110,7 +119,7 @@ def settle(figure: Figure) -> None:
         before = now
     figure.set_layout_engine("none")  # labels are put where panels are now
     order = list(_OFFSETS)
-    for axes in figure.axes:
+    for axes in panels(figure):
         notes: list[Any] = sorted(
             (note for note in axes.texts if note.get_label() in order),
             key=lambda note: order.index(str(note.get_label())),
@@ -175,7 +184,6 @@ def _settle(
         curves, leads = (box.count_contains(part) for part in inked)
         covered = float(curves) + 30.0 * float(leads > 0) + 0.04 * float(np.hypot(x, y))
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
-        out = 0.0 if role == "_number" else out
         if led and not _nearest(note, box, points):
             way = _way(note, box, points)
             covered += 3.0 if np.hypot(x, y) > FAR else 1e3

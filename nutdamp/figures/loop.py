@@ -1,19 +1,20 @@
-"""The picture of ``loop``: signal of the sensor, nutation between its thresholds, firings."""
+"""Pictures of a closed loop: one run of ``loop``, and the nutation that ``budget`` holds between thresholds."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from nutdamp.control_loop.budget import DAY, Budget, HeldNutation
 from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import labels, style
 from nutdamp.figures.history import TIME, firings
-from nutdamp.figures.legends import legend
-from nutdamp.figures.motion import title
-from nutdamp.figures.style import GREY, INK, MOTION, PULSE
+from nutdamp.figures.overview import title
+from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Vector
 from nutdamp.views.loop import described
@@ -35,49 +36,77 @@ ROW = 0.36
 DECADES = 5.0
 """Largest number of decades of the nutation on its log axis."""
 
+FIRST, EARLY, TURNS = 4, 0.2, 4.0
+"""Firings in this share of the run, and periods of the nutation, that the enlarged first seconds hold."""
+
+SHORT = 0.5
+"""Share of the run from which on its first seconds are not drawn a second time."""
+
+LINES = ((MOTION, "-"), (MOMENTUM, "--"), (GREY, "-."), (MOTION, ":"))
+"""Colour and style of the pairs of thresholds whose limit cycles are drawn."""
+
+PERIODS = 4.0
+"""Cycles drawn of the longest limit cycle."""
+
+ROWS = 600
+
 
 @style.styled
 def loop_figure(plan: LoopPlan) -> Figure:
-    """Signal of the sensor, nutation with thresholds, and firings, over the whole run."""
+    """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its first seconds."""
     run = plan.flown_run
+    spans = [run.until, first_seconds(plan)] if first_seconds(plan) < SHORT * run.until else [run.until]
     names = len({firing.pulse.channel for firing in run.fired})
-    figure = style.sheet(7.4, 5.3 + ROW * names)
-    grid = figure.add_gridspec(3, 1, height_ratios=[1.8, 1.8, 0.3 + ROW * names])
-    signal = figure.add_subplot(grid[0])
-    nutation = figure.add_subplot(grid[1], sharex=signal)
-    fired = figure.add_subplot(grid[2], sharex=signal)
-    for axes in (signal, nutation):
-        axes.tick_params(labelbottom=False)
-    _signal(signal, plan)
-    _nutation(nutation, plan)
-    firings(fired, run.flight, run.until, brief=True)
-    fired.set_xlabel(TIME)
-    legend(figure, [signal, nutation])
-    figure.suptitle(f"{title(run.flight)}\n{described(run.loop, thresholds=False)}")
+    heights = [1.8, 1.8, *([0.3 + ROW * names] * bool(names))]
+    figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
+    shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
+    panels = figure.subplots(len(heights), len(spans), squeeze=False, sharex="col", **shape)
+    for column, until in zip(panels.T, spans, strict=True):
+        _signal(column[0], plan, until)
+        _nutation(column[1], plan, until)
+        if names:
+            firings(column[2], run.flight, until)
+        column[0].set_xlim(-0.012 * until, until)
+        column[-1].set_xlabel(TIME)
+    if len(spans) > 1:
+        panels[0, 1].set_title(f"The first {style.number(spans[1])} s")
+    style.legend(figure, list(panels.ravel()))
+    style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{_loop(plan)}")
     labels.settle(figure)
     return figure
 
 
-def _signal(axes: Axes, plan: LoopPlan) -> None:
+def _loop(plan: LoopPlan) -> str:
+    return described(plan.flown_run.loop, thresholds=False).replace(" deg", "°")
+
+
+def first_seconds(plan: LoopPlan) -> float:
+    """End of the first seconds of a run, s: some firings, and some periods of the nutation."""
+    run = plan.flown_run
+    ends = [firing.pulse.end for firing in run.fired[:FIRST] if firing.pulse.end < EARLY * run.until]
+    return min(run.until, max(1.2 * max(ends, default=0.0), TURNS * plan.spacecraft.body_period))
+
+
+def _signal(axes: Axes, plan: LoopPlan, until: float) -> None:
     run = plan.flown_run
     sensor = run.loop.sensor
     if sensor.rate is None:
-        times = np.linspace(0.0, run.until, SAMPLES)
+        times = np.linspace(0.0, until, SAMPLES)
         values = Signal(plan.spacecraft, sensor, run.key).shown(run.flight.motion(times)[0])
     else:
-        times, values = _samples(plan, sensor.rate)
+        times, values = _samples(plan, sensor.rate, until)
     scale = 180.0 / math.pi if sensor.kind == GYRO else 1.0
     names = ("ω1 as sampled", "ω2 as sampled") if sensor.kind == GYRO else ("acceleration as sampled",)
-    for column, (label, colour) in enumerate(zip(names, (MOTION, PULSE), strict=False)):
-        axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=label)
-    axes.set_ylabel("signal, deg/s" if sensor.kind == GYRO else "signal, m/s²")
+    for column, (name, colour) in enumerate(zip(names, (MOTION, INK), strict=False)):
+        axes.plot(times, scale * values[:, column], ".", markersize=1.6, color=colour, label=name)
+    axes.set_ylabel("signal, °/s" if sensor.kind == GYRO else "signal, m/s²")
     axes.grid()
 
 
-def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
+def _samples(plan: LoopPlan, rate: float, until: float) -> tuple[Vector, Vector]:
     """Some of the samples, evenly, with the noise that the loop saw; those within firings are left out."""
     run = plan.flown_run
-    count = math.floor(run.until * rate) + 1
+    count = math.floor(until * rate) + 1
     shown_at = np.arange(0, count, max(math.ceil(count / SAMPLES), 1))
     signal, times, values = Signal(plan.spacecraft, run.loop.sensor, run.key), [], []
     for block in range(0, count, BLOCK):
@@ -92,23 +121,89 @@ def _samples(plan: LoopPlan, rate: float) -> tuple[Vector, Vector]:
     return instants[quiet], shown[quiet]
 
 
-def _nutation(axes: Axes, plan: LoopPlan) -> None:
+def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
     """Nutation on a log axis, thresholds, and the nutation seen at each firing."""
     run = plan.flown_run
-    track = run.flight.sampled(SAMPLES, run.until)
+    track = run.flight.sampled(SAMPLES, until)
     angles = np.degrees(track.nutation)
     start, stop = math.degrees(run.loop.start), math.degrees(run.loop.stop)
     most = max(float(angles.max()), start)
     low = max(0.5 * min(float(angles.min()), stop or start), most * 10.0**-DECADES)
-    axes.plot(track.t, np.maximum(angles, 0.1 * low), color=INK, label="nutation")
-    seen = [max(math.degrees(firing.seen), low) for firing in run.fired]
-    axes.plot([firing.pulse.t for firing in run.fired], seen, "x", color=PULSE, markersize=4, label="seen at a firing")
+    axes.plot(track.t, np.maximum(angles, 0.1 * low), color=MOTION, label="nutation θ")
+    seen = [(firing.pulse.t, max(math.degrees(firing.seen), low)) for firing in run.fired if firing.pulse.t <= until]
+    if seen:
+        axes.plot(*np.transpose(seen), "x", color=PULSE, markersize=4, label="θ seen at a firing")
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
     if stop > 0.0:
         axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
     axes.set_yscale("log")
     axes.set_ylim(low, 2.0 * most)
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter("")
-    axes.set_ylabel("nutation, deg (log)")
+    style.log_axis(axes.yaxis)
+    axes.set_ylabel("θ, ° (log)")
     axes.grid()
+
+
+@style.styled
+def budget_figure(budget: Budget) -> Figure:
+    """Nutation over time: without firing, and the sawtooth of each limit cycle by its means."""
+    body, held = budget.spacecraft, [row for row in budget.held if row.cycle is not None]
+    figure = style.sheet(7.4, 4.0)
+    axes = figure.subplots()
+    size = _shown(budget, held)
+    unit, seconds = ("days", DAY) if size > 2.0 * DAY else ("hours", 3600.0) if size > 7200.0 else ("s", 1.0)
+    times = np.linspace(0.0, size, ROWS)
+    free = np.degrees(np.arctan(np.exp(np.minimum(body.growth * times, 300.0)) * math.tan(body.nutation)))
+    axes.plot(times / seconds, free, color=INK, label="no firing")
+    for row, (colour, line) in zip(held, LINES, strict=False):
+        drawn, angles = _sawtooth(body.growth, row, size)
+        axes.plot(drawn / seconds, angles, color=colour, linestyle=line, label=_named(row))
+    if budget.largest is not None:
+        axes.axhline(math.degrees(budget.largest), **{**style.LIMIT, "label": "largest allowed"})
+    lows = [math.degrees(row.cycle.low) for row in held if row.cycle is not None]
+    highest = [math.degrees(row.cycle.largest) for row in held if row.cycle is not None]
+    top = max([*highest, math.degrees(budget.largest or 0.0), float(free[0])])
+    axes.set_yscale("log")
+    axes.set_ylim(0.5 * min([*lows, max(float(free.min()), 1e-3 * top)]), 3.0 * top)
+    style.log_axis(axes.yaxis)
+    axes.set(xlabel=f"time, {unit}", ylabel="θ, ° (log)", xlim=(0.0, size / seconds))
+    axes.grid()
+    style.legend(figure, [axes])
+    how = "held by the limit cycle of the loop" if held else "without firing"
+    style.heading(figure, body, f"nutation under dissipation, {how}")
+    return figure
+
+
+def _named(row: HeldNutation) -> str:
+    return f"{style.angle(row.thresholds.start)} to {style.angle(row.thresholds.stop)}"
+
+
+def _shown(budget: Budget, held: Sequence[HeldNutation]) -> float:
+    """End of the time axis, s: some cycles, and the time until damping must begin."""
+    size = max([PERIODS / _pace(row) + _begins(row) for row in held], default=0.0)
+    until = budget.until_largest
+    if until is not None and math.isfinite(until):
+        size = max(size, 1.2 * until)
+    return size or 3.0 / max(abs(budget.spacecraft.growth), 1e-300)
+
+
+def _begins(row: HeldNutation) -> float:
+    """Time of the first firing, s; with no nutation that of the first that could grow at once."""
+    return row.begins if math.isfinite(row.begins) else 0.0
+
+
+def _pace(row: HeldNutation) -> float:
+    """Cycles, or pulses of a loop that never pauses, 1/s."""
+    assert row.cycle is not None
+    return row.cycle.cycles or row.cycle.pulses
+
+
+def _sawtooth(growth: float, row: HeldNutation, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times (s) and nutation (deg) of a limit cycle, by its means, from when it first fires."""
+    assert row.cycle is not None
+    period, low, high = 1.0 / _pace(row), math.degrees(row.cycle.low), math.degrees(row.cycle.high)
+    count = max(math.ceil((size - _begins(row)) / period), 0)
+    rises = min(math.log(high / low) / growth, period) if high > low > 0.0 else period
+    starts = _begins(row) + period * np.arange(count)
+    times = np.stack([starts, starts + period - rises, starts + period], axis=1).ravel()
+    angles = np.tile([low, low, high], count)
+    return times, angles

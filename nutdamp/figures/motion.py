@@ -1,4 +1,4 @@
-"""The two plane pictures of the motion: pole curve in the body, axis track in space."""
+"""The two plane pictures of the motion: pole curve in the body, axis track in space with H as an inset."""
 
 from __future__ import annotations
 
@@ -9,120 +9,118 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.figures import geometry, labels, style
-from nutdamp.figures.legends import legend, short_name
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN
-from nutdamp.flight.propagation import Flight, model_name
+from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
+from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
-from nutdamp.views.end_tables import direction_text
-from nutdamp.views.text import degrees, moment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
 
 
 ALIKE = math.radians(2.0)
 """Channels whose torques point within this angle share one arrow."""
 
 NUMBERED = 17
-"""Largest number of pulses of a path that are numbered, and have arrowheads."""
+"""Largest number of firings of a path that are numbered, and have arrowheads."""
 
 CROWD, NEAR = 3, 0.05
-"""Pulses in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
+"""Firings in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
 
 MANY = 12
-"""Number of pulses from which on lines and arrowheads are small."""
+"""Number of firings from which on lines and arrowheads are small."""
 
 SPARSE = 40
-"""Number of pulses up to which each has a dot."""
+"""Number of firings up to which each has a dot."""
+
+ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
+"""Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
 
 
 def motion(flight: Flight, track: Track) -> Figure:
-    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8).
-
-    A third panel shows H alone where the track is too wide for it.
-    """
-    small = geometry.momentum_inset(flight, track)
-    figure = style.sheet(7.4 if small is None else 10.4, 4.5)
-    body, space, *inset = figure.subplots(1, 2 if small is None else 3)
-    pole_curve(body, flight, track)
-    axis_track(space, flight, track)
-    if small is not None:
-        momentum_inset(inset[0], space, flight, track, small)
-    legend(figure, [body, space])
+    """Pole curve in the 1-2 plane of the body beside the axis track in space (Magnus 1970 fig. 5-8)."""
+    wide = geometry.momentum_inset(flight, track) is not None
+    figure = style.sheet(9.6 if wide else 7.4, 4.1)
+    grid = figure.add_gridspec(1, 2, width_ratios=[1.0, ROOM if wide else 1.0])
+    planes(figure, (grid[0], grid[1]), flight, track)
     return figure
 
 
-def title(flight: Flight) -> str:
-    """Heading of every sheet: spacecraft, scheme, model and result."""
-    left, count = flight.residual, len(flight.schedule)
-    how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
-    swings = "" if flight.spacecraft.inertia.symmetric else "at most "  # between two angles, H standing still
-    goal = flight.spacecraft.goal.axis
-    aim = "shift of H" if goal is None else "H off the target"
-    pulses = "no pulse" if not count else f"{count} pulse{'s' * (count > 1)} until {moment(flight.schedule.end)}"
-    result = f"nutation {swings}{degrees(flight.spacecraft.nutation)} → {degrees(left.nutation)}"
-    turn = (
-        ""
-        if goal is None
-        else f"H turned {degrees(flight.spacecraft.to_turn)} to the target, {direction_text(flight.spacecraft, goal)}\n"
-    )
-    return f"{short_name(flight.spacecraft)}: {how}, {pulses}\n{turn}{result}, {aim} {degrees(left.axis_error)}"
+def planes(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> None:
+    """The two panels in ``cells`` of a figure."""
+    body, space = (figure.add_subplot(cell) for cell in cells)
+    pole_curve(body, flight, track)
+    axis_track(space, flight, track)
 
 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), pulses and channels marked."""
+    """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and channels marked."""
     rates = geometry.pole_path(track)
     size = float(np.hypot(*rates.T).max())
-    axes.axhline(0.0, color=GREY, linewidth=0.5)
-    axes.axvline(0.0, color=GREY, linewidth=0.5)
     _path(axes, flight, track, rates)
-    named = _directions(axes, flight, size)
-    style.square(axes, rates, margin=0.45 if named else 0.12, centre=True)
+    arrows = _directions(axes, flight, size)
+    style.square(axes, rates, margin=0.45 if arrows else 0.12, centre=True)
     body = flight.spacecraft
     note = "" if body.inertia.aligned else ", principal axes"
     note += ", spin about −3" if body.spin < 0.0 else ""
-    axes.set(xlabel=f"ω1, deg/s{note}", ylabel="ω2, deg/s", title="Pole curve: ω in the body")
+    title = "Pole curve: ω in the body" + ("\narrows: torque of the channels" if arrows else "")
+    axes.set(xlabel=f"ω1, °/s{note}", ylabel="ω2, °/s", title=title)
 
 
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
-    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8)."""
+    """Path of the spin axis about the first direction of H, as angles, with the jumps of H (Magnus 1970 fig. 6-8).
+
+    Where it is too wide for the path of H, that is shown enlarged in an inset.
+    """
     path, momentum = geometry.sky_paths(flight, track)
-    axes.axhline(0.0, color=GREY, linewidth=0.5)
-    axes.axvline(0.0, color=GREY, linewidth=0.5)
+    target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
-    _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
-    target = geometry.sky_target(flight, track)
-    if len(target):
-        axes.plot(*target.T, label="target", **style.TARGET)
-    sky = geometry.sky_names(flight)
+    width = float(np.ptp(path, axis=0).max())
+    places = _momentum(axes, flight, track, momentum, width)
+    _target(axes, target)
+    middle, half = geometry.room(np.vstack([path, momentum, target]), 0.14)
     style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    if small is None:
+        labels.add(axes, "H", places[0], TURNED, role="vital")
+    else:
+        ticks = [tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half]
+        axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
+        axes.set_xticks(ticks)
+        _inset(axes, flight, track, small)
+    sky = geometry.sky_names(flight)
     axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")
 
 
-def momentum_inset(axes: Axes, space: Axes, flight: Flight, track: Track, small: Vector) -> None:
-    """Path of H, enlarged, and a frame about that place in the axis track; ``small``: `geometry.momentum_inset`."""
-    stations = _momentum(axes, flight, track, geometry.sky_paths(flight, track)[1], float(np.ptp(small, axis=0).max()))
+def _target(axes: Axes, target: Vector) -> None:
+    """The star of the target (n, 2) with its name; none where there is none."""
+    if len(target):
+        axes.plot(*target.T, label="target", **style.TARGET)
+        labels.add(axes, "target", target[0], INK, role="vital")
+
+
+def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
+    """Path of H, enlarged, beside the axis track; ``small``: `geometry.momentum_inset`."""
+    inset = axes.inset_axes(INSET)
+    momentum = geometry.sky_paths(flight, track)[1]
+    stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
-        others = np.delete(stations, number + 1, axis=0)
-        labels.add(
-            axes, str(number + 1), stations[number + 1], FIRED, meant=labels.Meant(stations[[number + 1]], others)
-        )
-    labels.add(axes, "t = 0", stations[0], INK, role="vital")
-    target = geometry.sky_target(flight, track)
-    axes.plot(*target.T, **style.TARGET)
-    style.square(axes, small, margin=0.25)
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    space.plot([left, right, right, left, left], [low, low, high, high, low], color=INK, linewidth=THIN)
-    much = float(np.ptp(space.get_xlim())) / (right - left)
-    sky = geometry.sky_names(flight)
-    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"The framed part (× {much:.2g}):\nH after each pulse")
+        meant = labels.Meant(stations[[number + 1]], np.delete(stations, number + 1, axis=0))
+        labels.add(inset, str(number + 1), stations[number + 1], FIRED, meant=meant)
+    labels.add(inset, "t = 0", stations[0], INK, role="vital")
+    _target(inset, geometry.sky_target(flight, track))
+    style.square(inset, small, margin=0.25)
+    inset.locator_params(nbins=3)
+    inset.tick_params(labelsize=style.SMALL)
+    much = min(INSET[2] * ROOM, INSET[3]) * float(np.ptp(axes.get_ylim()) / np.ptp(inset.get_ylim()))
+    inset.set_title(f"H after each firing (× {much:.2g})", **style.NOTE)
+    axes.indicate_inset_zoom(inset, edgecolor=GREY, linewidth=THIN, alpha=1.0)
 
 
 def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width: float) -> Vector:
-    """The path of H, (n, 2) degrees, with its places at first and after each pulse, which are returned."""
+    """The path of H, (n, 2) degrees, with its places at first and after each firing, which are returned."""
     axes.plot(*geometry.once(momentum).T, label="path of H", **style.PATH_OF_H)
     stations = [momentum[:1]]
     numbered = style.thinned(len(flight.schedule), NUMBERED)
@@ -134,20 +132,21 @@ def _momentum(axes: Axes, flight: Flight, track: Track, momentum: Vector, width:
                 style.heads(axes, moved, _halfway(moved), MOMENTUM)
     places = np.vstack(stations)
     marked = [row for row in range(len(places)) if len(places) <= SPARSE or row == 0 or row - 1 in numbered]
-    name = "H at t = 0 and after each pulse"
-    look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under pulses
-    axes.plot(*places[marked].T, "+", label=name, **look)
+    look: dict[str, Any] = {"color": MOMENTUM, "markersize": 8, "markeredgewidth": 1.4, "zorder": 1.9}  # under firings
+    axes.plot(*places[marked].T, "+", label="H", **look)
     return places
 
 
 def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
-    """A path (n, 2) with its beginning, its sense, and its pulses: numbered where there is room."""
+    """A path (n, 2) with its beginning, its sense, and its firings: numbered where there is room."""
     coasts: list[Vector] = []
     firings: list[Vector] = []
     width = float(np.ptp(points, axis=0).max())
     numbered = style.thinned(len(flight.schedule), NUMBERED)
     thin = min(style.thickness(points), THIN if len(flight.schedule) > MANY else style.LINE) / style.LINE
     size = 9.0 if thin == 1.0 else 5.5
+    axes.axhline(0.0, color=GREY, linewidth=0.5)
+    axes.axvline(0.0, color=GREY, linewidth=0.5)
     for stretch in geometry.stretches(flight, track):
         rows = points[stretch.first : stretch.last + 1]
         if stretch.pulse is None:
@@ -162,28 +161,30 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
     _number(axes, [_refined(rows) for rows in firings], width)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
-        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="pulse")
+        axes.plot(*style.joined(firings).T, color=PULSE, linewidth=max(2.2 * thin, style.LINE), label="firing")
         begins = [rows[0] for number, rows in enumerate(firings) if len(firings) <= SPARSE or number in numbered]
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
     labels.add(axes, "t = 0", points[0], INK, role="vital")
+    if firings:
+        labels.add(axes, "end", points[-1], INK)
 
 
 def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
-    """Numbers of pulses beside their stretches of a path, (n, 2) each; first and last of those in one place."""
+    """Numbers of firings beside their stretches of a path, (n, 2) each; first and last of those in one place."""
     some = [rows[:: max(len(rows) // 20, 1)] for rows in firings]
-    for group in _together([rows[len(rows) // 2] for rows in firings], width):
+    for group in together([rows[len(rows) // 2] for rows in firings], width):
         own, first, last = np.vstack([some[number] for number in group]), group[0] + 1, group[-1] + 1
         others = [rows for other, rows in enumerate(some) if other not in group]
         meant = labels.Meant(own, np.vstack([np.empty((0, 2)), *others]))
         middle = firings[group[len(group) // 2]]
-        text = str(first) if first == last else f"{first}\N{EN DASH}{last}"
+        text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
         labels.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
 
 
-def _together(places: Sequence[Vector], width: float) -> list[list[int]]:
-    """The pulses to be numbered, from 0: `CROWD` or more in a row, each near the one before, have one label."""
+def together(places: Sequence[Vector], width: float) -> list[list[int]]:
+    """The firings to be numbered, from 0: `CROWD` or more in a row, each near the one before, have one label."""
     numbered = style.thinned(len(places), NUMBERED)
     if len(numbered) < len(places):
         return [[number] for number in numbered]
@@ -229,8 +230,6 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
         names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
         labels.add(axes, names, 1.2 * way, INK, role="vital")
-    if groups:
-        axes.plot([], [], color=INK, linewidth=THIN + 0.5, marker=">", markersize=4, label="torque direction")
     return bool(groups)
 
 

@@ -1,64 +1,86 @@
-"""The pictures of a flight by their names; one of them shows all on one sheet."""
+"""The pictures of a flight by their names; one of them shows all on one sheet. ``track`` is a track of ``flight``."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from nutdamp.figures import geometry, history, labels, motion, sphere, style
-from nutdamp.figures.legends import legend, titled
-from nutdamp.flight.propagation import Flight
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight, model_name
 from nutdamp.flight.track import Track
+from nutdamp.spacecraft import requirements
+from nutdamp.views.end_tables import angle_names, angle_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from nutdamp.planning.plan import Plan
+
+
+ROWS = 1000
+"""Rows of the track of a plan; the figures draw a finer one where they need it."""
+
+TALL = 4.0
+"""Inches of the two planes of the motion on the sheet with all."""
+
 
 @style.styled
 def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
-    """The figure ``overview``, ``motion``, ``sphere``, ``history`` or ``timeline``; raises KeyError for others.
+    """The figure ``overview``, ``motion``, ``sphere`` or ``history``; raises KeyError for others.
 
-    ``narrow``: for a phone, which has ``history`` and ``timeline`` alone.
+    Where the rows of ``track`` are too few for a smooth curve, a finer one is drawn. ``narrow``: for a phone, which has
+    ``history`` alone. Raises MissingExtra without matplotlib.
     """
     seen = geometry.drawn(flight, track)
     figure = (NARROW if narrow else DRAWN)[name](flight, seen)
     until, end = float(seen.t[-1]), float(track.t[-1])
-    cut = until < 0.99 * end
-    for axes in figure.axes:
-        if axes.get_xlabel() == history.TIME and cut:
-            axes.set_xlabel(f"{history.TIME} (the first {until:.4g} of {end:.4g})")
-    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if cut else ""
-    titled(figure, motion.title(flight) + part)
+    part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
+    style.heading(figure, flight.spacecraft, title(flight) + part)
     labels.settle(figure)
     return figure
 
 
+def title(flight: Flight) -> str:
+    """Heading of every sheet after the spacecraft's name: scheme, model and result."""
+    left, count, body = flight.residual, len(flight.schedule), flight.spacecraft
+    how = " ".join(filter(None, (flight.scheme, f"by {model_name([flight.schedule], flight.model)}")))
+    fired = f"firings: {count} until {style.number(flight.schedule.end)} s" if count else "no firing"
+    swings = "" if body.inertia.symmetric else "at most "  # between two angles, H standing still
+    goal, turn = body.goal.axis, ""
+    if goal is not None:
+        angles = zip(angle_names(body), angle_texts(body, goal), strict=True)
+        target = ", ".join(f"{name} {text.removesuffix(' deg').rstrip('0').rstrip('.')}°" for name, text in angles)
+        turn = f"H turned {style.angle(body.to_turn)} to the target, {target}\n"
+    result = f"nutation {swings}{style.angle(body.nutation)} → {style.angle(left.nutation)}"
+    return f"{how}, {fired}\n{turn}{result}, {style.part_name(requirements.aim(body))} {style.angle(left.axis_error)}"
+
+
 def overview(flight: Flight, track: Track) -> Figure:
-    """Pole curve, axis track, cones, rates and cone angles over time, firings: one sheet of A4 across, or longer."""
-    channels = len({pulse.channel for pulse in flight.schedule})
-    heights = [1.0, 1.0, 0.3 + 0.25 * max(channels, 2)]
-    figure = style.sheet(11.0, 5.9 + sum(heights))
-    halves = figure.subfigures(2, 1, height_ratios=[4.4, 1.5 + sum(heights)], squeeze=False)[:, 0]
-    upper, lower = halves[0], halves[1]
-    body, space, cones = upper.subplots(1, 3)
-    motion.pole_curve(body, flight, track)
-    motion.axis_track(space, flight, track)
-    sphere.cones_in_space(cones, flight, track)
-    legend(upper, [body, space, cones])
-    rates, angles, firings = lower.subplots(3, 1, sharex=True, height_ratios=heights)
-    history.rate_history(rates, flight, track)
-    history.cone_history(angles, flight, track)
-    history.firings(firings, flight, float(track.t[-1]), brief=channels > 2 or len(flight.schedule) > 8)
-    firings.set_xlabel(history.TIME)
-    legend(lower, [rates, angles, firings])
+    """Motion above history: one sheet of A4 across, or longer."""
+    sizes = history.heights(flight, track)
+    figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
+    ratio = motion.ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
+    grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
+    motion.planes(figure, [grid[0, 0], grid[0, 1]], flight, track)
+    cells = [grid[row + 1, :] for row in range(len(sizes))]
+    style.legend(figure, history.courses(figure, cells, flight, track))
     return figure
 
 
-DRAWN = {
-    "overview": overview,
-    "motion": motion.motion,
-    "sphere": sphere.sphere,
-    "history": history.history,
-    "timeline": history.timeline,
-}
-NARROW = {"history": partial(history.history, narrow=True), "timeline": partial(history.timeline, narrow=True)}
+DRAWN = {"overview": overview, "motion": motion.motion, "sphere": sphere.sphere, "history": history.history}
+NARROW = {"history": partial(history.history, narrow=True)}
+
+
+def shown(plan: Plan) -> tuple[Flight, Track]:
+    """A plan flown through its real widths as far as its pictures reach."""
+    end = geometry.shown_until(plan.spacecraft, plan.pulses)
+    flown = replace(propagation.flown(plan.spacecraft, plan.pulses, end), scheme=plan.scheme)
+    return flown, flown.sampled(ROWS, end)
+
+
+def until(flight: Flight) -> float:
+    """End of the time axis of a flight, s: that of the flight where it was named, else `geometry.shown_until`."""
+    usual = flight.schedule.end + flight.spacecraft.inertial_period
+    return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)

@@ -11,12 +11,10 @@ import numpy as np
 
 from nutdamp.figures import geometry, labels, style
 from nutdamp.figures.geometry import DrawnCones
-from nutdamp.figures.legends import legend
 from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft.model import Vector
-from nutdamp.views.text import degrees
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,12 +86,11 @@ def magnification(widest: float) -> float:
 
 
 def sphere(flight: Flight, track: Track) -> Figure:
-    """Body cone and space cone at t = 0 with the path of the spin axis: in space, and seen along H with its scale."""
-    figure = style.sheet(7.4, 4.5)
-    space, plan = figure.subplots(1, 2)
+    """Body cone and space cone at t = 0 with the path of the spin axis, seen from outside."""
+    figure = style.sheet(5.4, 5.2)
+    space = figure.subplots()
     cones_in_space(space, flight, track)
-    along_momentum(plan, flight, track)
-    legend(figure, [space, plan])
+    style.legend(figure, [space], 4)
     return figure
 
 
@@ -101,17 +98,18 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     """The cones at t = 0 and the path of the spin axis, seen from outside."""
     looked, rolling = view(flight, track), geometry.cones(flight, track.rates[0], track.quaternion[0])
     draw_ground(axes, looked, track)
-    pulses = draw_path(axes, looked, flight, track)
+    fired = draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, rolling)
     target = flight.spacecraft.goal.axis
     if target is not None:
-        axes.plot(*looked.seen(target)[0].T, label="target", **style.TARGET)
+        place = looked.seen(target)[0]
+        axes.plot(*place.T, label="_target", **style.TARGET)
+        labels.add(axes, "target", place[0], INK, role="vital")
     _name_tips(axes, rolling, lambda direction: looked.seen(direction)[0][0])
-    name_lines(axes, rolling, pulses=pulses)
+    name_lines(axes, rolling, fired=fired)
     frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
-    first = flight.schedule.pulses[:1]
-    before = ", before pulse 1" * any(pulse.thrust[0] <= 0.0 for pulse in first)
+    before = ", before firing 1" * any(pulse.thrust[0] <= 0.0 for pulse in flight.schedule.pulses[:1])
     axes.set_title(f"Cones at t = 0{before}" + (f" (angles × {much:g})" if much != 1.0 else ""))
 
 
@@ -130,7 +128,7 @@ def draw_ground(axes: Axes, looked: View, track: Track) -> None:
 
 def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
     """The path of the spin axis, with the firings in it; True where any of them moves it (an impulse does not)."""
-    pulses = False
+    fired = False
     thin = style.thickness(looked.seen(track.axis)[0]) / style.LINE
     for stretch in geometry.stretches(flight, track):
         rows = slice(stretch.first, stretch.last + 1)
@@ -138,8 +136,8 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
             draw_line(axes, looked, track.axis[rows], MOTION, thin)
         elif np.any(np.ptp(track.axis[rows], axis=0) > geometry.NO_CONE):
             draw_line(axes, looked, track.axis[rows], PULSE, 1.8 * thin)
-            pulses = True
-    return pulses
+            fired = True
+    return fired
 
 
 def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
@@ -153,14 +151,14 @@ def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
 
-def name_lines(axes: Axes, rolling: DrawnCones, *, pulses: bool) -> None:
+def name_lines(axes: Axes, rolling: DrawnCones, *, fired: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(rolling.body):
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
         axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(rolling)}")
     axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
-    if pulses:
-        axes.plot([], [], color=PULSE, linewidth=1.8, label="pulse")
+    if fired:
+        axes.plot([], [], color=PULSE, linewidth=1.8, label="firing")
     axes.plot([], [], label="path of H", **style.PATH_OF_H)
 
 
@@ -168,7 +166,7 @@ def _hidden(rolling: DrawnCones) -> str:
     """Words in the legend where the body cone is so small that the marks of the axes in it hide it."""
     about = (rolling.axis, rolling.momentum)
     body, space = (float(np.arccos(np.clip(rolling.rotation @ axis, -1.0, 1.0))) for axis in about)
-    return f" ({degrees(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
+    return f" ({style.angle(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
 
 
 def name_directions(axes: Axes) -> None:
@@ -229,18 +227,6 @@ def frame(axes: Axes, looked: View, directions: Vector) -> None:
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_aspect("equal", adjustable="box")
     axes.set_axis_off()
-
-
-def along_momentum(axes: Axes, flight: Flight, track: Track) -> None:
-    """The cones at t = 0 seen along H(0), true to scale along every radius."""
-    plane = geometry.sky_plane(flight, track.momentum[0])
-    rolling = geometry.cones(flight, track.rates[0], track.quaternion[0])
-    draw_circles(axes, plane, rolling)
-    _name_tips(axes, rolling, lambda direction: geometry.on_sky(plane, direction[None])[0])
-    shown = np.vstack([rolling.body, rolling.space, rolling.axis[None], rolling.momentum[None]])
-    style.square(axes, geometry.on_sky(plane, shown), margin=0.14)
-    sky = geometry.sky_names(flight)
-    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H, true angles\n{sky.view}")
 
 
 def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:

@@ -1,4 +1,4 @@
-"""The one style of all figures: colours, sizes, marks."""
+"""The one style of all figures: colours, sizes, marks, numbers, headings and legends."""
 
 from __future__ import annotations
 
@@ -7,34 +7,39 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
 from importlib.util import find_spec
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from nutdamp.errors import MissingExtra
 from nutdamp.figures.geometry import room
-from nutdamp.spacecraft.model import Vector
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part, required
+from nutdamp.views.text import digits
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
 # Okabe & Ito's palette for colour-blind readers (jfly.uni-koeln.de/color); line styles differ too, for grey print.
 MOTION, PULSE, MOMENTUM = "#0072B2", "#D55E00", "#009E73"
-"""Spin axis, body cone and other motion; firings; angular momentum and space cone."""
+"""Spin axis, body cone and other motion of the spacecraft; firings; angular momentum and space cone."""
 
-FIRED = "#B34700"
-"""Numbers of pulses: as `PULSE`, dark enough to be read on white (5.5:1, WCAG 2.1 requires 4.5:1)."""
+FIRED, TURNED = "#B34700", "#007a58"
+"""Words about firings and about H: dark enough to be read on white (5.3:1, WCAG 2.1 requires 4.5:1)."""
 
-TURNED = "#007a58"
-"""Words about H: as `MOMENTUM`, dark enough to be read on white (5.3:1)."""
+MISSED, UNCHECKED = "#b00020", "#8a5a00"
+"""A requirement that is NOT met, and nothing else; one that is met while the file has no tolerances to check."""
 
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
-"""Text and ω; marks; the circles of the sphere."""
+"""Text and second curves; limits and axes; the circles of the sphere."""
 
 STAR = 13.0
-"""Points across of the stars of the target and of the recommended plan."""
+"""Points across of the star of the target."""
 
 TARGET: dict[str, Any] = {
     "marker": "*", "color": INK, "markersize": STAR, "markerfacecolor": "none", "linestyle": "", "zorder": 4
@@ -44,20 +49,23 @@ TARGET: dict[str, Any] = {
 PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
 """Look of the path of H."""
 
+LIMIT: dict[str, Any] = {"color": GREY, "linewidth": 1.3, "linestyle": (0, (6, 2)), "label": "required", "zorder": 1.5}
+"""Look of a bound of the requirement."""
+
 PAPER = "#fefefe"
 """Ground under a hollow mark; in a page, its background."""
 
 LINE, THIN, LEADER = 1.3, 0.7, 0.5
 """Line widths, points; the last is that from a label to its point."""
 
-CROSS: dict[str, Any] = {"color": INK, "markersize": 9, "markeredgewidth": 1.1, "linestyle": "", "zorder": 3.8}
-"""Look of an x over the mark of a plan that falls short of the requirement."""
-
 SMALL, TICK_SIZE = 7.5, 8
 """Sizes of labels inside a panel and of those of its ticks, points."""
 
-ON_PAPER: dict[str, Any] = {"fontsize": SMALL, "bbox": {"facecolor": PAPER, "edgecolor": "none", "pad": 0.8}}
-"""Look of words that a line may pass behind."""
+NOTE: dict[str, Any] = {"fontsize": SMALL, "fontweight": "normal"}
+"""Look of a remark above a panel."""
+
+FIGURES = 3
+"""Significant figures of the numbers in a picture."""
 
 _SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
@@ -182,3 +190,85 @@ def thinned(count: int, most: int = 24) -> list[int]:
     steps = (many * 10**power for power in range(10) for many in (1, 2, 5))
     step = next(step for step in steps if count <= step * (most - 1))
     return [n - 1 for n in range(1, count + 1) if n in (1, count) or (n % step == 0 and 2 * (count - n) >= step)]
+
+
+def log_axis(axis: Axis) -> None:
+    """Plain numbers at the decades of a log axis, none between them."""
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
+
+
+def number(value: float) -> str:
+    """A number with `FIGURES` significant figures."""
+    return digits(value, FIGURES)
+
+
+def angle(radians: float) -> str:
+    """An angle given in rad, in degrees; below 1e-6° it is nothing to be seen."""
+    shown = math.degrees(radians)
+    return f"{number(shown)}°" if abs(shown) >= 1e-6 else "< 1e-6°" if shown else "0°"
+
+
+def part_name(part: Part) -> str:
+    """Name of a quantity that a requirement bounds."""
+    return "momentum shift" if part is Part.SHIFT else part.label
+
+
+def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
+    """The bound that the file requires of an angle, deg; None without one."""
+    return next((math.degrees(bound.most) for bound in required(spacecraft) if bound.part is part), None)
+
+
+LETTERS = 11.0
+"""Bold letters of a heading that fit in an inch."""
+
+LONGEST_NAME = 40
+"""Characters of a name that fit above a picture."""
+
+
+def heading(figure: Figure, spacecraft: Spacecraft, text: str) -> None:
+    """The lines above a picture, broken by its width: the name of the spacecraft, then ``text``."""
+    whole = f"{short_name(spacecraft)}: {text}"
+    figure.suptitle("\n".join(fill(line, int(LETTERS * figure.get_figwidth())) for line in whole.split("\n")))
+    figure.set_label(whole)  # for pages, which break it by their own width
+
+
+def short_name(spacecraft: Spacecraft) -> str:
+    """The name of the spacecraft, cut where it is too long for a heading."""
+    name = " ".join(spacecraft.name.split())
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1].rstrip()}…"
+
+
+def legend(figure: Figure, axes: Sequence[Axes], columns: int = 8) -> None:
+    """One legend under all panels, each name once, where no curve can run into it, in as many columns as fit."""
+    handles: dict[str, Artist] = {}
+    for panel in axes:
+        for handle, name in zip(*panel.get_legend_handles_labels(), strict=True):
+            handles.setdefault(name, handle)
+    if handles:
+        room = 72.0 * figure.bbox.width / figure.dpi
+        fitting = (many for many in range(min(columns, len(handles)), 1, -1) if _across(list(handles), many) <= room)
+        drawn = figure.legend(
+            list(handles.values()), list(handles), loc="outside lower center", ncols=next(fitting, 1), handlelength=2.2,
+            borderpad=0.2, columnspacing=1.4,
+        )  # fmt: skip
+        for mark in drawn.get_lines():
+            mark.set_markersize(max(mark.get_markersize(), DOT))
+
+
+DOT = 4.0
+"""Points that a mark of a legend measures at least, where a curve has smaller ones."""
+
+LETTER = 4.6
+"""Points that a letter of a legend takes, about."""
+
+HANDLE = 25.0
+"""Points to the left of the text in a legend: its line or mark."""
+
+
+def _across(names: Sequence[str], columns: int) -> float:
+    """Approximate width of a legend that is filled column by column, points."""
+    deep, more = divmod(len(names), columns)
+    ends = np.cumsum([deep + (index < more) for index in range(columns)]).tolist()
+    parts = [names[begin:end] for begin, end in zip([0, *ends[:-1]], ends, strict=True)]
+    return sum(HANDLE + LETTER * max(map(len, part)) for part in parts) + 11.0 * (columns - 1)

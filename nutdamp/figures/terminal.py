@@ -47,9 +47,9 @@ class Drawing:
                 yield left_line + Text(" " * GAP) + right_line
         else:
             yield from (*left, Text(), *right)
-        pulses = "   digits: pulse" if len(self.flight.schedule) else ""
+        pulses = "   digits: firing" if len(self.flight.schedule) else ""
         target = "" if self.flight.spacecraft.goal.axis is None else "   * target"
-        yield Text(f"o t = 0   x end   + H, first and after each pulse{target}{pulses}", FAINT)
+        yield Text(f"o t = 0   x end   + H, first and after each firing{target}{pulses}", FAINT)
 
     def pole_curve(self, width: int) -> list[Text]:
         """The rotation vector in the body, as lines of ``width`` characters."""
@@ -59,7 +59,7 @@ class Drawing:
         body = self.flight.spacecraft
         note = "" if body.inertia.aligned else ", principal axes"
         note += ", spin about -3" if body.spin < 0.0 else ""
-        return framed(panel, "Pole curve", f"ω1, deg/s{note}", "ω2, deg/s")
+        return framed(panel, "Pole curve", f"ω1, °/s{note}", "ω2, °/s")
 
     def axis_track(self, width: int) -> list[Text]:
         """The spin axis in space and the jumps of H, as lines of ``width`` characters."""

@@ -23,6 +23,7 @@ from nutdamp.estimation.parameters import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, Carried, correlations, replaced
 from nutdamp.files.fields import KeyPath
 from nutdamp.files.overrides import Setting
+from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, dotted, read_tree
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
@@ -164,6 +165,19 @@ def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, car
     values = dict(_edits(tree, fit, carried, fitted))
     rename = {"state": "omega0"} if ("state",) in values else {}
     return edited(text, values, rename)
+
+
+def fitted_file(fit: Fit, carried: Carried) -> str:
+    """`fitted_text` of the file that the fitted spacecraft was read from; raises BadRequest where there is none."""
+    source = fit.model.spacecraft.source
+    if not isinstance(source, Source):
+        raise BadRequest("fit: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+    return fitted_text(*source, fit, carried)
+
+
+def fitted_spacecraft(_: object, text: str) -> Spacecraft:
+    """Spacecraft of a file with estimates."""
+    return Source(text, "fitted").read()
 
 
 def notes(fit: Fit, carried: Carried) -> Iterator[str]:

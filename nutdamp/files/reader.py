@@ -7,18 +7,20 @@ the same sections. Files to start from ship with the package: the built-in examp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp import units
 from nutdamp.common.time import Epoch
-from nutdamp.errors import Fault, FaultyFile, in_order, nearest
+from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.keys import (
@@ -35,7 +37,7 @@ from nutdamp.files.keys import (
     SunSensorSection,
     ThrusterSection,
 )
-from nutdamp.files.overrides import Setting, overlay
+from nutdamp.files.overrides import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions
@@ -228,6 +230,39 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         commands=_commands(contents.commands),
         loop=_loop(contents.loop, inertia.axes),
     )
+
+
+class Source(NamedTuple):
+    """Origin of a spacecraft: the text of the file, its name in messages, and the keys set beside it."""
+
+    text: str
+    name: str
+    settings: tuple[Setting, ...] = ()
+
+    def read(self, doubt: Callable[[Fault], object] = lambda doubt: warn(doubt.as_warning)) -> Spacecraft:
+        """The spacecraft; ``doubt`` is called with numbers that are hardly meant. Raises FaultyFile."""
+        doubts: list[Fault] = []
+        body = read_spacecraft(*self, doubts.append)
+        for each in doubts:
+            doubt(each)
+        object.__setattr__(body, "source", self)  # not a field, so that `dataclasses.replace` drops it
+        return body
+
+    def changed(self, keys: Mapping[str, object]) -> Spacecraft:
+        """See `Spacecraft.with_`."""
+        return self._replace(settings=(*self.settings, *settings_within(keys))).read()
+
+
+def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None) -> Source:
+    """Source of a spacecraft in a file, or in a dict of its keys, with ``changes`` of keys.
+
+    Raises CannotRead or BadRequest.
+    """
+    if isinstance(path, Mapping):
+        return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
+    name = units.path("path", path, "the name of a file or a dict of its keys")
+    settings = settings_of(units.changes(changes))
+    return Source(read_text(Path(name)), name, settings)
 
 
 def _part(kind: type[Part], section: Section | None, **others: object) -> Part | None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import shutil
+from collections.abc import Callable
+from os import PathLike, fspath
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
 from nutdamp.errors import CannotWrite
-from nutdamp.files.tabular import STDOUT, csv_text
+from nutdamp.files.tabular import STDOUT, csv_text, whole_file
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array
 from nutdamp.montecarlo.study import Study
@@ -92,3 +94,46 @@ def check_room(path: str, study: Study, samples: int) -> None:
         raise CannotWrite(
             path, f"{samples} rows take more than {needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB are free there"
         )
+
+
+def streamed(
+    path: PathLike[str] | str | None,
+    cases: Any,
+    writer: Callable[[IO[bytes], Any], Any],
+    fly: Callable[[Callable[..., None] | None], None],
+) -> CannotWrite | None:
+    """Fly ``cases``, and write them with a ``writer`` to a file, if one is named; the error if they are not all saved.
+
+    Raises CannotWrite where no case has flown yet, KeyboardInterrupt where the flight ended before the first.
+    """
+
+    def fly_some(collect: Callable[..., None] | None) -> None:
+        fly(collect)
+        if not cases.done:
+            raise KeyboardInterrupt  # so that no file is written
+
+    if path is None:
+        fly_some(None)
+        return None
+    full: list[OSError] = []
+    try:
+        with whole_file(fspath(path)) as stream:
+            rows = writer(stream, cases.study)
+
+            def collect(*part: Any) -> None:
+                try:
+                    if not full:
+                        rows.write(*part)
+                except BrokenPipeError:
+                    raise
+                except OSError as reason:
+                    full.append(reason)
+
+            fly_some(collect)
+            if full:
+                raise full[0]
+    except CannotWrite as wrong:
+        if not cases.done:
+            raise
+        return wrong
+    return None

@@ -20,7 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.errors import BadRequest
+from nutdamp.common import results
+from nutdamp.common.numerics import finite
+from nutdamp.errors import CannotWrite
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
@@ -420,7 +422,38 @@ def run(
     return results
 
 
-__all__ = ["SAMPLES", "SEED", "study_of"]
+@dataclass(frozen=True, eq=False, repr=False)
+class Dispersed(results.Data, results.Drawn):
+    """Many dispersed cases; ``core`` holds their distributions, ``unsaved`` the error of a file that was not saved."""
+
+    core: Counted
+    unsaved: CannotWrite | None = None
+
+    @property
+    def met_fraction(self) -> float | None:
+        """Share of the cases that meet the requirement; None where nothing is required."""
+        return self.core.met_fraction
+
+    @property
+    def meets_requirement(self) -> bool | None:
+        """True where as many cases meet it as the file requires; None where nothing is required."""
+        return self.core.meets_requirement
+
+    def to_dict(self, worst: int = 5) -> dict[str, Any]:
+        """Contents of the file that the command writes with ``--json``, with as many ``worst`` cases."""
+        return finite(results.view(self, "data", worst=worst))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.core.met} of {self.core.done} cases comply>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Dispersion(Dispersed):
+    """Schedule of a ``scheme`` flown in dispersed cases."""
+
+    core: Results
+    scheme: str = ""
+
 
 SAMPLES = 20_000
 """Cases that are flown where nothing else is said."""
@@ -431,6 +464,5 @@ SEED = 1
 
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
     """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
-    if spacecraft.dispersions is None:
-        raise BadRequest("the spacecraft has no dispersions")
+    requirements.expect_dispersions(spacecraft)
     return Study(DispersedModel(spacecraft, schedule), seed)

@@ -13,6 +13,8 @@ from rich.console import Group
 
 from nutdamp import __version__
 from nutdamp.errors import listed, printable
+from nutdamp.files.reader import Source
+from nutdamp.files.yaml import dotted
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.verification import verify
 from nutdamp.page.craft import ends_note, ends_sheet, spacecraft_blocks
@@ -34,7 +36,7 @@ from nutdamp.page.document import (
 from nutdamp.page.manoeuvre import manoeuvre_section
 from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
 from nutdamp.page.moving import moving_of
-from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, schemes_picture_of, trade_picture_of
+from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, trade_picture_of
 from nutdamp.page.sheets import aspects_sheet
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
 from nutdamp.planning.plan import Plan, unrounded
@@ -66,6 +68,19 @@ class Repeat(NamedTuple):
     settings: tuple[tuple[str, str], ...] = ()
 
 
+def called(body: Spacecraft, how: str) -> Repeat:
+    """The call in Python that makes a page again; where fields were replaced, no file stands for the spacecraft."""
+    if not isinstance(body.source, Source):
+        return Repeat(f"nutdamp.report(spacecraft, {how})", "", "")
+    return repeated(f"nutdamp.report({body.source.name!r}, {how})", body.source)
+
+
+def repeated(command: str, source: Source) -> Repeat:
+    """The command or call that makes a page again from a file."""
+    settings = tuple((dotted(setting.path), str(setting.value)) for setting in source.settings)
+    return Repeat(command, source.name, source.text, settings)
+
+
 def report_page(
     compared: Comparison,
     repeat: Repeat,
@@ -78,7 +93,7 @@ def report_page(
     sections = [
         PageSection("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
         PageSection("method", "Method", tuple(method_blocks(compared))),
-        _schemes(compared, decided),
+        _schemes(compared),
     ]
     if traded:
         sections.append(_trade(compared, traded))
@@ -175,7 +190,7 @@ def _unplanned(body: Spacecraft) -> Iterator[Figure]:
     yield Figure("nutation at t = 0", degrees(body.tilt))
 
 
-def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
+def _schemes(compared: Comparison) -> PageSection:
     """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
     remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
     hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
@@ -183,8 +198,6 @@ def _schemes(compared: Comparison, decided: Decision | None) -> PageSection:
     blocks: list[Block] = [sheet(table.title, table), *hints, *map(Prose, _reading(compared))]
     if remarks:
         blocks.append(Remarks(remarks))
-    if decided is not None and len(compared) > 1:
-        blocks.append(schemes_picture_of(compared, decided))
     return PageSection("schemes", "Schemes compared", tuple(blocks))
 
 

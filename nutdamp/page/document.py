@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
+    from nutdamp.page.workbench import Workbench
     from nutdamp.spacecraft.model import Vector
 
 
@@ -121,8 +125,8 @@ class NamedDirection(NamedTuple):
 class Moving:
     """Fixed parts of the moving view, and its moving parts as the JSON ``data``.
 
-    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``command``: that which writes
-    the same rows.
+    ``longitude``: name of the numbers of the globe; ``how``: the model that is flown; ``absent``: the reason for
+    which there is no ``workbench``; ``command``: that which writes the same rows.
     """
 
     panels: tuple[Panel, ...]
@@ -135,6 +139,8 @@ class Moving:
     longitude: str
     steep: bool
     how: str
+    workbench: Workbench | None
+    absent: str
     command: tuple[str, ...]
     data: str
 
@@ -172,6 +178,23 @@ class Control(NamedTuple):
         """Names and values of the entries given, but for the title."""
         pairs = zip(self._fields[1:], self[1:], strict=True)
         return tuple((name, value) for name, value in pairs if value)
+
+
+def controlled(**given: str) -> Control:
+    """Entries of configuration control on a page; the date defaults to SOURCE_DATE_EPOCH, where that is set.
+
+    Raises BadRequest for other names, and for a SOURCE_DATE_EPOCH that is no number of seconds.
+    """
+    unknown = sorted({*given} - {*Control._fields})
+    if unknown:
+        raise BadRequest(f"{unknown[0]}: expected one of {', '.join(Control._fields)}")
+    control, epoch = Control(**given), os.environ.get("SOURCE_DATE_EPOCH", "")
+    if control.date or not epoch:
+        return control
+    try:
+        return control._replace(date=datetime.fromtimestamp(int(epoch), UTC).date().isoformat())
+    except (ValueError, OverflowError, OSError):
+        raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
 
 
 UNCONTROLLED = Control()

@@ -6,6 +6,8 @@ import base64
 import hashlib
 import pkgutil
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from html import escape
 from importlib.util import find_spec
@@ -15,12 +17,17 @@ from typing import TYPE_CHECKING
 
 from nutdamp.errors import BadRequest, MissingExtra
 from nutdamp.figures.style import require
-from nutdamp.page.document import Block, Moving, Page
+from nutdamp.page.document import Block, Control, Moving, Page
 from nutdamp.views.text import MISSING
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
+
+    from nutdamp.montecarlo.study import Results
+    from nutdamp.page.content import Repeat
+    from nutdamp.planning.decision import Comparison
+    from nutdamp.planning.tradeoff import Front
 
 
 ENDINGS = (".html", ".htm")
@@ -47,8 +54,8 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
     moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
     style, script = (
-        "\n".join(map(_part, (name, *[view] * moves)))
-        for name, view in (("page.css", "view.css"), ("sort.js", "view.js"))
+        "\n".join(map(_part, (name, *views * moves)))
+        for name, views in (("page.css", ["view.css"]), ("sort.js", ["motion.js", "bench.js", "view.js"]))
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
@@ -122,3 +129,37 @@ def number_in(text: str) -> float | None:
         return float(text.removeprefix("<").strip())
     except ValueError:
         return None
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """The report page: its comparison, its dispersed cases, the page itself, and ``content``, the text of its file."""
+
+    comparison: Comparison
+    dispersed: Results | None
+    page: Page = field(repr=False)
+    content: str = field(repr=False)
+
+    @property
+    def verdict(self) -> str:
+        """Sentence at the top of the page."""
+        return self.page.verdict
+
+    @property
+    def met(self) -> bool | None:
+        """True where the requirement is met; None where nothing is required, and without a feasible plan."""
+        return self.page.met
+
+    @property
+    def good(self) -> bool:
+        """True where nothing is missed, whether required or not."""
+        return self.page.good
+
+
+def made_of(compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()) -> Report:
+    """The report, not yet written. Raises MissingExtra without the extra plot."""
+    from nutdamp.page.content import report_page
+
+    chosen = compared.recommended
+    page = report_page(compared, repeat, traded=traded, control=control)
+    return Report(compared, None if chosen is None else compared.results(chosen), page, page_html(page))

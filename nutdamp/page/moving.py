@@ -1,6 +1,7 @@
 """The view of the motion that the script of a page moves: its rows as whole numbers.
 
-The script only reads rows and draws them: each number that it shows is one row of the track, rounded here.
+The script reads rows and draws them: each number that it shows is one row of the track, rounded here. Only where the
+schedule is changed in the workbench it computes rows of its own.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.page.document import Circle, Moving, NamedDirection
 from nutdamp.page.scales import LEAD, Panel, panel, placed, strip_of
+from nutdamp.page.workbench import Room, absence, workbench_data, workbench_of
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -84,7 +86,7 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
     """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
     body, samples = flown.spacecraft, samples_for(flown, until)
     track = flown.sampled(samples, until)
-    panels, columns, target = _panels(flown, track, named)
+    panels, columns, target, rooms = _panels(flown, track, named)
     strip, span = strip_of(flown, track, until)
     firing, texts = _firing(flown, track)
     cone = _angle_digits(track)
@@ -94,18 +96,20 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "theta": _whole(np.degrees(track.nutation), cone),
         "mu": _whole(np.degrees(track.body_cone), cone),
         "lambda": _whole(np.degrees(track.space_cone), cone),
-        **_named_columns("axis", _unit(track.axis)),
-        **_named_columns("H", _unit(track.momentum)),
         **_named_columns("angle", _pointing(body, track.axis)),
         "firing": firing,
     }
+    if named:
+        columns |= _named_columns("axis", _unit(track.axis)) | _named_columns("H", _unit(track.momentum))
     for number, watched in enumerate((direction for direction in named if direction.watched), start=1):
         columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, watched.axis)), ANGLE_DIGITS)
     utc = _dates(body, track, clock)
     turns = until / geometry.quickest(flown)
+    absent = absence(body, flown.schedule)
     data: dict[str, Any] = {
         "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
         "until": until,
+        "samples": samples,
         "lead": LEAD,
         "span": span,
         "columns": {name: _steps(values) for name, values in columns.items()},
@@ -116,12 +120,13 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "named": [_mark(direction) for direction in named],
         "look": _look(track, named),
         "dots": turns * COARSE > samples,
+        "bench": None if absent else workbench_data(flown, track, *rooms, until),
     }
     speeds, speed = _speeds(until)
     return Moving(
         panels, strip, speeds, speed, angle_names(body), tuple(named), utc is not None,
         "azimuths" if body.attitude is None else "right ascensions", turns > STEEP,
-        propagation.model_name([flown.schedule]),
+        propagation.model_name([flown.schedule]), None if absent else workbench_of(flown), absent,
         ("nutdamp simulate SPACECRAFT", f"--scheme {scheme}", "--flown", f"--until {until:.12g}",
          f"--samples {samples}", "--csv FILE"),
         json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
@@ -130,8 +135,8 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
 
 def _panels(
     flown: Flight, track: Track, named: Sequence[NamedDirection]
-) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None]:
-    """Pole curve and axis track, the columns of their paths, and the place of the target in the latter."""
+) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
+    """Pole curve and axis track, the columns of their paths, the place of the target in the latter, and both rooms."""
     sky, momentum = geometry.sky_paths(flown, track)
     target = _target(flown, track, named, np.vstack([sky, momentum]))
     pole = geometry.pole_path(track)
@@ -149,7 +154,8 @@ def _panels(
         **_named_columns("sky", placed(sky, *sky_room)),
         **_named_columns("momentum", placed(momentum, *sky_room)),
     }
-    return panels, columns, [column[0] for column in placed(target, *sky_room)] if len(target) else None
+    place = [column[0] for column in placed(target, *sky_room)] if len(target) else None
+    return panels, columns, place, (pole_room, sky_room)
 
 
 def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:

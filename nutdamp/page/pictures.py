@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nutdamp.figures import dispersion, export, geometry, overview, schemes, trade
+from nutdamp.figures import dispersion, geometry, overview, trade
 from nutdamp.figures.overview import NARROW
 from nutdamp.page.document import Picture
 from nutdamp.page.panels import picture
 from nutdamp.physics import attitude
-from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.text import degrees
-from nutdamp.views.tolerance_tables import budget_rows
 
 if TYPE_CHECKING:
     from nutdamp.flight.track import Track
@@ -29,14 +28,14 @@ UNEQUAL = " With I1 ≠ I2 the space cone is what ω traces about H in free moti
 
 
 def pictures_of(plan: Plan) -> tuple[Picture, ...]:
-    """Pole curve and axis track, cones in space, rates and angles over time, firings; raises MissingExtra."""
-    flown, track = export.shown(plan)
+    """Pole curve and axis track, cones in space, nutation, firings and rates over time; raises MissingExtra."""
+    flown, track = overview.shown(plan)
     drawn = [
         (
             "motion",
-            "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the pulses that move it. "
+            "Pole curve: the tip of the rotation vector ω in the 1-2 plane of the body, with the firings that move it. "
             "Axis track: the direction of the spin axis in space, with the places of the angular momentum H"
-            + (", enlarged in a panel of their own." if geometry.momentum_inset(flown, track) is not None else ".")
+            + (", enlarged in an inset." if geometry.momentum_inset(flown, track) is not None else ".")
             + _wanders(plan, track),
             "Pole curve in the body and track of the spin axis in space",
         ),
@@ -48,19 +47,14 @@ def pictures_of(plan: Plan) -> tuple[Picture, ...]:
         ),
         (
             "history",
-            "Body rates and cone angles over time; bars mark the pulses. The nutation is shown on a log axis too.",
-            "Body rates and cone angles over time",
+            "Nutation on a log axis with what is required, the firings of each channel, and body rates over time."
+            + " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
+            * plan.pulses.through_valves
+            + " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
+            * any(pulse.channel == STEERABLE for pulse in plan.pulses),
+            "Nutation, firings and body rates over time",
         ),
     ]
-    if len(plan.pulses):
-        through = " The on-times are effective ones, impulse over full torque: the manoeuvre sheet has the commands."
-        how, unit = ("by which impulse", "impulse") if plan.pulses.idealised else ("for how long", "on-time")
-        caption = f"Which channel fires, when and {how}: “pulse: {unit}” beside the bars where there is room, and in "
-        caption += "the schedule."
-        caption += through * plan.pulses.through_valves
-        if any(pulse.channel == STEERABLE for pulse in plan.pulses):
-            caption += " Angles are those of the torque of the steerable torquer, from body axis +1 towards +2."
-        drawn.append(("timeline", caption, "Timeline of the firings"))
     return tuple(
         picture(
             overview.flight_figure(name, flown, track),
@@ -84,16 +78,6 @@ def _wanders(plan: Plan, track: Track) -> str:
     return f" Between the pulses H is up to {degrees(farthest)} from where it was: what is required is for the end."
 
 
-def schemes_picture_of(compared: Comparison, decided: Decision | None) -> Picture:
-    """The schemes beside each other; raises MissingExtra."""
-    return picture(
-        schemes.schemes_figure(compared, decided),
-        "A row for each scheme: what it costs, when it ends, what it leaves. Where a scheme falls short, its row says "
-        "so, whatever it costs. Values below the range of an axis are drawn at its left edge.",
-        "Dot plots of cost, end, nutation and momentum shift by scheme",
-    )
-
-
 def trade_picture_of(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
     wide, narrow = (
@@ -109,17 +93,15 @@ def trade_picture_of(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 
 
 def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
-    """Distribution of the cases of a study, final H, effect of each tolerance; raises MissingExtra."""
+    """Distribution of the cases of a study, and final H; raises MissingExtra."""
     body = dispersed.study.model.spacecraft
     bounded = any(bound.part is requirements.aim(body) for bound in requirements.required(body))
-    limited = bool(requirements.required(body))
-    biased = any(row.bias for row in budget_rows(dispersed.study))
     drawn = (
         (
             "cases",
-            "How many cases leave how much nutation, and how far H has moved, with what is required: "
-            "histograms, and the share of cases beyond each value.",
-            "Histograms and distribution functions of nutation and momentum shift",
+            "Share of the cases that leave no more than so much nutation, and no more than so much momentum shift, "
+            "over a histogram, with what is required.",
+            "Distribution functions and histograms of nutation and momentum shift",
         ),
         (
             "momentum",
@@ -127,12 +109,6 @@ def dispersion_pictures_of(dispersed: Results, scheme: str) -> tuple[Picture, ..
             + (", and what is required of it." if bounded else ".")
             + " The momentum shift is counted from where H was at t = 0 in that case." * (body.goal.axis is None),
             "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
-        ),
-        (
-            "budget",
-            f"One sigma of each input{', or its bias (hatched),' * biased} alone: what it does to the nutation, and to "
-            "where H ends." + " What is required holds for all inputs together." * limited,
-            "Tornado of the tolerance budget",
         ),
     )
     return tuple(

@@ -1,22 +1,23 @@
-"""Display and output of the results: the functions of `nutdamp.common.results`, for each of the public types."""
+"""Display and output of the results: functions that `nutdamp.api` names for `nutdamp.common.results`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from nutdamp import units
 from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import Comparison, Decision, decide, infeasibility, remarks
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.decision import Comparison, Decision, Simulation, decide
+from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, verdicts
 from nutdamp.views.decision_json import decision_json
-from nutdamp.views.plan_json import comparison_json, plan_json, spacecraft_json
+from nutdamp.views.plan_json import comparison_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees
@@ -25,134 +26,219 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from nutdamp.flight.track import Track
+    from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.document import Block
+    from nutdamp.planning.robust import RobustComparison
 
 
-results.sentences.register(Plan, remarks)
-results.sentences.register(Comparison, verdicts.warnings)
-results.reason.register(Plan, infeasibility)
-results.reason.register(Comparison, verdicts.reason)
+_TABLED = ("csv", "table", "figure", "line", "html")
+"""Subjects of results with rows."""
+
+VIEWS = {
+    "object.save": "page.results:save",
+    "object.write": "page.results:write",
+    "Spacecraft.data": "views.plan_json:spacecraft_json",
+    **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
+    "Plan.data": "views.plan_json:plan_json",
+    "Plan.sentences": "planning.decision:remarks",
+    "Plan.reason": "planning.decision:infeasibility",
+    **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
+    "Comparison.data": "page.results:comparison_data",
+    "Comparison.sentences": "views.verdicts:warnings",
+    "Comparison.reason": "views.verdicts:reason",
+    **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in ("csv", "table", "figure", "line", "html")},
+    "RobustComparison.data": "page.results:robust_data",
+    **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
+    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
+    **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
+    "Trade.data": "views.trade_files:trade_json spacecraft fronts",
+    "Trade.csv": "views.trade_files:trade_csv fronts",
+    "Trade.figure": "figures.trade:trade_figure spacecraft fronts",
+    "Trade.screen": "views.trade_tables:trade_screen spacecraft fronts",
+    "Dispersion.data": "views.dispersion_json:dispersion_json core scheme=scheme",
+    "Dispersion.figure": "page.results:dispersion_figure",
+    "Dispersion.screen": "views.dispersion_tables:dispersion_screen core scheme=scheme nominal=core.study.nominal",
+    "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
+    "LoopDispersion.figure": "figures.dispersion:loop_cases_figure core",
+    "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
+    "LoopPlan.data": "views.loop:loop_json",
+    "LoopPlan.figure": "figures.loop:loop_figure",
+    "LoopPlan.screen": "views.loop:loop_screen",
+    "LoopVerification.data": "views.loop:verified_json",
+    "LoopVerification.screen": "views.loop:verification_screen",
+    "Fitted.data": "views.fit:fit_json core",
+    "Fitted.figure": "figures.fit:fit_figure core",
+    "Fitted.text": "files.editing:fitted_file core",
+    "Fitted.spacecraft": "files.editing:fitted_spacecraft",
+    "Verified.data": "views.verification_json:verification_json plan.flight plan.scheme core",
+    "Verified.screen": "views.verify_tables:verification_screen plan.spacecraft plan.scheme core",
+    "Budget.data": "views.budget:budget_json",
+    "Budget.csv": "views.budget:budget_csv",
+    "Budget.figure": "figures.loop:budget_figure",
+    "Budget.screen": "views.budget:budget_screen",
+}
+"""Functions of results, see `nutdamp.common.results.view`."""
 
 
-results.data.register(Spacecraft, spacecraft_json)
-results.data.register(Plan, plan_json)
-
-
-@results.data.register
-def _(compared: Comparison) -> dict[str, Any]:
-    return comparison_data(compared, decide(compared))
-
-
-def comparison_data(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+def comparison_data(compared: Comparison) -> dict[str, Any]:
     """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
+    return _decided(compared, decide(compared))
+
+
+def _decided(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
     data = comparison_json(compared, verdicts.spoken(compared))
     return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
 
 
-@results.table.register
-def _(plan: Plan) -> results.Table:
+def robust_data(robust: RobustComparison) -> dict[str, Any]:
+    """The object of ``plan --robust --json``."""
+    from nutdamp.views.robust_json import robust_json
+    from nutdamp.views.robust_verdicts import robust_reason
+
+    data = _decided(robust.comparison, robust.decision)
+    return {**data, "robust": robust_json(robust, robust_reason(robust))}
+
+
+def simulation_data(simulation: Simulation) -> dict[str, Any]:
+    """The object of ``simulate --json``."""
+    from nutdamp.views.simulation import simulation_json
+
+    return simulation_json(simulation, decisions.verdict(simulation.decision))
+
+
+def plan_table(plan: Plan) -> results.Table:
+    """Rows of the pulses."""
     return pulse_table(plan.flight).array()
 
 
-@results.table.register
-def _(compared: Comparison) -> results.Table:
+def comparison_table(compared: Comparison) -> results.Table:
+    """Rows of the schemes."""
     return scheme_table(compared, compared.recommended).array()
 
 
-@results.table.register
-def _(flight: Flight) -> results.Table:
+def flight_table(flight: Flight) -> results.Table:
+    """Rows of the track."""
     return track_array(flight.sampled(flight.samples, flight.shown_to), flight.spacecraft.inertia)
 
 
-@results.write_csv.register
-def _(plan: Plan, path: str | PathLike[str]) -> None:
-    write_whole(units.path("path", path), pulse_table(feasible(plan).flight).csv())
+def simulation_table(simulation: Simulation) -> results.Table:
+    """Rows of the track."""
+    track = simulation.shown.sampled(simulation.samples, simulation.until)
+    return track_array(track, simulation.plan.spacecraft.inertia)
 
 
-@results.write_csv.register
-def _(compared: Comparison, path: str | PathLike[str]) -> None:
-    write_whole(units.path("path", path), scheme_table(compared, compared.recommended).csv())
+def save(result: object, path: str | PathLike[str]) -> None:
+    """Write the CSV file of a result; raises CannotWrite."""
+    write_whole(units.path("path", path), results.view(result, "csv"))
 
 
-@results.write_csv.register
-def _(flight: Flight, path: str | PathLike[str]) -> None:
-    pieces = flight.pieces(flight.samples, flight.shown_to)
-    write_whole(units.path("path", path), partial(write_track, pieces, flight.spacecraft.inertia))
+def write(_: object, path: str | PathLike[str], text: str) -> None:
+    """Write a text of a result; raises CannotWrite."""
+    write_whole(units.path("path", path), text)
 
 
-@results.figure.register(Flight)
-def _(flight: Flight, name: str | None) -> Figure:
-    from nutdamp.figures import export
+def dispersion_figure(dispersion: Dispersion, name: str = "overview") -> Figure:
+    """Figure of dispersed cases by its name."""
+    from nutdamp.figures import dispersion as figures
 
-    return _drawn(name, flight, flight.sampled(flight.samples, export.until(flight)))
-
-
-@results.figure.register(Plan)
-def _(plan: Plan, name: str | None) -> Figure:
-    from nutdamp.figures import export
-
-    return _drawn(name, *export.shown(feasible(plan)))
+    return figures.dispersion_figure(name, dispersion.core, scheme=dispersion.scheme)
 
 
-@results.figure.register(Comparison)
-def _(compared: Comparison, name: str | None) -> Figure:
-    from nutdamp.figures import schemes
-
-    if name not in (None, "schemes"):
-        raise BadRequest(f"there is no figure {name!r}; expected 'schemes'")
-    return schemes.schemes_figure(compared, decide(compared))
+def plan_csv(plan: Plan) -> str:
+    """File of the pulses; raises Infeasible."""
+    return pulse_table(feasible(plan).flight).csv()
 
 
-def _drawn(name: str | None, flight: Flight, track: Track) -> Figure:
+def comparison_csv(compared: Comparison) -> str:
+    """File of the schemes."""
+    return scheme_table(compared, compared.recommended).csv()
+
+
+def flight_csv(flight: Flight) -> Callable[[IO[bytes]], None]:
+    """File of the track."""
+    return partial(write_track, flight.pieces(flight.samples, flight.shown_to), flight.spacecraft.inertia)
+
+
+def simulation_csv(simulation: Simulation) -> Callable[[IO[bytes]], None]:
+    """File of the track."""
+    return partial(write_track, simulation.pieces(), simulation.plan.spacecraft.inertia)
+
+
+def flight_figure(flight: Flight, name: str = "overview") -> Figure:
+    """Figure of a flight by its name."""
+    from nutdamp.figures import overview
+
+    return _drawn(name, flight, flight.sampled(flight.samples, overview.until(flight)))
+
+
+def simulation_figure(simulation: Simulation, name: str = "overview") -> Figure:
+    """Figure of the flight shown by its name."""
+    return _drawn(name, simulation.shown, simulation.pictured)
+
+
+def plan_figure(plan: Plan, name: str = "overview") -> Figure:
+    """Figure of the flight of a plan by its name."""
+    from nutdamp.figures import overview
+
+    return _drawn(name, *overview.shown(feasible(plan)))
+
+
+def comparison_figure(compared: Comparison, name: str = "overview") -> Figure:
+    """Figure of the recommended plan; raises Infeasible."""
+    if compared.recommended is None:
+        raise Infeasible(compared.reason)
+    return plan_figure(compared.recommended, name)
+
+
+def _drawn(name: str, flight: Flight, track: Track) -> Figure:
     """A figure of a flight by its name; raises BadRequest."""
     from nutdamp.figures import overview
 
-    chosen = "overview" if name is None else units.instance("name", name, str, "the name of a figure")
     try:
-        return overview.flight_figure(chosen, flight, track)
+        return overview.flight_figure(units.instance("name", name, str, "the name of a figure"), flight, track)
     except KeyError:
-        raise BadRequest(f"there is no figure {name!r}") from None
+        raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 
 
-@results.line.register
-def _(spacecraft: Spacecraft) -> str:
+def spacecraft_line(spacecraft: Spacecraft) -> str:
+    """Summary of a spacecraft in one line."""
     inertia = spacecraft.inertia
     return (
         f"<Spacecraft {spacecraft.name}: {inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(spacecraft.nutation)}>"
     )
 
 
-@results.line.register
-def _(plan: Plan) -> str:
+def plan_line(plan: Plan) -> str:
+    """Summary of a plan in one line."""
     left = plan.flown
     if left is None:
         return f"<Plan {plan.scheme}: infeasible, {plan.why}>"
     return f"<Plan {plan.scheme}: {len(plan)} pulses until {plan.end:.4g} s, nutation left {degrees(left.nutation)}>"
 
 
-@results.line.register
-def _(flight: Flight) -> str:
+def flight_line(flight: Flight) -> str:
+    """Summary of a flight in one line."""
     left = flight.residual
     ended = f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
     return f"<Flight of {_summary(flight)}: {ended}>"
 
 
-@results.line.register
-def _(compared: Comparison) -> str:
+def comparison_line(compared: Comparison) -> str:
+    """Summary of a comparison in one line."""
     chosen = compared.recommended
     verdict = compared.reason if chosen is None else f"recommended {chosen.scheme}, {compared.reason}"
     return f"<Comparison of {', '.join(plan.scheme for plan in compared)}: {verdict}>"
 
 
-@results.html.register
-def _(spacecraft: Spacecraft) -> str | None:
+def spacecraft_html(spacecraft: Spacecraft) -> str | None:
+    """HTML table of a spacecraft for notebooks; None without the extra plot."""
     from nutdamp.page.craft import spacecraft_facts
 
     return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
 
 
-@results.html.register
-def _(plan: Plan) -> str | None:
+def plan_html(plan: Plan) -> str | None:
+    """HTML table of a plan for notebooks; None without the extra plot."""
     from nutdamp.page.document import Prose, sheet
 
     if not plan.feasible:
@@ -160,15 +246,15 @@ def _(plan: Plan) -> str | None:
     return _beside(_block(sheet(f"Pulses of {plan.scheme}", pulse_table(plan.flight, phased=True))), plan)
 
 
-@results.html.register
-def _(flight: Flight) -> str | None:
+def flight_html(flight: Flight) -> str | None:
+    """HTML table of a flight for notebooks; None without the extra plot."""
     from nutdamp.page.sheets import residual_sheet
 
     return _beside(_block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual)), flight)
 
 
-@results.html.register
-def _(compared: Comparison) -> str | None:
+def comparison_html(compared: Comparison) -> str | None:
+    """HTML table of a comparison for notebooks; None without the extra plot."""
     from nutdamp.page.document import sheet
 
     table = scheme_table(compared, compared.recommended)
@@ -202,11 +288,3 @@ def _block(content: Block) -> str | None:
 
 def _summary(flight: Flight) -> str:
     return f"{len(flight.schedule)} pulses until {flight.shown_to:.4g} s by {flight.model}"
-
-
-def feasible(plan: Plan) -> Plan:
-    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
-    units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
-    if not plan.feasible:
-        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
-    return plan

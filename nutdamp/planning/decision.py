@@ -59,20 +59,17 @@ class Comparison(results.Data, results.Tabled):
         return iter(self.plans)
 
     def __getitem__(self, scheme: str) -> Plan:
-        for candidate in self.plans:
-            if candidate.scheme == scheme:
-                return candidate
-        raise KeyError(scheme)
+        return {candidate.scheme: candidate for candidate in self.plans}[scheme]
 
     @property
     def reason(self) -> str:
         """Reason for the recommendation."""
-        return results.reason(self)
+        return str(results.view(self, "reason"))
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings on the recommended plan: unmet bounds and limiting factors."""
-        return results.sentences(self)
+        return tuple(results.view(self, "sentences"))
 
     @cached_property
     def recommendation(self) -> Recommendation[Plan]:
@@ -345,17 +342,22 @@ def decide(compared: Comparison) -> Decision | None:
     return Decision(plan, None if undecided else cases, undecided)
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
+PICTURED = 100_000
+"""Largest number of rows of the track of a picture."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(results.Data, results.Tabled):
     """Propagation of a ``plan`` to ``until`` s, shown through ``real`` widths or by the impulse sum (17).
 
-    Its track has ``samples`` rows.
+    Its track has ``samples`` rows; pictures show it to ``drawn_to`` s.
     """
 
     plan: Plan
     until: float
     real: bool
     samples: int
+    drawn_to: float
 
     @cached_property
     def _both(self) -> tuple[Flight, Flight]:
@@ -374,7 +376,7 @@ class Simulation:
 
     @cached_property
     def shown(self) -> Flight:
-        """Whichever of these is shown."""
+        """The shown one of them."""
         return replace(self.flown if self.real else self.impulses, scheme=self.plan.scheme)
 
     @cached_property
@@ -391,14 +393,14 @@ class Simulation:
         """Track of the flight shown, in pieces."""
         return self._both[self.real].pieces(self.samples, self.until)
 
-    def track(self, samples: int, until: float) -> Track:
-        """Track to another end in s."""
-        return self._both[self.real].sampled(samples, until)
+    @cached_property
+    def pictured(self) -> Track:
+        """Track of pictures."""
+        return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)
 
 
 TELLING = math.radians(1e-6)
 """Remaining nutation angle in rad from which there is a note on it."""
-
 
 CUT = "the search ended at its limit of work"
 

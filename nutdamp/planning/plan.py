@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +35,9 @@ from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
+
+if TYPE_CHECKING:
+    from nutdamp.flight.verification import Verification
 
 MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
 """rad by which a route keeps clear of the cones."""
@@ -218,12 +222,12 @@ class Plan(results.Data, results.Tabled):
     @property
     def why(self) -> str | None:
         """Reason for the lack of a schedule; None where there is one."""
-        return None if self.feasible else results.reason(self)
+        return None if self.feasible else str(results.view(self, "reason"))
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Notes for the reader."""
-        return results.sentences(self)
+        return tuple(results.view(self, "sentences"))
 
     @property
     def total_impulse(self) -> float:
@@ -476,6 +480,30 @@ def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: cat
     if scheme in catalogue.PLANNED and left is not None and not _helps(flown, left):
         return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
     return flown
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Verified(results.Data):
+    """Schedule of a ``plan`` flown by independent methods: ``core`` holds them, conserved quantities, error budget."""
+
+    core: Verification
+    plan: Plan
+
+    @property
+    def agree(self) -> bool:
+        """True where an independent integration was flown, and all of them confirm the flown motion."""
+        return self.core.agree
+
+    def __repr__(self) -> str:
+        return f"<Verified {self.plan.scheme}: agrees with {', '.join(self.core.checks) if self.agree else 'nothing'}>"
+
+
+def feasible(plan: Plan) -> Plan:
+    """A plan with a schedule; raises BadRequest for anything but a `Plan`, Infeasible for one without."""
+    units.instance("plan", plan, Plan, "a Plan, as nutdamp.plan gives it")
+    if not plan.feasible:
+        raise Infeasible(f"{plan.scheme} is infeasible: {plan.why}")
+    return plan
 
 
 def _helps(judged: Plan, left: Residual) -> bool:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.common import work
+from nutdamp.common import results, work
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, Results, run, study_of, threads_here
 from nutdamp.planning import chance_plan
@@ -123,7 +123,7 @@ class Cost(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RobustComparison:
+class RobustComparison(results.Data):
     """Candidates from the best down; ``usual`` is recommended by the comparison, ``chosen`` the robust plan.
 
     ``ground`` is what decided among the ``equals`` candidates that comply often enough, or are as good as the best, by

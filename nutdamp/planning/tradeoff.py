@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from nutdamp.common import work
+from nutdamp.common import results, work
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import compare, infeasibility, usual
@@ -323,3 +323,19 @@ def numbered(all_fronts: Sequence[Front]) -> Iterator[tuple[int, Front, Point]]:
     """All points of all fronts, numbered from 1."""
     pairs = ((front, point) for front in all_fronts for point in front.points)
     return ((index, front, point) for index, (front, point) in enumerate(pairs, start=1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trade(results.Data, results.Written):
+    """Time against cost: ``fronts`` of schedules of the scheme optimal, one for each momentum shift allowed."""
+
+    spacecraft: Spacecraft
+    fronts: tuple[Front, ...]
+
+    def __repr__(self) -> str:
+        return f"<Trade of {self.spacecraft.name}, fronts: {len(self.fronts)}, schedules: {len(self.plans)}>"
+
+    @property
+    def plans(self) -> tuple[Plan, ...]:
+        """Plans of all points, front after front, each from its earliest end to its latest."""
+        return tuple(point.plan for _, _, point in numbered(self.fronts))

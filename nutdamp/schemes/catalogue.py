@@ -7,11 +7,11 @@ headings from the fields. No scheme is loaded: the command line needs the names 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar
 
-from nutdamp.errors import BadRequest, SenselessOption
+from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.units import as_given, is_count, is_number
 
 LEAST = ("propellant", "impulse", "time", "pulses")
@@ -325,3 +325,32 @@ POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda s
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
+
+
+def expect_names(values: Iterable[str]) -> tuple[str, ...]:
+    """Names of schemes that there are, each once; raises BadRequest."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise BadRequest(f"names: expected a list of schemes, such as ['two-pulse'], got {as_given(values)}")
+    names = tuple(values)
+    for name in names:
+        if not isinstance(name, str) or name not in NAMES:
+            close = nearest(name, NAMES) if isinstance(name, str) else None
+            cure = f"there are {', '.join(NAMES)}" if close is None else f"did you mean {close!r}?"
+            raise BadRequest(f"there is no scheme {as_given(name)}; {cure}")
+    return tuple(dict.fromkeys(names))
+
+
+def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = None) -> Options | SchemeOptions | None:
+    """Options of one scheme or several, or those ``chosen`` by keyword, which the ``scheme`` must have.
+
+    Raises BadRequest.
+    """
+    if not (value is None or isinstance(value, Options | SchemeOptions)) or (value is not None and chosen):
+        raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
+    if not chosen:
+        return value
+    own = [] if scheme is None else [SCHEMES[scheme].options]
+    if unread := [*Options(**chosen).without_effect(own)] if own else []:
+        has = ", ".join(names_of(own[0]))
+        raise BadRequest(f"options: {scheme} has no {unread[0]!r}; there are {has}")
+    return Options(**chosen)

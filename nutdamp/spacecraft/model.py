@@ -303,9 +303,14 @@ class Spacecraft(results.Data, results.Shown):
     def replace(self, **fields: object) -> Spacecraft:
         """Spacecraft with fields replaced, in SI and principal axes: ``replace(mass=210.0)``.
 
-        Only names and types are checked; `with_` checks all that a file is checked for. Raises BadRequest.
+        Names, types and signs are checked; `with_` checks all that a file is checked for. Raises BadRequest.
         """
-        return units.replaced(self, fields)
+        changed = units.replaced(self, fields)
+        for name in ("mass", "dissipation"):
+            value = getattr(changed, name)
+            if value is not None and value <= 0.0:
+                raise BadRequest(f"{name} = {units.as_given(value)}: expected a number above zero")
+        return changed
 
     @property
     def thrust_laws(self) -> tuple[str, ...]:

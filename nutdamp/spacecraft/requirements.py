@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from nutdamp.errors import BadRequest
+from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft
 
 DAMPED_SHARE = 0.01
@@ -230,3 +232,36 @@ def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:
         return missed(spacecraft, left.nutation, left.aim)
     shares = [left_of(bound.part, left, spacecraft) / bound.most for bound in limits]
     return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))
+
+
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
+
+dispersions:
+  A: {normal: 2 %}
+  C: {normal: 2 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  timing: {uniform: 5 ms}"""
+"""Message for a file that should have dispersions."""
+
+LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
+
+loop:
+  sensor: {kind: gyro, rate: 100 Hz, noise: 0.01 deg/s, delay: 20 ms}
+  law: four-pulse
+  start: 0.5 deg
+  stop: 0.05 deg"""
+"""Message for a file that should have a loop."""
+
+
+def expect_dispersions(spacecraft: Spacecraft) -> None:
+    """Raise BadRequest, with an example to write, for a spacecraft without dispersions."""
+    if spacecraft.dispersions is None:
+        raise BadRequest(DISPERSIONS)
+
+
+def expect_loop(spacecraft: Spacecraft) -> Loop:
+    """Loop of a spacecraft; raises BadRequest, with an example to write, where there is none."""
+    if spacecraft.loop is None:
+        raise BadRequest(LOOP)
+    return spacecraft.loop

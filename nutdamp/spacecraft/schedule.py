@@ -264,6 +264,9 @@ class Schedule:
     def __iter__(self) -> Iterator[Pulse]:
         return iter(self.pulses)
 
+    def __getitem__(self, index: int) -> Pulse:
+        return self.pulses[index]
+
     @property
     def without_proof(self) -> Schedule:
         """Copy without the rigorous bound: for a motion that the bound was not derived for."""

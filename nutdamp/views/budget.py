@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, HeldNutation, HoldingBudget
+from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
 from nutdamp.control_loop.limit_cycle import Cycle
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.plan_json import heading
@@ -42,11 +42,11 @@ def _digits(count: int) -> Callable[[float], str]:
     return lambda value: f"{value:.{count}g}"
 
 
-def _tank(budget: HoldingBudget) -> bool:
+def _tank(budget: Budget) -> bool:
     return budget.spacecraft.tank is not None
 
 
-def _required(budget: HoldingBudget) -> bool:
+def _required(budget: Budget) -> bool:
     return budget.meets_requirement is not None
 
 
@@ -89,12 +89,12 @@ HELD = (
 )  # fmt: skip
 
 
-def budget_table(budget: HoldingBudget) -> DataTable:
+def budget_table(budget: Budget) -> DataTable:
     """A row for each pair of thresholds."""
     return DataTable("Limit cycles", HELD, budget.held, budget)
 
 
-def budget_screen(budget: HoldingBudget, *, verbose: bool = True) -> RenderableType:
+def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
     """The screen of ``budget``."""
     first, *others = _outlook(budget)
     head = [*opening(budget.spacecraft, verbose), Text(first, style="bold"), *map(Text, others)]
@@ -104,7 +104,7 @@ def budget_screen(budget: HoldingBudget, *, verbose: bool = True) -> RenderableT
     return summary(head, rows, remarks, "--csv budget.csv · --plot budget.png · nutdamp loop", verbose=verbose)
 
 
-def _outlook(budget: HoldingBudget) -> Iterator[str]:
+def _outlook(budget: Budget) -> Iterator[str]:
     """Course of the nutation without firing, and the time when damping must begin."""
     body, limit = budget.spacecraft, budget.largest
     now = degrees(body.nutation)
@@ -129,12 +129,12 @@ def _outlook(budget: HoldingBudget) -> Iterator[str]:
         yield "Pulses a day and propellant a year need a closed loop: the key loop of the file (nutdamp explain loop)."
 
 
-def _falls(budget: HoldingBudget, limit: float) -> str:
+def _falls(budget: Budget, limit: float) -> str:
     time = budget.until_largest
     return f"; it is below {most(limit)}" + (" already" if time == 0.0 else f" in {lasting(time)}")
 
 
-def _warnings(budget: HoldingBudget) -> Iterator[str]:
+def _warnings(budget: Budget) -> Iterator[str]:
     """Warnings of thresholds that waste propellant, of the present spin, and of a missing limit cycle."""
     body = budget.spacecraft
     warned: set[str] = set()
@@ -152,7 +152,7 @@ def _warnings(budget: HoldingBudget) -> Iterator[str]:
         yield "disturbances of the file are left out"
 
 
-def _warnings_of_row(row: HeldNutation, budget: HoldingBudget) -> Iterator[str]:
+def _warnings_of_row(row: HeldNutation, budget: Budget) -> Iterator[str]:
     body, loop = budget.spacecraft, budget.spacecraft.loop
     assert loop is not None
     if row.why:
@@ -182,7 +182,7 @@ def _second(cycle: Cycle, other: Cycle) -> str:
     return f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
 
 
-def _notes(budget: HoldingBudget) -> Iterator[str]:
+def _notes(budget: Budget) -> Iterator[str]:
     """Notes on the bounds of the limit cycle, and on the accuracy of the figures."""
     known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
     if known:
@@ -205,12 +205,12 @@ def _notes(budget: HoldingBudget) -> Iterator[str]:
         yield described(budget.spacecraft.loop, thresholds=False)
 
 
-def budget_csv(budget: HoldingBudget) -> str:
+def budget_csv(budget: Budget) -> str:
     """One row for each pair of thresholds; unknown values stay empty."""
     return budget_table(budget).csv()
 
 
-def budget_json(budget: HoldingBudget) -> dict[str, Any]:
+def budget_json(budget: Budget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
     body, table = budget.spacecraft, budget_table(budget)
     return {

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,8 +12,11 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from nutdamp import __version__
+from nutdamp.common.numerics import finite
+from nutdamp.common.results import Data
 from nutdamp.control_loop.stability import margins
-from nutdamp.errors import CannotRead, Fault, FaultyFile, listed
+from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
+from nutdamp.files.reader import Source
 from nutdamp.flight.end_state import at_start
 from nutdamp.montecarlo.inputs import DispersedInput, reachable
 from nutdamp.physics.thruster import Tank
@@ -316,6 +320,35 @@ def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
         }
         for fault in faults
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedFile(Data):
+    """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant."""
+
+    spacecraft: Spacecraft
+    doubts: tuple[Fault, ...]
+    data: Mapping[str, Any] = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of the file in ``check --json``."""
+        return finite(dict(self.data))
+
+
+def checked(
+    source: Source, name: str | None, doubts: list[Fault], warn: Callable[[Fault], object] = lambda _: None
+) -> CheckedFile:
+    """Check of a source called ``name``; ``doubts`` are added to the list, and ``warn`` is called with each.
+
+    Derived quantities may be faulty, too. Raises FaultyFile.
+    """
+    body = source.read(doubts.append)
+    for doubt in doubts:
+        warn(doubt)
+    try:
+        return CheckedFile(body, tuple(doubts), checked_json(name, body, doubts))
+    except NutdampError as wrong:
+        raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
 
 
 def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Fault] = ()) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from rich.constrain import Constrain
 from rich.padding import Padding
 from rich.text import Text
 
-from nutdamp.views.guide import SOURCES, SUMMARIES, Block, CommandHelp, Formula, Topic, TopicRows
+from nutdamp.views.guide import MOTION, PAGES, SCHEMES, SOURCES, Block, CommandHelp, Formula, Topic, TopicRows, page
 from nutdamp.views.layout import facts
 
 WIDEST = 100
@@ -20,11 +20,18 @@ NARROW = 60
 
 
 def topics_screen() -> RenderableType:
-    """All topics with a line about each."""
-    parts: list[RenderableType] = [Text("What can be explained: nutdamp explain TOPIC")]
-    for group, topics in SUMMARIES:
-        parts += [Text(), Text(group, style="bold"), _Pairs(topics)]
-    return Constrain(Group(*parts), WIDEST)
+    """All pages with a line about each, and what else can be asked for."""
+    parts: list[RenderableType] = [Text("The guide: nutdamp explain TOPIC")]
+    for group, names in PAGES:
+        rows = tuple((name, page(name).summary) for name in names)
+        parts += [Text(group, style="bold"), Padding(_Pairs(rows), (0, 0, 0, 2))]
+    others = (
+        ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
+        ("Motion", ", ".join(topic.name for topic in MOTION)),
+        ("Equations", "17, K7, 24.4"),
+        ("Words", "any heading of a table, column, name in JSON, symbol, or key of the file, as in: explain tilt"),
+    )
+    return Constrain(Group(*parts, _Pairs(others)), WIDEST)
 
 
 def examples_screen(rows: tuple[tuple[str, str], ...]) -> RenderableType:
@@ -71,7 +78,8 @@ class _Pairs:
         self.rows = rows
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        if options.max_width < NARROW:
+        longest = max(len(name) for name, _ in self.rows)
+        if options.max_width < NARROW or longest > 0.45 * options.max_width:
             for name, text in self.rows:
                 yield Text(name, style="dim", overflow="fold")
                 yield Padding(Text(text, overflow="fold"), (0, 0, 0, 2))

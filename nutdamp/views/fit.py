@@ -20,13 +20,6 @@ from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, mass
 from nutdamp.views.verdicts import exact_percent, percent
 
-UNITS = {
-    "axis": ("deg", 180.0 / math.pi),
-    "acceleration": ("m/s²", 1.0),
-    "sun_pulse": ("ms", 1e3),
-}
-"""Units of signals for people, and their factors; of all others deg/s."""
-
 FAR = 4.0
 """Sigmas of the file from which on a change is remarked upon."""
 
@@ -39,7 +32,9 @@ MOST_PAIRS = 6
 
 def in_shown(signal: str) -> tuple[str, float]:
     """Unit in which a signal is shown, and its factor from SI."""
-    return UNITS.get(signal, ("deg/s", 180.0 / math.pi))
+    if signal == "acceleration":
+        return "m/s²", 1.0
+    return ("ms", 1e3) if signal == "sun_pulse" else ("deg" if signal == "axis" else "deg/s", 180.0 / math.pi)
 
 
 def _scaled(name: str, row: Estimate) -> float | None:

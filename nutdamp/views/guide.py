@@ -1,24 +1,28 @@
-"""The guide that ``nutdamp explain`` shows: topics by name, read from Markdown files; `explain_tables` lays them out.
+"""The guide that ``nutdamp explain`` shows, read from its Markdown pages; `explain_tables` lays them out.
 
-The numbered equations of the sources are in `equations.md`, their symbols in `symbols.md`; the units of files and
-options come from the table that reads them.
-
-``# name :: summary`` begins a topic and ``## title`` a part of it. Blank lines separate blocks: lines indented by four
-are a formula, ``- name :: text`` a row, ``$`` a command line (two blanks where it may be broken), all else a paragraph.
+A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the pages of `ENTRIES` each
+``## name`` begins a topic of its own, again with a line of summary, and ``### title`` a part of it; on the others
+``## title`` begins a part. Blocks are what the web shows: paragraphs, tables, code, and lists, in which
+``- **name**: text`` is a row. The units of files and options come from the table that reads them.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple, cast
 
 from nutdamp.errors import BadRequest, nearest
 from nutdamp.units import KINDS, Kind
 
+FOLDER = Path(__file__).parents[1] / "guide"
+"""Folder of the pages."""
+
 
 class Formula(NamedTuple):
-    """Lines of a formula, in plain Unicode."""
+    """Lines of a formula or of a screen, in plain Unicode, as they are."""
 
     lines: tuple[str, ...]
 
@@ -54,15 +58,40 @@ class Topic(NamedTuple):
     parts: tuple[TopicPart, ...]
 
 
-def _page(file: str) -> str:
-    """The text of a Markdown file of the guide."""
-    return (Path(__file__).parents[1] / "guide" / file).read_text(encoding="utf-8")
+ENTRIES = ("schemes", "motion", "equations")
+"""Pages whose sections are topics of their own."""
 
 
-def topics(file: str) -> tuple[Topic, ...]:
-    """The topics of ``file``, in order."""
-    text = _page(file)
-    return tuple(map(_topic, _sections(text, "# ")[1:]))
+@cache
+def page(name: str) -> Topic:
+    """The page of that name; of a page of `ENTRIES` its introduction and the names of its topics."""
+    first, *sections = _sections(_text(name), "## ")
+    _, _, body = first.lstrip("\n").partition("\n")
+    intro = _topic(f"{name}\n{body}", "### ")
+    if name in ENTRIES:
+        rows = TopicRows(tuple((topic.name, topic.summary) for topic in entries(name)))
+        return intro._replace(parts=(*intro.parts, TopicPart("", (rows,))))
+    return intro._replace(parts=(*intro.parts, *map(_part, sections)))
+
+
+@cache
+def entries(name: str) -> tuple[Topic, ...]:
+    """The topics on a page of `ENTRIES`, in order."""
+    return tuple(_topic(section, "### ") for section in _sections(_text(name), "## ")[1:])
+
+
+def rows(name: str) -> Iterator[tuple[str, str]]:
+    """The rows of all lists and tables of a page."""
+    for part in page(name).parts:
+        for block in part.blocks:
+            if isinstance(block, TopicRows):
+                yield from block.rows
+
+
+def _text(name: str) -> str:
+    """The text of a page, without comments and pictures."""
+    text = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
+    return re.sub(r"<!--.*?-->\n?|!\[.*?\]\(.*?\)\n?", "", text, flags=re.DOTALL)
 
 
 def _sections(text: str, mark: str) -> list[str]:
@@ -70,29 +99,74 @@ def _sections(text: str, mark: str) -> list[str]:
     return f"\n{text}".split(f"\n{mark}")
 
 
-def _topic(text: str) -> Topic:
-    name, _, rest = text.partition(" :: ")
-    summary, _, body = rest.partition("\n")
-    first, *others = _sections(body, "## ")
-    parts = [("", first)] if first.strip() else []
-    titled = (tuple(other.split("\n", 1)) for other in others)
-    return Topic(name, summary, tuple(TopicPart(title, _blocks(blocks)) for title, blocks in (*parts, *titled)))
+def _topic(text: str, mark: str) -> Topic:
+    """The topic of a text whose first line is its name, and whose first paragraph is the summary."""
+    first, *others = _sections(text, mark)
+    name, _, rest = first.strip("\n").partition("\n")
+    summary, *body = _blocks(rest)
+    opening = (TopicPart("", tuple(body)),) if body else ()
+    return Topic(name, str(summary), (*opening, *map(_part, others)))
 
 
-def _blocks(text: str) -> tuple[Block, ...]:
-    return tuple(map(_block, re.split(r"\n\n+", text.strip("\n"))))
+def _part(text: str) -> TopicPart:
+    title, _, body = text.partition("\n")
+    return TopicPart(title, tuple(_blocks(body)))
+
+
+def _blocks(text: str) -> Iterator[Block]:
+    for number, part in enumerate(re.split(r"^```(.*\n(?:.*\n)*?)```$", text, flags=re.MULTILINE)):
+        if number % 2:
+            yield _code(part.rstrip("\n").split("\n")[1:])
+        else:
+            yield from map(_block, filter(str.strip, re.split(r"\n\n+", part.strip("\n"))))
+
+
+def _code(lines: list[str]) -> Block:
+    """Command lines alone, or lines to show as they are."""
+    if all(line.startswith("$ ") for line in lines):
+        return CommandHelp(tuple(tuple(re.split(r" (?=--?[a-z])", line[2:])) for line in lines))
+    return Formula(tuple(lines))
 
 
 def _block(text: str) -> Block:
     lines = text.split("\n")
     if text.startswith("    "):
         return Formula(tuple(line[4:] for line in lines))
-    if text.startswith("$ "):
-        return CommandHelp(tuple(tuple(line[2:].split("  ")) for line in lines))
+    if text.startswith("| "):
+        return _table(lines)
     if text.startswith("- "):
-        named = (row.replace("\n  ", " ").partition(" :: ") for row in text[2:].split("\n- "))
-        return TopicRows(tuple((name, meaning) for name, _, meaning in named))
-    return " ".join(lines)
+        named = (_plain(row).partition("**: ") for row in text[2:].split("\n- "))
+        return TopicRows(tuple((name[2:], meaning) if mark else ("·", name) for name, mark, meaning in named))
+    return _plain(text)
+
+
+def _table(lines: list[str]) -> TopicRows:
+    """The rows of a table: the first cell as name; further ones under their headings where there are several."""
+    heads, _, *cells = (
+        [_plain(cell.strip()).replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines
+    )
+    if len(heads) == 2:
+        return TopicRows(tuple((name, text) for name, text in cells))
+    return TopicRows(
+        tuple(
+            (name, "\n".join(f"{head}: {text}" for head, text in zip(heads[1:], texts, strict=True) if text))
+            for name, *texts in cells
+        )
+    )
+
+
+_LINK = re.compile(r"(?P<before>explain |, )?\[(?P<text>[^\]]+)\]\((?P<page>[^)#]*?)(\.md)?(#(?P<entry>[^)]*))?\)")
+
+
+def _plain(text: str) -> str:
+    """A text on one line, with links as the commands that show where they lead."""
+
+    def shown(link: re.Match[str]) -> str:
+        before, words, entry = link["before"] or "", link["text"], link["entry"] or Path(link["page"]).name
+        known = before or "/" in link["page"] or ":" in link["page"] or words.casefold() == entry
+        return f"{before}{words}" if known else f"{words} (explain {entry})"
+
+    return _LINK.sub(shown, " ".join(text.split()))
 
 
 def _line(kind: Kind) -> str:
@@ -122,7 +196,9 @@ def units_topic() -> Topic:
                     "or one that is not listed, is an error that names those allowed; Hz is for sampling rates "
                     "alone, and revolutions are no unit here, since nobody can tell whether they count turns or "
                     "radians.",
-                    "Reports show degrees, CSV and JSON name the unit in the column or key, such as t_s, nutation_deg.",
+                    "A share is a plain number or has %. Screens show degrees, s, N m s, g or kg of propellant, "
+                    "the spin in rpm and rad/s; CSV and JSON name the unit in the column or key, such as t_s, "
+                    "nutation_deg.",
                 ),
             ),
             TopicPart("See also", ("explain file",)),
@@ -130,10 +206,19 @@ def units_topic() -> Topic:
     )
 
 
-__all__ = ["FILE", "NAMES", "OVERVIEW", "SOURCES", "SUMMARIES", "found", "limits", "meant"]
+PAGES = (
+    ("To begin", ("tutorial", "reading", "glossary")),
+    ("How to", ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "fit", "report", "library")),
+    ("Reference", ("commands", "file", "csv", "json", "units")),
+    ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
+    ("The project", ("contributing", "speed", "changes")),
+)
+"""The pages in groups."""
 
-SCHEMES, MOTION = topics("schemes.md"), topics("motion.md")
-CODE = topics("contributing.md")
+FILE = "file"
+"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.file_guide`)."""
+
+SCHEMES, MOTION = entries("schemes"), entries("motion")
 
 SOURCES = (
     'M(n): K. Magnus, "Untersuchungen über zeitabhängig selbsterregte, symmetrische Kreisel", 1970',
@@ -141,57 +226,38 @@ SOURCES = (
     '24.4: lecture text "Kreiseltheorie", section 24.4',
 )
 
-FILE = "file"
-"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.file_guide`)."""
-
 OVERVIEW = "equations"
 """Name of the table of all equations."""
 
-SUMMARIES: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
-    ("Schemes", tuple((topic.name, topic.summary) for topic in SCHEMES)),
-    (
-        "Motion",
-        (
-            *((topic.name, topic.summary) for topic in MOTION),
-            (OVERVIEW, "the numbered equations of the sources, and where they are in the code"),
-            ("17", "one of them: M(1) to M(27) as 1 to 27, K(5) to K(15) as K5 to K15, 24.4"),
-        ),
-    ),
-    (
-        "Files",
-        (
-            (FILE, "every key of the spacecraft file; file.thrusters, file.limits.tick: a part of it"),
-            ("units", "units of the spacecraft file and of options"),
-        ),
-    ),
-    ("Code", tuple((topic.name, topic.summary) for topic in CODE)),
-)
-"""All topics with a line about each, in groups."""
-
-NAMES = tuple(name for _, group in SUMMARIES for name, _ in group)
+NAMES = (*(name for _, names in PAGES for name in names), *(topic.name for topic in (*SCHEMES, *MOTION)))
+"""Names of pages, and of the topics on them that are no equations."""
 
 _NUMBER = re.compile(r"(?P<source>m|k|§)?\s*\(?\s*(?P<number>[0-9]+(\.[0-9]+)?)\s*\)?")
 _FIGURE = re.compile(r"(abb|fig)[a-z]*\.?-?[0-9]*")
 
 
 def found(requested: str) -> Topic:
-    """The topic by its name or by the number of an equation, but for `FILE` and `OVERVIEW`.
+    """The page or topic by its name or by the number of an equation, but for `FILE` and `OVERVIEW`.
 
     Raises BadRequest, which names a near one, where there is none.
     """
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
-    known = {topic.name: topic for topic in (*SCHEMES, *MOTION, *CODE)}
-    if name in known:
-        return known[name]
     if name == "units":
         return units_topic()
+    if name in NAMES:
+        return page_or_topic(name)
     if name == "energy-sink":
-        return known["dissipation"]
+        return page_or_topic("dissipation")
     if _FIGURE.fullmatch(name):
-        return known["figures"]
+        return page_or_topic("figures")
     if match := _NUMBER.fullmatch(requested.strip().casefold()):
         return _equation(match["source"] or "", match["number"])
     raise BadRequest(f"there is no topic {requested!r}; {meant(name, NAMES)}")
+
+
+def page_or_topic(name: str) -> Topic:
+    """The entry of `NAMES`."""
+    return next((topic for topic in (*SCHEMES, *MOTION) if topic.name == name), None) or page(name)
 
 
 def _equation(source: str, number: str) -> Topic:
@@ -212,10 +278,8 @@ def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") ->
 
 
 def limits() -> tuple[str, ...]:
-    """Assumptions and limits, a paragraph each; the README has the same ones."""
-
-    text = _page("limits.md")
-    return tuple(" ".join(part.split()) for part in re.split(r"^- ", text, flags=re.MULTILINE) if part.strip())
+    """Assumptions and limits, a paragraph each."""
+    return tuple(text for _, text in rows("limits"))
 
 
 class Equation(NamedTuple):
@@ -257,9 +321,8 @@ class Equation(NamedTuple):
         return Topic(self.number, self.subject, parts)
 
 
-(_symbols,) = topics("symbols.md")
-SYMBOLS = dict(cast("TopicRows", _symbols.parts[0].blocks[0]).rows)
+SYMBOLS = dict(rows("symbols"))
 """Symbols of the sources with their units."""
 
-EQUATIONS = tuple(map(Equation.of, topics("equations.md")))
+EQUATIONS = tuple(map(Equation.of, entries("equations")))
 """Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""

@@ -52,13 +52,13 @@ def _apart(value: float) -> str:
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column("channel", "channel", "", lambda row: row.firing.pulse.channel, where="verified difference", kind=TEXT),
+    Column("channel", "channel", "", lambda row: row.firing.pulse.channel, where="verified verified_json", kind=TEXT),
     Column("", "start", "s", lambda row: row.firing.pulse.start, seconds, "screen"),
-    Column("start_s", "start", "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified difference"),
-    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified difference"),
+    Column("start_s", "start", "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
+    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
     Column("", "on-time", "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
-    Column("on_time_s", "on-time", "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified difference"),
-    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified difference"),
+    Column("on_time_s", "on-time", "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
+    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
     Column("", "channel", "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
     Column("seen_deg", "nutation seen", "deg", lambda row: math.degrees(row.firing.seen), small_angle, "screen json"),
@@ -66,7 +66,7 @@ FIRINGS = (
     Column("", "after", "deg", lambda row: math.degrees(row.after), small_angle, "screen"),
     Column("", "nutation", "deg", lambda row: math.degrees(row.firing.true_nutation), small_angle, "verified"),
     Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
-           "verified difference"),
+           "verified verified_json"),
 )  # fmt: skip
 
 
@@ -285,5 +285,5 @@ def verified_json(verification: LoopVerification) -> dict[str, Any]:
         "missing": verification.missing or None,
         "evaluations": verification.evaluations,
         "until_s": run.until,
-        "firings": _differences(verification).json("difference"),
+        "firings": _differences(verification).json("verified_json"),
     }

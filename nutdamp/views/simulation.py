@@ -31,18 +31,18 @@ IMPULSES, WIDTHS = "impulse approximation (17)", "full simulation"
 """Names of the two models."""
 
 
-class EndRow(NamedTuple):
+class ModelEnd(NamedTuple):
     """The end of a flight by one of the models."""
 
     model: str
     flight: Flight
 
 
-def _residual(name: str) -> Callable[[EndRow], str]:
+def _residual(name: str) -> Callable[[ModelEnd], str]:
     return lambda row: degrees(getattr(row.flight.residual, name))
 
 
-def _direction(name: str, at: int) -> Callable[[EndRow], str]:
+def _direction(name: str, at: int) -> Callable[[ModelEnd], str]:
     return lambda row: angle_texts(row.flight.spacecraft, getattr(row.flight.final, name))[at]
 
 
@@ -61,7 +61,7 @@ def _columns(body: Spacecraft, until: float) -> Iterator[Column]:
 
 def end_comparison(simulation: Simulation) -> DataTable:
     """Residuals and directions at the end by both models."""
-    rows = EndRow(IMPULSES, simulation.impulses), EndRow(WIDTHS, simulation.flown)
+    rows = ModelEnd(IMPULSES, simulation.impulses), ModelEnd(WIDTHS, simulation.flown)
     columns = tuple(_columns(simulation.flown.spacecraft, simulation.extremes.until))
     return DataTable("Final state by both models", columns, rows)
 

@@ -4,7 +4,7 @@
 
 Whole processes take turns with what they are compared with, after one unmeasured turn, so that a machine that slows
 down slows them all; times are medians: of processor time, but of the time passed where several threads work.
-`--markdown` prints the table of README. What a process works inside is timed by `inside.py`, in a process of its own.
+`--markdown` prints a table. What a process works inside is timed by `inside.py`, in a process of its own.
 A limit that is missed is marked, and the exit status is 1.
 """
 
@@ -205,7 +205,7 @@ def line(row: Row) -> str:
 
 
 def markdown(rows: list[Row]) -> str:
-    """The rows as a table of README."""
+    """The rows as a table in Markdown."""
     lines = ["| what | time | ratio |", "|---|---|---|"]
     for row in rows:
         scale, unit = next(

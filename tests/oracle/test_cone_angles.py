@@ -17,7 +17,7 @@ from support.places import case
 from support.process import Run
 
 from nutdamp import load
-from nutdamp.figures.motion import title
+from nutdamp.figures.overview import title
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm
@@ -97,7 +97,7 @@ def test_free_motion_is_one_thing_in_all_that_tells_it(name: str) -> None:
         assert math.degrees(track.nutation.max()) == pytest.approx(said["nutation_deg"], rel=1e-4)
         for key in ("nutation_deg", "body_cone_deg", "space_cone_deg"):
             assert left[key] == pytest.approx(said[key], rel=1e-12)
-        assert f"nutation at most {said['nutation_deg']:.4g} deg" in title(flown)
+        assert f"nutation at most {said['nutation_deg']:#.3g}°" in title(flown)
     model = DispersedModel(body, Schedule())
     out = np.empty((len(OUTPUTS), 1))
     measure(model, ClosedForm(model)(model.cases({})), out)

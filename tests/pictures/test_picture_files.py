@@ -45,14 +45,14 @@ pytestmark = pytest.mark.usefixtures("plans_shared")
     ("path", "magic"), [("a.png", b"\x89PNG"), ("b.SVG", b"<?xml"), deep("c.d.pdf", b"%PDF"), ("-", b"\x89PNG")]
 )
 def test_the_ending_says_the_format_and_the_same_flight_gives_the_same_file(path: str, magic: bytes) -> None:
-    figure = drawn("timeline", "no pulses")
+    figure = drawn("history", "no pulses")
     content = image.rendered(figure, path)
     assert content.startswith(magic)
     assert image.rendered(figure, path) == content
 
 
 def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch: pytest.MonkeyPatch) -> None:
-    figure, said = drawn("timeline", "no pulses"), []
+    figure, said = drawn("history", "no pulses"), []
     for ending, paths in (
         (image.ending, ("a.bmp", "a", "png", "a.png.gz", ".png")),
         (film_format, ("a.webm", "gif")),
@@ -80,9 +80,9 @@ def test_other_endings_and_missing_programs_are_named_with_the_cure(monkeypatch:
 
 
 def test_settings_of_the_user_change_nothing() -> None:
-    plain = image.rendered(drawn("timeline", "no pulses"), "a.png")
+    plain = image.rendered(drawn("history", "no pulses"), "a.png")
     with mpl.rc_context({"axes.facecolor": "red", "font.size": 20, "text.usetex": True, "savefig.dpi": 10}):
-        assert image.rendered(drawn("timeline", "no pulses"), "a.png") == plain
+        assert image.rendered(drawn("history", "no pulses"), "a.png") == plain
         assert mpl.rcParams["font.size"] == 20
 
 
@@ -91,7 +91,7 @@ def test_settings_of_the_user_change_nothing() -> None:
 
 def test_inline_svg_stands_in_any_page() -> None:
     """As wide as what holds it, in the colour of the text around, and no rule or id of it meets another's."""
-    shown = [image.svg(drawn("timeline", case)) for case in ("wide pulses", "no pulses")]
+    shown = [image.svg(drawn("history", case)) for case in ("wide pulses", "no pulses")]
     ids = []
     for text in shown:
         root = ET.fromstring(text)
@@ -105,9 +105,9 @@ def test_inline_svg_stands_in_any_page() -> None:
         assert set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text)) <= set(ids[-1])
     assert not set(ids[0]) & set(ids[1])
     assert not re.search(r'\sd="[^"]*\.\d{3}', shown[0])
-    for content in (shown[0], image.rendered(drawn("timeline", "wide pulses"), "a.svg").decode()):
+    for content in (shown[0], image.rendered(drawn("history", "wide pulses"), "a.svg").decode()):
         words = re.findall(r"<text[^>]*>([^<]*)</text>", content)
-        assert "Firings" in words
+        assert "θ, ° (log)" in words
         assert any(word.startswith("1: ") for word in words)
         assert "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif" in content
 
@@ -141,7 +141,7 @@ def test_a_path_that_goes_straight_back_is_drawn_once() -> None:
 def test_a_page_has_the_bands_of_all_pulses_of_a_panel_as_one_path() -> None:
     content = image.svg(flight_picture("history", WIDE, kicks(WIDE, 30, 0.7, 0.1)))
     outlines = re.findall(r'<path d="([^"]*)"[^>]*fill-opacity: 0\.25', content)
-    assert sorted(outline.count("M") for outline in outlines) == [1, 30, 30, 30, 30]  # the first is in the legend
+    assert sorted(outline.count("M") for outline in outlines) == [1, 30, 30]  # the first is in the legend
 
 
 def digest() -> str:

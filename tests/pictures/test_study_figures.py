@@ -1,4 +1,4 @@
-"""Figures of studies and of loops: distributions, final H, tornado, firings."""
+"""Figures of studies and of loops: distributions, final H, firings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch, Rectangle, StepPatch
+from matplotlib.patches import PathPatch, StepPatch
 from support.builders import aimed, spinner
 from support.cases import deep, weekly
 from support.colours import check_colours
@@ -26,15 +26,13 @@ from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.figures import dispersion
 from nutdamp.figures.history import BAR
-from nutdamp.figures.loop import loop_figure
-from nutdamp.figures.loop_cases import loop_cases_figure
+from nutdamp.figures.loop import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
 from nutdamp.page.pictures import dispersion_pictures_of
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
-from nutdamp.views.tolerance_tables import budget_rows, in_words
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -42,7 +40,7 @@ POINTED = replace(
     aimed(spinner(steerable=Steerable(50.0), requirement=REQUIRED), 10.0, 30.0),
     dispersions=replace(TOLERANCES, thrust={}),
 )
-NAMES = ("overview", "cases", "momentum", "budget")
+NAMES = ("overview", "cases", "momentum")
 OFFSET = Tolerance("bias", 0.01)
 
 
@@ -68,39 +66,33 @@ def test_studies_are_drawn_whole_seen_on_any_page_and_say_what_is_met(name: str,
 
 @pytest.mark.deep
 @pytest.mark.parametrize("which", ["shift", weekly("target")])
-def test_histograms_and_cases_beyond_reach_the_last_case(which: str) -> None:
-    """One of 3,000 lies beyond the last but one, as far as the maximum; the scale is that of the histogram beside."""
+def test_curves_and_histograms_hold_all_cases(which: str) -> None:
+    """The curve is the share of cases within a value; a point on it is that of the requirement."""
     results = study(which)
     assert results.values is not None
-    axes = drawn("cases", which).axes
     outputs = ("nutation", "momentum_shift" if which == "shift" else "axis_error")
-    for histogram, function, output in zip(axes[::2], axes[1::2], outputs, strict=True):
+    for axes, output in zip(drawn("cases", which).axes, outputs, strict=True):
         values = np.sort(np.degrees(results.values[OUTPUTS.index(output)]))
-        (stairs,) = (patch for patch in histogram.patches if isinstance(patch, StepPatch))
+        (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
         heights, edges, _ = stairs.get_data()
-        assert edges[-1] == pytest.approx(values[-1])
-        assert float(np.sum(heights)) == pytest.approx(100.0)
-        assert histogram.get_xlim()[1] >= edges[-1]
-        assert function.get_xlim() == histogram.get_xlim()
-        places, shares = line(function, "cases").T
-        assert places[-3:] == pytest.approx([values[-2], values[-1], values[-1]], rel=1e-3)
-        assert shares[-3:-1] == pytest.approx([100.0 / len(values)] * 2)
-        assert shares[-1] < function.get_ylim()[0] < shares[-2]
-        for place, beyond in zip(places[:-1:7], shares[:-1:7], strict=True):
-            assert 100.0 * np.mean(values > place * (1.0 + 1e-9)) == pytest.approx(beyond, abs=100.5 / len(values))
+        counts, _ = np.histogram(values, [min(values[0], edges[0]), *edges[1:-1], values[-1]])
+        assert heights == pytest.approx(dispersion.HIGHEST * counts / counts.max())
+        places, shares = line(axes, "cases within").T
+        assert (places[-1], shares[-1]) == (pytest.approx(values[-1]), 100.0)
+        for place, share in zip(places[::37], shares[::37], strict=True):
+            assert 100.0 * np.mean(values <= place * (1.0 + 1e-9)) == pytest.approx(share, abs=200.0 / len(values))
+        (dot,) = (one for one in axes.lines if one.get_marker() == "o")
+        assert np.asarray(dot.get_xydata())[0] == pytest.approx([np.quantile(values, 0.997), 99.7], rel=0.02)
 
 
 def test_a_histogram_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
     axes = Figure().subplots()
-    dispersion._histogram(axes, Exact(values), "nutation left", None)
+    dispersion.draw_distribution(axes, Exact(values), "nutation left, °", None, 60)
     assert axes.get_xscale() == "log"
-    assert "log axis" in axes.get_title()
+    assert axes.get_xlabel() == "nutation left, ° (log)"
     (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
-    shares, edges, _ = stairs.get_data()
-    assert edges[-1] == pytest.approx(50.0)
-    assert float(np.sum(shares)) == pytest.approx(100.0)
-    assert shares[-1] == pytest.approx(0.01)
+    assert stairs.get_data()[1][-1] == pytest.approx(50.0)
 
 
 @pytest.mark.deep
@@ -111,12 +103,12 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     results = studied(replace(BODY, dispersions=still), 50)
     figure = dispersion.dispersion_figure("cases", results, scheme="two-pulse")
     check_layout(figure)
-    most = results.distribution("nutation")
-    assert most is not None
-    left = math.degrees(most.maximum)
-    assert (left >= 1e-6) == bool(bias)
-    said = f"all 50 cases:\n{f'{left:.4g}°' if bias else 'below 1e-6°'}, required 0.5°"
-    for axes in figure.axes[:2]:
+    for axes, output, required in zip(figure.axes, ("nutation", "momentum_shift"), (0.5, 0.2), strict=True):
+        most = results.distribution(output)
+        assert most is not None
+        left = math.degrees(most.maximum)
+        assert (left >= 1e-6) == bool(bias)
+        said = f"all 50 cases:\n{f'{left:#.3g}°' if bias else 'below 1e-6°'}, required {required:.3f}°"
         assert [text.get_text() for text in axes.texts] == [said]
         assert not len(axes.get_xticks())
         assert not axes.lines
@@ -170,53 +162,19 @@ def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
 
 
 @pytest.mark.deep
-def test_the_tornado_has_the_rows_and_effects_of_the_table_and_says_what_they_are() -> None:
-    results = study()
-    rows = budget_rows(results.study)
-    first, figure = results.study.first_order, drawn("budget")
-    names = [entry.name for entry in first.inputs]
-    titles = []
-    for axes, output in zip(figure.axes, ("nutation", "momentum_shift"), strict=True):
-        effects = np.degrees(first.effects(output))
-        assert len(axes.patches) == len(rows)
-        lengths = []
-        labels = [text.get_text() for text in axes.get_yticklabels()]
-        for bar, label in zip(axes.patches, labels, strict=True):
-            (row,) = (one for one in rows if label == (f"{one.name}, {one.size}" if one.size else one.name))
-            lengths.append(float(bar.get_extents().transformed(axes.transData.inverted()).x1))
-            assert lengths[-1] == pytest.approx(math.sqrt(sum(float(effects[index]) ** 2 for index in row.inputs)))
-            if len(row.inputs) == 1:
-                assert row.name == in_words(names[row.inputs[0]])
-            assert (bar.get_hatch() == "////") == (bar.get_label() == "bias, not one sigma") == row.bias
-        assert any(label.startswith("A, ") for label in labels)
-        # On each side the largest is on top; what has no name of its own comes last.
-        named = lengths[:-1] if labels[-1].endswith(" others") else lengths
-        assert named == sorted(named, reverse=True)
-        assert axes.get_yticks()[0] == max(axes.get_yticks())
-        titles.append(" ".join(axes.get_title().split()))
-    assert sorted(index for row in rows for index in row.inputs) == list(range(len(names)))
-    check_text("pictures.tornado", "\n".join(titles))
-    assert "bias, not one sigma" in legend_words(figure)
-
-
-@pytest.mark.deep
-@pytest.mark.parametrize("name", ["budget", *map(weekly, NAMES[:3])])
-def test_nothing_that_varies_is_an_empty_tornado(name: str) -> None:
+@pytest.mark.parametrize("name", ["overview", *map(weekly, NAMES[1:])])
+def test_nothing_that_varies_is_drawn(name: str) -> None:
     results = studied(replace(BODY, dispersions=Dispersions(timing_offset=OFFSET)), 50)
     check_layout(dispersion.dispersion_figure(name, results, scheme="two-pulse"))
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize(
-    ("required", "biased"),
-    [(None, False), (Requirement(nutation=0.01), True), (Requirement(nutation=0.01, momentum_shift=0.01), False)],
-)
-def test_captions_name_no_bias_and_no_bound_that_is_not_drawn(required: Requirement | None, biased: bool) -> None:
-    varied = Dispersions(A=Tolerance("normal", 0.02, relative=True), timing_offset=OFFSET if biased else None)
+@pytest.mark.parametrize("required", [None, Requirement(nutation=0.01), Requirement(momentum_shift=0.01)])
+def test_captions_name_no_bound_that_is_not_drawn(required: Requirement | None) -> None:
+    varied = Dispersions(A=Tolerance("normal", 0.02, relative=True))
     results = studied(replace(BODY, requirement=required, dispersions=varied), 50)
-    _, momentum, budget = dispersion_pictures_of(results, "two-pulse")
+    _, momentum = dispersion_pictures_of(results, "two-pulse")
     assert ("required" in momentum.caption) == (required is not None and required.momentum_shift is not None)
-    assert ("bias" in budget.caption) == biased
 
 
 # --- loops -----------------------------------------------------------------------------------------------------------
@@ -237,9 +195,9 @@ def looping(requirement: Requirement | None = None) -> Spacecraft:
 def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
     figure = loop_figure(loop_of(looping(), 60.0))
     check_layout(figure)
-    fired = figure.axes[2]
+    fired = next(axes for axes in figure.axes if not axes.get_ylabel())
     assert len(fired.get_yticks()) == 4
-    assert all(re.fullmatch(r"[\d–-]*", text.get_text()) for text in fired.texts)
+    assert all(re.fullmatch(r"[\d–: .s]*", text.get_text()) for text in fired.texts)
     numbers = [text.get_window_extent() for text in fired.texts if text.get_text()]
     assert numbers
     for number in numbers:
@@ -253,19 +211,21 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
 def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bool) -> None:
     body = looping(Requirement(momentum_shift=math.radians(most)))
     results = run_loops(LoopResults(loop_study(body, 60.0), 20))
-    figure = loop_cases_figure(results)
+    figure = dispersion.loop_cases_figure(results)
     check_layout(figure)
-    panels = {axes.get_xlabel(): axes for axes in figure.axes}
-    for name, output, scale in (
-        ("first quiet, s", "settled", 1.0),
-        ("left then, deg", "quiet", 180.0 / math.pi),
-        ("propellant, g", "propellant", 1e3),
-    ):
-        bars, values = [one for one in panels[name].patches if isinstance(one, Rectangle)], scale * results.of(output)
-        assert sum(one.get_height() for one in bars) == len(values)
-        ends = [bars[0].get_x(), bars[-1].get_x() + bars[-1].get_width()]
-        assert ends == pytest.approx([values.min(), values.max()]) or values.min() == values.max()
-    shift = panels["shift of H, deg"]
+    nutation, shift = figure.axes
+    assert line(nutation, "cases within")[-1] == pytest.approx([np.degrees(results.of("nutation").max()), 100.0])
     levels = [float(np.asarray(one.get_xdata())[0]) for one in shift.lines if one.get_label() == "required"]
     assert levels == ([pytest.approx(most)] if beside else [])
-    assert ("outside the view" in shift.get_title()) is not beside
+    assert f"required {most:#.3g}".rstrip(".") in shift.get_title()
+
+
+@pytest.mark.deep
+def test_the_first_seconds_of_a_long_run_are_enlarged() -> None:
+    plan = loop_of(looping(), 400.0)
+    figure = loop_figure(plan)
+    check_layout(figure)
+    whole, first = figure.axes[:2]
+    assert whole.get_xlim()[1] == pytest.approx(400.0)
+    assert first.get_xlim()[1] == pytest.approx(first_seconds(plan))
+    assert figure.axes[1].get_title() == f"The first {first_seconds(plan):#.3g} s"

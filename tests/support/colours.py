@@ -13,10 +13,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from support.layout import texts
 
-from nutdamp.figures import export
+from nutdamp.figures import image
 from nutdamp.figures.style import FAINT, GREY, INK, PAPER
 
-PAGE = Path(export.__file__).parents[1] / "page" / "page.css"
+PAGE = Path(image.__file__).parents[1] / "page" / "page.css"
 
 Colour = str | tuple[str, float]
 

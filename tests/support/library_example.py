@@ -1,4 +1,4 @@
-"""The example of the README."""
+"""The example of the guide."""
 
 import nutdamp
 

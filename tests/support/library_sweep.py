@@ -1,4 +1,4 @@
-"""The sweep of the README."""
+"""The sweep of the guide."""
 
 import nutdamp
 

@@ -21,7 +21,6 @@ def unpictured() -> Iterator[None]:
         content,
         moving_of=one,
         pictures_of=several,
-        schemes_picture_of=one,
         trade_picture_of=one,
         dispersion_pictures_of=several,
     ):

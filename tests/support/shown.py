@@ -12,7 +12,7 @@ from matplotlib.text import Annotation
 from support.builders import aimed, cross, fan, spinner
 from support.markup import Node, parsed
 
-from nutdamp.figures import export, geometry, overview
+from nutdamp.figures import geometry, overview
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
@@ -37,11 +37,11 @@ def kicks(body: Spacecraft, count: int, step: float, on_time: float) -> Schedule
     return Schedule(tuple(channel_pulse(channels[n % len(channels)], 0.5 + n * step, on_time) for n in range(count)))
 
 
-NAMES = ("overview", "motion", "sphere", "history", "timeline")
+NAMES = ("overview", "motion", "sphere", "history")
 TORQUER = Steerable(50.0)
 STEERED = spinner(steerable=TORQUER, requirement=Requirement(0.01))
 SIXTEEN = spinner(degrees=8.0, channels=fan(16, 20.0))
-H_MARKS = "H at t = 0 and after each pulse"
+H_MARKS = "H"
 
 CASES: dict[str, tuple[Spacecraft, Schedule | str]] = {
     "wide pulses": (BODY, "two-pulse"),
@@ -77,7 +77,7 @@ def flown(case: str) -> tuple[Flight, Track]:
     """The flight of a case, as far as its pictures reach."""
     body, pulses = CASES[case]
     pulses = planning.plan(body, pulses).pulses if isinstance(pulses, str) else pulses
-    made, track = export.shown(planning.Plan(body, "trial", pulses))
+    made, track = overview.shown(planning.Plan(body, "trial", pulses))
     return made, geometry.drawn(made, track)
 
 
@@ -90,7 +90,7 @@ def drawn(name: str, case: str) -> Figure:
 def flight_picture(name: str, body: Spacecraft, pulses: Schedule | str = "two-pulse") -> Figure:
     """A figure of a schedule, or of the one of a scheme."""
     plan = planning.plan(body, pulses) if isinstance(pulses, str) else planning.Plan(body, "trial", pulses)
-    return overview.flight_figure(name, *export.shown(plan))
+    return overview.flight_figure(name, *overview.shown(plan))
 
 
 def studied(body: Spacecraft, count: int, scheme: str = "two-pulse") -> Results:

@@ -61,7 +61,7 @@ explain 17
 explain file.thrusters
 explain weather; 2
 plan
-plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png --figure timeline
+plan smoke.yaml --scheme two-pulse --json plan.json --csv pulses.csv --plot plan.png --figure history
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --csv optimal.csv
 plan smoke.yaml --scheme optimal --set limits.horizon=20s --free-axis --least time
 plan --scheme half-cone --target 10deg,45deg --nominal --json target.json

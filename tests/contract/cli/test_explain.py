@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import ast
+import io
 import itertools
 import math
 import re
 import shlex
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
+from support import places
 from support.commands import python, rows, words
 from support.golden import check_text
 from support.process import Run
 
 from nutdamp.cli.main import group
 from nutdamp.cli.options import SHARED
+from nutdamp.errors import BadRequest
+from nutdamp.files import samples, tabular, telemetry
 from nutdamp.files.overrides import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
+from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
-from nutdamp.views import guide
+from nutdamp.views import guide, loop_cases, spin_table, topics, trade_files
 from nutdamp.views.explain_tables import WIDEST
 from nutdamp.views.file_guide import flow, keys
 from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
@@ -29,7 +37,13 @@ from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
 FIGURES = guide.found("figures")
-TOPICS = (*guide.NAMES, *(equation.number for equation in EQUATIONS), "file.thrusters", "file.limits.tick")
+TOPICS = (
+    *guide.NAMES,
+    *(equation.number for equation in EQUATIONS),
+    "file.thrusters",
+    "file.limits.tick",
+    "requirement",
+)
 
 
 def explained(*arguments: str, columns: int = 80) -> str:
@@ -40,9 +54,13 @@ def explained(*arguments: str, columns: int = 80) -> str:
 
 def test_every_topic_and_every_equation_is_listed() -> None:
     listed, equations = words(explained()), words(explained("equations"))
-    for _, topics in guide.SUMMARIES:
-        assert all(f"{name} {summary}" in listed for name, summary in topics)
-    assert {*NAMES, "nutation", "file", "units", "figures", "equations", "17"} <= set(guide.NAMES)
+    for _, names in guide.PAGES:
+        assert all(f"{name} {guide.page(name).summary}" in listed for name in names)
+    assert {*NAMES, "nutation", "file", "units", "figures", "equations"} <= set(guide.NAMES)
+    assert all(name in listed for name in guide.NAMES)
+    lines = explained(columns=80).splitlines()
+    assert len(lines) <= 40  # one screen
+    assert max(map(len, lines)) <= 80
     assert all(f"{equation.number} {equation.subject}: {equation.place}" in equations for equation in EQUATIONS)
 
 
@@ -158,6 +176,139 @@ def test_the_figures_are_all_there_and_their_commands_differ_in_the_motion_alone
             first in ("nutdamp simulate", "nutdamp plan") and figure == "--figure motion"
         )
         assert first == "nutdamp animate" or re.fullmatch(r"--plot \w+\.png", plot)
+
+
+VIEWS = places.ROOT / "nutdamp" / "views"
+
+
+def declared(package: str) -> Iterator[str]:
+    """Headings of tables as the code has them: of Column(…), Heading(…) and columns(…), and in lists of heads."""
+    for node in nodes((places.ROOT / "nutdamp" / package).glob("*.py")):
+        parts: list[ast.expr] = []
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            shown = {"columns": slice(0, None), "Heading": slice(0, 1), "Column": slice(1, 2)}
+            parts = node.args[shown.get(node.func.id, slice(0))]
+        elif isinstance(node, ast.Assign | ast.AugAssign):
+            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+            parts = [node.value] * (isinstance(target, ast.Name) and target.id == "heads")
+        for part in parts:
+            yield from texts_in(part)
+
+
+def nodes(paths: Iterable[Path]) -> Iterator[ast.AST]:
+    for path in paths:
+        yield from ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+
+
+def texts_in(node: ast.expr) -> Iterator[str]:
+    """The texts of a literal, of a list of them, or of either side of a choice."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.Tuple | ast.List):
+        for entry in node.elts:
+            yield from texts_in(entry)
+    elif isinstance(node, ast.IfExp):
+        yield from (*texts_in(node.body), *texts_in(node.orelse))
+    elif isinstance(node, ast.BinOp | ast.Starred):
+        yield from texts_in(node.left if isinstance(node, ast.BinOp) else node.value)
+
+
+def test_every_heading_of_a_table_is_explained() -> None:
+    headings = {" ".join(heading.split()) for package in ("views", "page") for heading in declared(package)} - {""}
+    assert len(headings) > 80
+    assert {heading for heading in headings if not is_known(heading)} == set()
+
+
+def is_known(name: str) -> bool:
+    try:
+        return bool(topics.explained(name))
+    except BadRequest:
+        return False
+
+
+def test_words_are_explained_however_they_are_written() -> None:
+    for word in (
+        "tilt",
+        "requirement",
+        "robust",
+        "H",
+        "momentum shift",
+        "met fraction",
+        "prolate",
+        "flown",
+        "max_on_time",
+        "limits.tick",
+        "Exit status",
+        "dead band",
+        "Azimuth",
+        "on-time s",
+        "on_time_s",
+        "nutation after, deg",
+    ):
+        assert is_known(word), word
+    assert topics.explained("on-time s").summary == topics.explained("On-Time").summary
+    assert topics.explained("a").parts != topics.explained("A").parts  # symbols differ by case
+    assert "file.thrusters.max_on_time" in explained("max_on_time")
+    assert topics.explained("lever_arm").parts[-1].title == "In the spacecraft file"
+    with pytest.raises(BadRequest, match=r"momentum.shift"):
+        topics.explained("momentun shift")
+
+
+def test_a_further_source_of_words_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    notes = ("note", lambda: [("fewer-pulses", "Another plan takes fewer pulses.")])
+    monkeypatch.setattr(topics, "WORDS", (*topics.WORDS, notes))
+    assert "Another plan takes fewer pulses." in explained("fewer-pulses")
+
+
+def columns_written() -> Iterator[str]:
+    yield from (*EFFECTIVE, *tabular.HEADER, *telemetry.TIMES, *telemetry.MEASURED, *spin_table.HEADER)
+    yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS), *trade_files.HEADER)
+    for key, where in keys_of_columns():
+        if "json" not in where or "csv" in where:
+            yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]
+
+
+def keys_of_columns() -> Iterator[tuple[str, str]]:
+    """Names of columns that go into files, and the places that have them as far as they are written out."""
+    for node in nodes(VIEWS.glob("*.py")):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Column":
+            key, *others = node.args
+            texts = [text for other in (*others, *(word.value for word in node.keywords)) for text in texts_in(other)]
+            if isinstance(key, ast.Constant) and key.value:
+                yield str(key.value), " ".join(texts)
+
+
+def keys_written() -> Iterator[str]:
+    """Names that the code gives to numbers in JSON."""
+    subjects = ("budget", "check", "fit", "loop", "loop_cases", "simulation", "trade_files")
+    paths = (*VIEWS.glob("*_json.py"), *(VIEWS / f"{subject}.py" for subject in subjects))
+    for node in nodes(paths):
+        for key in node.keys if isinstance(node, ast.Dict) else ():
+            if isinstance(key, ast.Constant) and isinstance(key.value, str):
+                yield key.value
+    yield from (key.replace("#", "") for key, where in keys_of_columns() if "json" in where)
+
+
+@pytest.mark.parametrize(("page", "written"), [("csv", columns_written), ("json", keys_written)])
+def test_the_reference_has_every_column_and_every_name(page: str, written: Callable[[], Iterator[str]]) -> None:
+    listed = {name for names, _ in guide.rows(page) for name in names.split(", ")}
+    names = set(written())
+    assert len(names) > 70
+    assert names - listed == set()
+
+
+def test_long_pages_go_through_a_pager_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    paged: list[str] = []
+    monkeypatch.setattr("click.echo_via_pager", paged.append)
+    assert "Sun pulse" in explained("command-block")
+    assert paged == []
+    terminal = Console(force_terminal=True, width=80, height=30, file=io.StringIO())
+    monkeypatch.setattr("nutdamp.cli.check.console", lambda: terminal)
+    monkeypatch.setattr("nutdamp.cli.check.on_keyboard", lambda: True)
+    assert explained("command-block") == ""
+    assert "Sun pulse" in paged.pop()
+    assert "angle" in explained("tilt")
+    assert paged == []
 
 
 @pytest.mark.deep

@@ -68,6 +68,7 @@ def test_a_loop_is_flown_and_written_and_fired_again(run: Run, file: str, tmp_pa
     screen = run("loop", file, "--json", "loop.json", "--csv", "pulses.csv", "--track", "track.csv")
     assert screen.returncode == 0, screen.stderr
     check_text("loop.screen", screen.stdout)
+    check_text("loop.full", run("loop", file, "-v").stdout)
     written = json.loads((tmp_path / "loop.json").read_text())
     assert (written["stopped"], written["channel"], written["meets_requirement"]) == ("end", None, True)
     assert written["quiet_s"][0] > written["pulses"][-1]["start_s"]
@@ -209,7 +210,7 @@ def test_what_a_file_lacks_and_what_does_not_go_together_is_said(run: Run, stage
         ("disperse", "exact.yaml", "--loop"),
         (*disperse, "--loop", "--scheme", "two-pulse"),
         (*disperse, "--loop", "--threads", "2"),
-        (*disperse, "--loop", "--plot", "x.svg", "--figure", "budget"),
+        (*disperse, "--loop", "--plot", "x.svg", "--figure", "cases"),
         (*disperse, "--until", "9s"),
         (*disperse, "--loop", "--until", "0s"),
         ("budget", "bare.yaml"),

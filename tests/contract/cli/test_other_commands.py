@@ -81,9 +81,10 @@ def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_pat
 
 
 def test_check_prints_derived_quantities(run: Run) -> None:
-    ended = run("check")
-    assert ended.returncode == 0
+    ended, full = run("check"), run("check", "-v")
+    assert ended.returncode == full.returncode == 0
     check_text("cli.check.example", ended.stdout)
+    check_text("cli.check.full", full.stdout)
 
 
 def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
@@ -181,7 +182,7 @@ dispersions:
 
 def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=DISPERSED, exact_yaml=DISPERSED.partition("dispersions:")[0])
-    check_text("cli.check.dispersions", run("check", "sat.yaml").stdout)
+    check_text("cli.check.dispersions", run("check", "sat.yaml", "-v").stdout)
     inputs = ["thrust left 1", "thrust T2", "direction left 1 a", "direction left 1 b", "timing of each pulse"]
     dispersions = result(run, "check sat.yaml")["files"][0]["dispersions"]
     assert [entry["name"] for entry in dispersions["inputs"]] == inputs

@@ -34,6 +34,7 @@ USAGE = {
                 "disperse --samples 10 --plot x.jpg", "animate -o a.webm", "report -o report.pdf",
                 "report -o report.md", "report -o report"],
     "figures": ["plan --plot a.png --figure globe", "disperse --figure cases"],
+    "dropped figures": ["plan --plot a.png --figure timeline", "disperse --plot a.png --figure budget"],
     "left out": ["animate", "import", "export dated.yaml", "export", "export stk", "export AEM 'my body.yaml'",
                  "export body.yaml apm", "export body.yaml other.yaml", "export body.yaml --format apm x y"],
     "contradictions": ["plan --scheme one-pulse --scheme two-pulse --csv x.csv",
@@ -58,7 +59,7 @@ USAGE = {
     "targets": [*(f"{command} --scheme {scheme}" for scheme in ("half-cone", "rhumb-line")
                   for command in ("plan", "simulate", "verify", "export --format json", "report")),
                 "plan --scheme half-cone --scheme rhumb-line"],
-    "topics": [f"explain {topic}" for topic in ("tow-pulse", "nutaton", "unit", "28", "K4", "file.thruster",
+    "topics": [f"explain {topic}" for topic in ("tow-pulse", "nutaton", "unitz", "28", "K4", "file.thruster",
                                                 "file.horizon", "file.qqq.zzz", "weather")],
     "examples": ["init --from lunar-prospecter", "init --from zzz"],
 }  # fmt: skip

@@ -18,8 +18,9 @@ from support.cases import spread
 from support.commands import call
 from support.process import Run
 
-from nutdamp.cli import job
-from nutdamp.cli.job import progress, stoppable, working
+from nutdamp.cli import screen
+from nutdamp.cli.main import stoppable
+from nutdamp.cli.screen import progress, working
 from nutdamp.views.layout import NARROW, columns
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -53,6 +54,30 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
         assert "…" not in narrow.stdout
         assert numbers(narrow.stdout) >= numbers(wide.stdout)
         assert max(map(len, narrow.stdout.splitlines())) <= width
+
+
+@spread("name", sorted(path.stem for path in places.CONFIGS.glob("*.yaml")), quick=2, deep=20)
+def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
+    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns; a row of the table is one line."""
+    commands = ["check", "simulate --samples 100", "simulate --scheme none --samples 100"]
+    text = (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
+    commands += ["loop"] * ("\nloop:" in text) + ["budget"] * ("\nloop:" in text and "\ndissipation:" in text)
+    for command in commands:
+        usual, wide = (call(run, f"{command} {places.CONFIGS}/{name}.yaml -q", columns=width) for width in (80, 200))
+        assert usual.returncode in (0, 4), usual.stderr
+        lines = usual.stdout.splitlines()
+        assert len(lines) <= 40
+        assert max(map(len, lines)) <= 80
+        assert lines[-1].startswith("-v all values")
+        assert sum(line.startswith("note: ") for line in lines) <= 3
+        (table, *_), (whole, *_) = (tables(ended.stdout) for ended in (usual, wide))
+        assert [row.split() for row in table] == [row.split() for row in whole]
+
+
+def tables(shown: str) -> list[list[str]]:
+    """Rows of the table of a screen, without its headings."""
+    parts = (part.splitlines() for part in shown.split("\n\n")[1:2])
+    return [[line for line in part if re.search("[0-9]", line)] for part in parts] or [[]]
 
 
 def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
@@ -122,11 +147,11 @@ class Terminal(io.StringIO):
 
 def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float, *, quiet: bool = False) -> str:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(job, "PATIENCE", patience)
+    monkeypatch.setattr(screen, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
-    with progress("flying", 1_000, quiet=quiet) as tell:
+    with progress("flying", quiet=quiet) as tell:
         for count in (200, 500, 900):
-            tell(count)
+            tell(count, 1_000)
     return stream.getvalue()
 
 
@@ -141,7 +166,7 @@ def test_a_terminal_is_shown_share_rate_and_time_left_of_a_long_run(monkeypatch:
 def test_elsewhere_one_line_says_how_far_long_work_is(
     monkeypatch: pytest.MonkeyPatch, long: float, quiet: bool, lines: int
 ) -> None:
-    monkeypatch.setattr(job, "LONG", long)
+    monkeypatch.setattr(screen, "LONG", long)
     text = shown(monkeypatch, io.StringIO(), 0.0, quiet=quiet)
     assert text.count("\n") == lines
     assert not lines or text.startswith("flying: 200 of 1,000 done after 0 s, about 0 s left")
@@ -157,7 +182,7 @@ def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
 ) -> None:
     err = stream()
     monkeypatch.setattr(sys, "stderr", err)
-    monkeypatch.setattr(job, "PATIENCE", patience)
+    monkeypatch.setattr(screen, "PATIENCE", patience)
     monkeypatch.setenv("TERM", "xterm")
     with working("planning", quiet=quiet):
         while seen and "planning" not in err.getvalue():  # until the timer has had its turn

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import json
 import math
 import re
@@ -51,7 +52,7 @@ def test_importing_loads_nothing_that_takes_time(tmp_path: Path) -> None:
 def test_every_public_name_is_there_and_no_other() -> None:
     for name in nutdamp.__all__:
         assert getattr(nutdamp, name) is not None
-    assert set(nutdamp.__all__) <= set(dir(nutdamp))
+    assert sorted(nutdamp.__all__) == dir(nutdamp)
     with pytest.raises(AttributeError, match="nonsense"):
         _ = nutdamp.nonsense  # type: ignore[attr-defined]
 
@@ -85,6 +86,46 @@ def test_the_examples_of_the_readme_run(run: Run, tmp_path: Path) -> None:
         assert plan["flown"]["nutation_deg"] < 1e-6
         lines.append(f"{angle} deg: {plan['propellant_kg']:.5f} kg of propellant")
     assert sweep.stdout.splitlines() == lines
+
+
+@pytest.mark.deep
+@pytest.mark.usefixtures("plain_pages")
+def test_every_function_has_an_example_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    for name in sorted({*nutdamp.__all__} - {"errors", "__version__"}):
+        function = getattr(nutdamp, name)
+        if not isinstance(function, type):
+            (example,) = finder.find(function, name, globs={"nutdamp": nutdamp})
+            assert example.examples, name
+            assert runner.run(example).failed == 0, name
+
+
+def test_every_result_shows_itself_in_one_short_line_and_as_json(tmp_path: Path) -> None:
+    body, stage = CRAFT.with_(limits={"horizon": "8 s"}), nutdamp.example("upper-stage")
+    plan = planned()
+    for result in (
+        nutdamp.simulate(plan, 20.0),
+        nutdamp.trade(body, 1, [0.0]),
+        nutdamp.disperse(plan, 50, csv=tmp_path / "cases.csv"),
+        nutdamp.disperse_loop(stage, 2, until=60.0),
+        nutdamp.loop(stage, 60.0),
+        nutdamp.verify(plan),
+        nutdamp.budget(stage),
+    ):
+        assert re.fullmatch(r"<\w+ .{3,110}>|<\w+: .{3,80}>", repr(result))
+        json.dumps(result.to_dict(), allow_nan=False)
+    assert len((tmp_path / "cases.csv").read_text().splitlines()) == 51
+
+
+def test_a_plan_is_of_the_scheme_named_or_the_recommended_one() -> None:
+    calm = nutdamp.read("{name: X, inertia: {A: 120, C: 80}, omega0: [0.1, 0, 3]}")
+    assert nutdamp.plan(calm).scheme == nutdamp.compare(calm).recommended.scheme  # type: ignore[union-attr]
+    with pytest.raises(Infeasible):
+        nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}))
+    by_keyword = nutdamp.plan(CRAFT, "four-pulse", on_time=0.2)
+    assert by_keyword.to_dict() == nutdamp.plan(CRAFT, "four-pulse", Options(on_time=0.2)).to_dict()
+    assert by_keyword.pulses[0].on_time == 0.2
 
 
 def test_there_is_one_type_of_each_name() -> None:
@@ -193,6 +234,13 @@ WRONG: list[Call] = [
     lambda: CRAFT.replace(omega0=(0.1, 3.0)),
     lambda: CRAFT.replace(channels=("+M1",)),
     lambda: CRAFT.replace(weight=3),
+    lambda: CRAFT.replace(mass=-3),
+    lambda: LIB.plan(CRAFT, "four-pulse", per_turn=2),
+    lambda: LIB.plan(CRAFT, "four-pulse", Options(on_time=1.0), on_time=0.2),
+    lambda: LIB.simulate(planned(), -1.0),
+    lambda: LIB.robust(planned()),
+    lambda: LIB.loop(CRAFT),
+    lambda: LIB.loop(nutdamp.example("upper-stage"), case=0),
     lambda: LIB.report(planned()),
     lambda: LIB.report(CRAFT, "page.txt"),
     lambda: LIB.report(CRAFT, "page.html", disperse=-1),

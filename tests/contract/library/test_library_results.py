@@ -79,6 +79,8 @@ def test_arrays_and_data_frames_have_the_columns_of_files(tmp_path: Path, monkey
         monkeypatch.setitem(sys.modules, "pandas", None)
         with refused(nutdamp.NutdampError, "library.no-pandas"):
             made.to_pandas()
+        with pytest.raises(ImportError):
+            made.to_pandas()
 
 
 def test_the_track_is_in_the_axes_of_the_file() -> None:
@@ -236,16 +238,27 @@ def test_a_report_disperses_as_disperse_does(dispersed: Path) -> None:
 def test_flights_comparisons_and_plans_draw_themselves() -> None:
     compared = nutdamp.compare(CRAFT, ["two-pulse", "four-pulse"], samples=500)
     plan = compared["two-pulse"]
-    assert [len(plan.fly().figure(name).axes) for name in ("motion", "timeline")] == [2, 1]
+    assert [len(plan.fly().figure(name).axes) for name in ("motion", "history")] == [2, 3]
     assert len(plan.figure("motion").axes) >= 2
-    for figure in (compared.figure(), compared.figure("schemes")):
-        labels = [text.get_text() for axes in figure.axes for text in axes.get_yticklabels()]
-        assert {"two-pulse", "four-pulse"} <= set(labels)
-    for name in ("motion", "nothing"):
+    assert compared.recommended is not None
+    assert compared.recommended.scheme in compared.figure("motion").get_suptitle()
+    for name in ("timeline", "schemes"):
         with refused(BadRequest, f"library.no-figure-{name}"):
             compared.figure(name)
     with refused(Infeasible, "library.no-figure-infeasible"):
         nutdamp.plan(CRAFT.with_(limits={"horizon": "1 ms"}), "two-pulse").figure()
+
+
+@pytest.mark.deep
+def test_studies_draw_themselves_and_write_their_rows(tmp_path: Path) -> None:
+    stage, plan = nutdamp.example("upper-stage"), nutdamp.plan(CRAFT, "two-pulse")
+    budget, simulated = nutdamp.budget(stage), nutdamp.simulate(plan, 20.0, samples=50)
+    for result in (budget, simulated, nutdamp.loop(stage, 60.0), nutdamp.disperse(plan, 50)):
+        assert result.figure().axes
+    for rows in (budget, simulated):
+        rows.to_csv(tmp_path / "rows.csv")
+        assert (tmp_path / "rows.csv").read_text().count("\n") > 1
+    assert len(simulated.to_numpy()) == (tmp_path / "rows.csv").read_text().count("\n") - 1
 
 
 class Tags(HTMLParser):

@@ -16,10 +16,10 @@ from support.golden import check_text, refused
 from support.synthetic import motion
 
 import nutdamp
-from nutdamp.api import Fitted, fit
+from nutdamp.api import fit
 from nutdamp.errors import BadRequest
 from nutdamp.estimation import forecast
-from nutdamp.estimation.forecast import Outlook, Prospect
+from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.planning import decision
 from nutdamp.views.fit import advice, estimate_table, fit_screen
@@ -75,7 +75,7 @@ def test_only_a_spacecraft_of_a_file_makes_one(fitted: Fitted) -> None:
 
 def test_the_screen_says_how_many_periods_the_record_has(fitted: Fitted) -> None:
     values = fitted.core.named
-    periods = re.search(r"0 s to 30 s, (\S+) nutation periods", shown(fit_screen(fitted.core, 0.0)))
+    periods = re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0)))
     assert periods is not None
     expected = LENGTH * (1.0 - values["C/A"]) * values["omega_3"] / (2.0 * math.pi)
     assert float(periods[1]) == pytest.approx(expected, rel=5e-3)

@@ -159,7 +159,7 @@ def test_every_line_fits_the_terminal_and_nothing_but_text_is_sent(case: str, wi
     shown = screen(case, width)
     assert all(len(line) <= width for line in shown.splitlines())
     assert "\x1b" not in shown
-    units = {"ω1, deg/s", "ω2, deg/s", "towards inertial x, deg", "towards inertial y, deg", "Pole curve", "Axis track"}
+    units = {"ω1, °/s", "ω2, °/s", "towards inertial x, °", "towards inertial y, °", "Pole curve", "Axis track"}
     assert not [unit for unit in units if unit not in shown]
     assert ("Axis track" in shown.splitlines()[1]) == (width >= 76), "side by side where there is room"
     assert ("spin about -3" in shown) == (case == "reversed")
@@ -174,7 +174,7 @@ def test_it_grows_with_the_terminal_and_has_colours_only_where_they_are_wanted()
 
 def test_pulses_are_numbered_where_there_is_room() -> None:
     few = screen("two pulses", 80)
-    assert "digits: pulse" in few
+    assert "digits: firing" in few
     assert set("ox12") <= set("".join(line[:39] for line in few.splitlines()[3:17]))
     assert "digits" not in screen("free", 80)
 

@@ -20,7 +20,7 @@ from support.planner import Planner
 from support.process import Run
 
 import nutdamp
-from nutdamp.figures.motion import title
+from nutdamp.figures.overview import title
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import ANGLE, deviations, seen_at, tolerated
 from nutdamp.planning import plan as planning

@@ -48,8 +48,6 @@ def ace(**control: str) -> Node:
 
 @pytest.mark.deep
 def test_the_spacecraft_its_limits_and_its_angles_stand_there_whole() -> None:
-    readme = (places.ROOT / "README.md").read_text("utf-8").partition("\n## Limits\n")[2].partition("\n## ")[0]
-    assert guide.limits() == tuple(" ".join(part.split()) for part in f"\n{readme}".split("\n- ") if part.strip())
     assert len(guide.limits()) >= 8
     assumed = [item.text for item in section(ace(), "assumptions").all("li")]
     assert assumed == [text.replace("`", "") for text in guide.limits()]

@@ -159,15 +159,15 @@ def test_pictures_are_inside_and_described() -> None:
     figures = tree(page(example_text(), pictured=True)).all("figure")
     drawn = [svg for figure in figures for svg in figure.all("svg")]
     pictures = [svg for svg in drawn if "role" in svg.attributes]
-    assert len(drawn) - len(pictures) >= 6  # panels of these, for narrow screens
-    assert len(pictures) == 7  # schemes, motion, cones, history, timeline, and the last two for narrow screens
+    assert len(drawn) - len(pictures) >= 2  # panels of these, for narrow screens
+    assert len(pictures) == 4  # motion, cones, history, and the last for narrow screens
     assert all(one.attributes["aria-label"] and one.attributes["role"] == "img" for one in pictures)
     assert all("viewbox" in one.attributes for one in pictures)
 
 
 def test_dark_pages_lighten_the_colours_that_the_pictures_use() -> None:
     css = (places.ROOT / "nutdamp" / "page" / "page.css").read_text(encoding="utf-8")
-    used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED)
+    used = (style.MOTION, style.PULSE, style.MOMENTUM, style.FIRED, style.TURNED, style.MISSED, style.UNCHECKED)
     assert set(re.findall(r"(?:stroke|fill): (#\w+)\"\]", css)) == {colour.lower() for colour in used}
 
 

@@ -23,7 +23,7 @@ from support.places import CASES, case
 from support.process import Run
 
 from nutdamp.common import numerics
-from nutdamp.figures import export, overview
+from nutdamp.figures import overview
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Residual
@@ -180,17 +180,17 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
         " {name: tune, kind: rotating, torque: [1 mN m, 0, 0], rate: -1}]"
     )
     text = f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
-    shown = run("check", "-", "--json", "d.json", stdin=text).stdout
+    shown = run("check", "-", "-v", "--json", "d.json", stdin=text).stdout
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["disturbances"][0]["precession_rad_s"] > 0.0
     assert file["disturbances"][2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
     check_text("capability.disturbances", shown)
-    check_text("capability.sun", run("check", "-", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
+    check_text("capability.sun", run("check", "-", "-v", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
     assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
     blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
-    shown = " ".join(run("check", "-", stdin=blind).stdout.split())
+    shown = " ".join(run("check", "-", "-v", stdin=blind).stdout.split())
     seen = block_model.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
     first = block_model.first_sun_pulse(SUN_BODY)
     assert seen == pytest.approx(first + block_model.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
@@ -274,7 +274,7 @@ def test_the_plan_of_a_watched_axis_has_its_angles_and_one_that_fails_none() -> 
 def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, command: str) -> None:
     """The command that shows both models gives the angles of each, one a row."""
     options = ("--scheme", "two-pulse", "--target", "350deg,20deg", "--json", "end.json", "--quiet")
-    screen = run(command, "-", *options, *["-v"] * (command == "plan"), stdin=POINTED).stdout
+    screen = run(command, "-", *options, *["-v"] * (command != "verify"), stdin=POINTED).stdout
     written = json.loads((tmp_path / "end.json").read_text())
     written = written["plans"][0] if command == "plan" else written
     assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})
@@ -353,8 +353,8 @@ def test_dates_that_no_calendar_has_are_left_out() -> None:
 def test_a_steering_angle_is_the_same_everywhere() -> None:
     body, pulse = spinner(steerable=Steerable(5.0)), steered(0.75, math.radians(-70.123))
     assert channel_text(pulse, body) == "steerable 289.88°"
-    figure = overview.flight_figure("timeline", *export.shown(planning.Plan(body, "x", Schedule((pulse,)))))
-    assert any("289.88°" in text.get_text() for text in figure.axes[0].texts)
+    figure = overview.flight_figure("history", *overview.shown(planning.Plan(body, "x", Schedule((pulse,)))))
+    assert any("289.88°" in text.get_text() for text in figure.axes[1].texts)
 
 
 def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:

@@ -26,7 +26,7 @@ TABLE = DataTable(
         Column("size_m", "size", "mm", lambda row: row[3], lambda size: f"{1e3 * size:.1f}", "screen csv json"),
         Column("good", "verdict", "", lambda row: row[4], lambda good: "met" if good else "NOT met", "screen csv json",
                kind=YES_NO, met=lambda row: row[4]),
-        Column("never", "never", "", lambda row: row[99], where="screen csv json", when=lambda source: source == "other"),
+        Column("never", "never", "", lambda row: row[99], where="screen csv", when=lambda source: source == "other"),
         Column("page", "page", "", lambda row: row[0], where="page", kind=REAL),
     ),
     [("one", 1, np.array([1.0, 2.0, 3.0]), 0.5, True), ("two", 2, None, None, None), ("three", 3, None, 0.25, False)],
@@ -63,7 +63,7 @@ def test_an_array_has_the_fields_of_the_file() -> None:
 
 def test_a_screen_shows_texts_and_a_dash_for_the_unknown() -> None:
     heads, units, *rows = screen(TABLE)
-    assert [heads, units] == [["name", "count", "size", "verdict"], ["mm"]]
+    assert [heads, units] == [["size"], ["name", "count", "mm", "verdict"]]
     assert rows == [["one", "1", "500.0", "met"], ["two", "2", "–", "–"], ["three", "3", "250.0", "NOT", "met"]]
 
 

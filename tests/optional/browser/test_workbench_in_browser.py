@@ -1,0 +1,426 @@
+"""The workbench in a real browser: what it computes is what `by_impulses` does; drag, keys, limits and copies."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import places
+from support.cases import spread
+from support.pages import plain_page
+from support.places import case
+from support.process import Run
+from support.shown import compared_text
+
+from nutdamp.files.reader import example_text
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight
+from nutdamp.page.document import Moving, PageSection
+from nutdamp.page.html import page_html
+from nutdamp.page.moving import moving, moving_of
+from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft.model import Goal
+from nutdamp.spacecraft.schedule import Schedule
+
+pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]
+
+EXAMPLE = example_text()
+NEARBY = """name: Target from the angular momentum, spin reversed
+inertia: {A: 80, C: 120}
+state: {spin: -30 rpm, nutation: 8 deg, phase: 70 deg}
+steerable: {torque: 40 N m}
+goal: {tilt: 10 deg, azimuth: 45 deg}
+requirement: {nutation: 0.5 deg, momentum_shift: 0.2 deg}
+"""
+LIMITED = """name: Limits
+inertia: {A: 120, C: 80}
+state: {spin: 30 rpm, nutation: 5 deg, phase: 40 deg}
+steerable: {torque: 20 N m}
+limits: {horizon: 60 s, earliest: 1 s, gap: 0.2 s, tick: 1 ms, blackout: [[8 s, 9 s]]}
+requirement: {nutation: 0.5 deg}
+"""
+FILES = {
+    "example": EXAMPLE,
+    "target": case("far-target.yaml").read_text(encoding="utf-8"),
+    "nearby": NEARBY,
+    **{
+        name: (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
+        for name in ("single-thruster", "lunar-prospector", "steerable-stage", "cluster", "magnus-oblate")
+    },
+}
+
+Browse = Callable[..., Any]
+Times = Mapping[int, tuple[float, float]]
+"""Start and on-time, s, of changed pulses by their place."""
+
+
+@cache
+def chosen(text: str) -> Plan:
+    plan = compared_text(text).recommended
+    assert plan is not None
+    return plan
+
+
+@pytest.fixture(scope="module")
+def paged(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Moving], Path]:
+    """The file of a page with nothing but a moving view, which is quickly made."""
+    folder, bare = tmp_path_factory.mktemp("workbench"), plain_page(compared_text(EXAMPLE))
+
+    def page(view: Moving) -> Path:
+        made = replace(bare, sections=(PageSection("motion", "Motion", (view,)),))
+        path = folder / f"{len(list(folder.iterdir()))}.html"
+        path.write_text(page_html(made), encoding="utf-8")
+        return path
+
+    return page
+
+
+@pytest.fixture(scope="module")
+def written(paged: Callable[[Moving], Path]) -> Callable[[str], Path]:
+    """The page of the recommended plan of a spacecraft file, made once."""
+    return cache(lambda text: paged(moving_of(chosen(text))))
+
+
+def changed(plan: Plan, times: Times, ratio: float = 0.0, thrust: float = 0.0) -> Flight:
+    """The flight by impulses with other times, C/A and thrust; the latter in per cent."""
+    body, factor, pulses = plan.spacecraft, 1.0 + thrust / 100.0, []
+    first, second, third = body.inertia.moments
+    body = replace(body, inertia=replace(body.inertia, moments=(first, second, third * (1.0 + ratio / 100.0))))
+    for number, pulse in enumerate(plan.pulses):
+        start, on_time = times.get(number, (pulse.start, pulse.on_time))
+        scale = factor * (on_time / pulse.on_time if pulse.on_time else 1.0)
+        torque = None if pulse.torque is None else pulse.torque * factor
+        t = start + 0.5 * on_time if number in times else pulse.t
+        pulses.append(replace(pulse, t=t, on_time=on_time, impulse=pulse.impulse * scale, torque=torque))
+    return propagation.by_impulses(body, Schedule(tuple(pulses)), 1.2 * plan.pulses.end + 10.0)
+
+
+def part(page: Any, name: str) -> Any:
+    return page.locator(f'.moving [data-part="{name}"]')
+
+
+def settle(page: Any) -> None:
+    """Wait for the frame in which a change is drawn."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def shown(page: Any, column: str = "now") -> dict[str, float]:
+    """Angles at the end as numbers, rad."""
+    settle(page)
+    keys = page.eval_on_selector_all(".bench [data-row]", "rows => rows.map((row) => row.dataset.row)")
+    return {key: float(part(page, f"{column}-{key}").get_attribute("value")) for key in keys}
+
+
+def expect(page: Any, flight: Flight) -> None:
+    values, left = shown(page), flight.residual
+    assert {"nutation", "momentum_shift"} <= set(values)
+    assert ("axis_error" in values) == (flight.spacecraft.goal.axis is not None)
+    if flight.spacecraft.goal.spin is not None:
+        error = abs(flight.settled.spin - flight.spacecraft.goal.spin)
+        assert values.pop("spin") == pytest.approx(error, rel=0.0, abs=1e-12)
+    for key, value in values.items():
+        assert math.degrees(value) == pytest.approx(math.degrees(getattr(left, key)), rel=0.0, abs=1e-9), key
+
+
+def enter(page: Any, number: int, start: float, on_time: float) -> None:
+    """Type start and on-time of a pulse; that of an ideal impulse cannot be changed."""
+    if part(page, "pulse").is_enabled():
+        part(page, "pulse").select_option(index=number)
+    part(page, "begin").fill(str(start))
+    if part(page, "width").is_enabled():
+        part(page, "width").fill(str(on_time))
+
+
+@spread("name", FILES, quick=3)
+def test_the_end_is_that_of_simulate_by_impulses(browse: Browse, written: Any, name: str) -> None:
+    plan = chosen(FILES[name])
+    times: dict[int, tuple[float, float]] = {}
+    with browse(written(FILES[name])) as page:
+        expect(page, changed(plan, {}))
+        assert shown(page) == shown(page, "plan")
+        for number, pulse in list(enumerate(plan.pulses))[:2]:
+            times[number] = (round(0.97 * pulse.start + 0.05, 4), round(0.9 * pulse.on_time, 4))
+            enter(page, number, *times[number])
+            expect(page, changed(plan, times))
+        for ratio, thrust in ((1.0, 0.0), (-0.55, 0.0), (-1.0, 5.0), (0.35, -2.75)):
+            part(page, "ratio").fill(str(ratio))
+            part(page, "thrust").fill(str(thrust))
+            expect(page, changed(plan, times, ratio, thrust))
+        part(page, "reset").click()
+        expect(page, changed(plan, {}))
+        assert not part(page, "reset").is_enabled()
+
+
+@spread("name", FILES, quick=1)
+def test_a_changed_motion_is_drawn_as_it_goes_by_impulses(browse: Browse, written: Any, name: str) -> None:
+    plan = chosen(FILES[name])
+    pulse = plan.pulses.pulses[0]
+    times = {0: (round(pulse.start + 0.02, 4), pulse.on_time)}
+    flight = changed(plan, times, 0.5)
+    with browse(written(FILES[name])) as page:
+        before = part(page, "sky-curves").locator("path.axis").get_attribute("d")
+        enter(page, 0, *times[0])
+        part(page, "ratio").fill("0.5")
+        settle(page)
+        assert "impulse sum (17)" in part(page, "shown").text_content()
+        assert part(page, "sky-curves").locator("path.axis").get_attribute("d") != before
+        last = int(part(page, "slider").get_attribute("max"))
+        for row in (last // 5, last // 3, last // 2, last):
+            part(page, "slider").fill(str(row))
+            t = float(part(page, "t").text_content().removesuffix(" s"))
+            if min(abs(t - centre) for centre in [entry.t for entry in flight.schedule]) < 0.02:
+                continue  # at a jump a rounded time is on either side
+            track = flight.sampled(2, t)
+            near = {"theta": track.nutation, "mu": track.body_cone, "lambda": track.space_cone}
+            for cone, values in near.items():
+                angle = float(part(page, cone).text_content().removesuffix("°"))
+                assert angle == pytest.approx(math.degrees(values[-1]), abs=6e-5)
+            x, y, z = track.axis[-1].tolist()
+            framed = plan.spacecraft.attitude is not None
+            height = math.atan2(z, math.hypot(x, y)) if framed else math.atan2(math.hypot(x, y), z)
+            angle = float(part(page, "angle2" if framed else "angle1").text_content().removesuffix("°"))
+            rate = math.degrees(float(np.linalg.norm(track.rates[-1])))  # the time is rounded too
+            assert angle == pytest.approx(math.degrees(height), abs=6e-5 + 1e-4 * rate)
+        part(page, "reset").click()
+        settle(page)
+        assert part(page, "sky-curves").locator("path.axis").get_attribute("d") == before
+
+
+def test_the_spin_has_its_limit_too(browse: Browse, paged: Callable[[Moving], Path]) -> None:
+    plan = chosen(FILES["single-thruster"])  # its pulses change the spin
+    spin = propagation.by_impulses(plan.spacecraft, plan.pulses).settled.spin
+    for goal, verdict in ((1.0005 * spin, "met"), (1.002 * spin, "NOT met")):
+        body = replace(plan.spacecraft, goal=Goal(spin=goal))
+        view = moving(propagation.flown(body, plan.pulses, 40.0), 40.0, plan.scheme)
+        with browse(paged(view)) as page:
+            expect(page, propagation.by_impulses(body, plan.pulses))
+            assert part(page, "verdict-spin").text_content() == verdict
+
+
+def place(page: Any, index: int, grip: str) -> tuple[float, float]:
+    box = page.locator(".firing").nth(index).locator(f".{grip}").bounding_box()
+    return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+
+def drag(page: Any, index: int, grip: str, by: float) -> None:
+    x, y = place(page, index, grip)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 0.5 * by, y)
+    page.mouse.move(x + by, y)
+    page.mouse.up()
+
+
+@spread("name", ["example", "target", "steerable-stage"], quick=1)
+def test_dragging_a_bar_moves_the_firing_and_its_edge_the_on_time(browse: Browse, written: Any, name: str) -> None:
+    plan = chosen(FILES[name])
+    with browse(written(FILES[name])) as page:
+        page.locator(".desk").scroll_into_view_if_needed()
+        box = part(page, "strip").bounding_box()
+        data = json.loads(page.locator(".moving script").text_content())
+        second = (1.0 - data["lead"]) * box["width"] / data["until"]  # px
+        pulse, step = plan.pulses.pulses[0], data["bench"]["step"]
+        drag(page, 0, "middle", 40.0)
+        start, on_time = float(part(page, "begin").input_value()), pulse.on_time
+        assert start == pytest.approx(pulse.start + 40.0 / second, abs=step)
+        expect(page, changed(plan, {0: (start, on_time)}))
+        bar = page.locator(".firing").first.bounding_box()
+        assert bar["x"] == pytest.approx(box["x"] + data["lead"] * box["width"] + second * start, abs=1.5)
+        if pulse.on_time == 0.0:
+            assert page.locator(".firing .last").count() == 0
+            return
+        drag(page, 0, "last", -4.0)
+        longer = float(part(page, "width").input_value())
+        assert longer == pytest.approx(on_time - 4.0 / second, abs=step)
+        expect(page, changed(plan, {0: (start, longer)}))
+        end = start + longer
+        drag(page, 0, "first", 3.0)
+        begin, width = (float(part(page, field).input_value()) for field in ("begin", "width"))
+        assert begin + width == pytest.approx(end, abs=1e-8)
+        assert begin == pytest.approx(start + 3.0 / second, abs=step)
+        expect(page, changed(plan, {0: (begin, width)}))
+
+
+def test_what_misses_its_limit_is_not_met_at_once(browse: Browse, written: Any) -> None:
+    plan = chosen(EXAMPLE)
+    with browse(written(EXAMPLE)) as page:
+        verdict = part(page, "verdict-nutation")
+        assert verdict.text_content() == "met"
+        colour = "(one) => getComputedStyle(one).color"
+        plain = verdict.evaluate(colour)
+        for thrust in (-5.0, -2.0, 5.0, 0.0):
+            part(page, "thrust").fill(str(thrust))
+            settle(page)
+            left = changed(plan, {}, 0.0, thrust).residual
+            met = left.nutation <= math.radians(0.5)
+            assert verdict.text_content() == ("met" if met else "NOT met")
+            assert (verdict.evaluate(colour) == plain) == met
+            said = part(page, "thrust").get_attribute("aria-valuetext")
+            assert f"nutation {part(page, 'now-nutation').text_content()} {verdict.text_content()}" in said
+        part(page, "begin").fill("0.5")
+        part(page, "begin").blur()
+        assert "nutation" in part(page, "summary").text_content()
+
+
+@pytest.mark.parametrize(
+    ("number", "start", "on_time", "text"),
+    [
+        (0, 0.5, 0.5, "pulse 1: start 0.5 s, earliest 1 s"),
+        (1, 59.9, 0.5, "pulse 2: end 60.4 s, horizon 60 s"),
+        (1, 8.5, 0.2, "pulse 2: fires in the blackout 8 s to 9 s"),
+        (0, 2.0005, 0.5, "pulse 1: start 2.0005 s is no multiple of 0.001 s"),
+        (0, 2.0, 0.5005, "pulse 1: on-time 0.5005 s is no multiple of 0.001 s"),
+    ],
+)
+def test_a_broken_limit_is_named(
+    browse: Browse, written: Any, number: int, start: float, on_time: float, text: str
+) -> None:
+    with browse(written(LIMITED)) as page:
+        assert part(page, "verdict-limits").text_content() == "met"
+        enter(page, number, start, on_time)
+        settle(page)
+        assert part(page, "verdict-limits").text_content() == "NOT met"
+        assert text in part(page, "broken").text_content()
+
+
+def test_on_times_and_gaps_have_limits_too(browse: Browse, written: Any) -> None:
+    plan = chosen(EXAMPLE)  # from 20 ms to 2 s
+    second = plan.pulses.pulses[1]
+    with browse(written(EXAMPLE)) as page:
+        for on_time, text in ((0.01, "on-time 0.01 s, minimum 0.02 s"), (2.5, "on-time 2.5 s, maximum 2 s")):
+            enter(page, 0, 0.5, on_time)
+            settle(page)
+            assert f"pulse 1: {text}" in part(page, "broken").text_content()
+        enter(page, 0, second.start + 1.0, 0.5)
+        settle(page)
+        assert "pulse 1: overlaps the firing before it" in part(page, "broken").text_content()
+    with browse(written(LIMITED)) as page:
+        first = chosen(LIMITED).pulses.pulses[0]
+        enter(page, 1, round(first.end + 0.1, 3), 0.5)
+        settle(page)
+        assert "pulse 2: gap 0.1 s, minimum 0.2 s" in part(page, "broken").text_content()
+
+
+@spread("name", ["example", "target", "single-thruster", "nearby"], quick=1)
+def test_the_copied_schedule_flies_to_the_same_end(
+    browse: Browse, written: Any, run: Run, tmp_path: Path, name: str
+) -> None:
+    plan = chosen(FILES[name])
+    pulse = plan.pulses.pulses[0]
+    with browse(written(FILES[name]), permissions=["clipboard-read", "clipboard-write"]) as page:
+        enter(page, 0, round(pulse.start + 0.03, 4), round(0.95 * pulse.on_time, 4))
+        left = shown(page)
+        part(page, "copy-csv").click()
+        settle(page)
+        assert part(page, "copied").text_content() == "Copied."
+        (tmp_path / "changed.csv").write_text(page.evaluate("navigator.clipboard.readText()"), encoding="utf-8")
+        part(page, "copy-command").click()
+        settle(page)
+        command = page.evaluate("navigator.clipboard.readText()")
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "changed.csv").read_text(encoding="utf-8"))))
+    assert [row["channel"] for row in rows] == [entry.channel for entry in plan.pulses]
+    (tmp_path / "spacecraft.yaml").write_text(FILES[name], encoding="utf-8")
+    words = shlex.split(command)
+    assert words == ["nutdamp", "simulate", "SPACECRAFT", "--schedule", "FILE", "--flown"]
+    names = {"SPACECRAFT": str(tmp_path / "spacecraft.yaml"), "FILE": str(tmp_path / "changed.csv")}
+    done = run(*[names.get(word, word) for word in words[1:]], "-q", "--json", "-")
+    assert done.returncode in (0, 4), done.stderr
+    assert "contradicts" not in done.stderr
+    ended = json.loads(done.stdout)["residual"]
+    for key, value in left.items():
+        assert math.degrees(value) == pytest.approx(ended[f"{key}_deg"], rel=0.0, abs=1e-9)
+
+
+def test_the_keyboard_does_everything(browse: Browse, written: Any) -> None:
+    """Each tab stop is a control with a name that can be changed; what can do nothing is none."""
+    plan = chosen(EXAMPLE)
+    with browse(written(EXAMPLE)) as page:
+        part(page, "pulse").focus()
+        page.keyboard.press("ArrowDown")
+        assert float(part(page, "begin").input_value()) == pytest.approx(plan.pulses.pulses[1].start, abs=1e-8)
+        stops = []
+        for _ in range(6):
+            page.keyboard.press("Tab")
+            stops.append(page.evaluate("document.activeElement.dataset.part"))
+        assert stops == ["begin", "width", "ratio", "thrust", "copy-csv", "copy-command"]
+        part(page, "thrust").focus()
+        page.keyboard.press("ArrowRight")
+        expect(page, changed(plan, {}, 0.0, 0.25))
+        part(page, "begin").focus()
+        page.keyboard.press("ArrowUp")
+        start = float(part(page, "begin").input_value())
+        assert start > plan.pulses.pulses[1].start
+        expect(page, changed(plan, {1: (start, plan.pulses.pulses[1].on_time)}, 0.0, 0.25))
+        part(page, "reset").focus()
+        page.keyboard.press("Enter")
+        expect(page, changed(plan, {}))
+        assert page.evaluate("document.activeElement.dataset.part") == "begin"
+
+
+def test_the_cones_roll_on_each_other(browse: Browse, written: Any) -> None:
+    for text, side in ((EXAMPLE, 1.0), (NEARBY, -1.0)):  # prolate outside, oblate around
+        with browse(written(text)) as page:
+            last = int(part(page, "slider").get_attribute("max"))
+            for row in (0, last // 5, last // 2):
+                part(page, "slider").fill(str(row))
+                body, space = (
+                    [
+                        float(part(page, "cones").locator(f"circle.{name}").get_attribute(key))
+                        for key in ("cx", "cy", "r")
+                    ]
+                    for name in ("body", "space")
+                )
+                between = math.dist(body[:2], space[:2])
+                assert between == pytest.approx(body[2] + side * space[2], abs=0.5)
+                mu, theta = (float(part(page, name).text_content().removesuffix("°")) for name in ("mu", "theta"))
+                assert body[2] / between == pytest.approx(mu / theta, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["example", "target"])
+def test_it_fits_one_screen_and_a_phone(browse: Browse, written: Any, name: str) -> None:
+    with browse(written(FILES[name]), 1280) as page:
+        top, bottom = page.evaluate(
+            "[document.querySelector('.moving').getBoundingClientRect().top, "
+            "document.querySelector('.desk').getBoundingClientRect().bottom]"
+        )
+        assert bottom - top <= 800.0
+    with browse(written(FILES[name]), 400) as page:
+        wide = "[...document.querySelectorAll('.bench, .bench *')].filter((one) => one.checkVisibility())"
+        assert page.evaluate(f"{wide}.every((one) => one.getBoundingClientRect().right <= innerWidth)")
+
+
+def test_an_accessibility_checker_finds_nothing_in_a_changed_workbench(browse: Browse, written: Any) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="NOT CHECKED for accessibility").Axe()
+    for scheme in ("light", "dark"):
+        with browse(written(EXAMPLE), 1280, scheme) as page:
+            enter(page, 0, 0.5, 0.01)
+            settle(page)
+            assert part(page, "verdict-limits").text_content() == "NOT met"
+            violations = axe.run(page).response["violations"]
+            assert [(one["id"], node["html"][:200]) for one in violations for node in one["nodes"]] == []
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        ("dissipation: {time_constant: 600 s}", "energy dissipation"),
+        ("disturbances: [{torque: [20 mN m, 0, 0]}]", "disturbance torques"),
+    ],
+)
+def test_elsewhere_the_page_says_why_there_is_none(browse: Browse, written: Any, more: str, reason: str) -> None:
+    with browse(written(f"{EXAMPLE}\n{more}\n")) as page:
+        assert page.locator(".bench, .firing").count() == 0
+        assert part(page, "cones").count() == 0
+        assert f"No workbench ({reason})" in page.locator(".moving .how").text_content()
+        part(page, "slider").fill("30")
+        assert part(page, "theta").text_content() != ""
