@@ -116,7 +116,7 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
         _remarks(plan, decision),
-        "--csv pulses.csv · --plot loop.png · nutdamp disperse --loop",
+        "--plot loop.png · nutdamp disperse --loop",
         more=[margin_table(plan.margins).screen("screen"), end_table(plan.flight, plan.aspects)],
         verbose=verbose,
     )

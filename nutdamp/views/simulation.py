@@ -46,8 +46,8 @@ def _direction(name: str, at: int) -> Callable[[ModelEnd], str]:
     return lambda row: angle_texts(row.flight.spacecraft, getattr(row.flight.final, name))[at]
 
 
-def _columns(body: Spacecraft, until: float) -> Iterator[Column]:
-    yield Column("", f"at {moment(until)}", "", lambda row: row.model, where="screen", kind=TEXT)
+def _columns(body: Spacecraft) -> Iterator[Column]:
+    yield Column("", "model", "", lambda row: row.model, where="screen", kind=TEXT)
     names = ["nutation", "body_cone", "space_cone", "momentum_shift"]
     for name in names:
         yield Column("", name.replace("_", " "), "", _residual(name), where="screen")
@@ -62,7 +62,7 @@ def _columns(body: Spacecraft, until: float) -> Iterator[Column]:
 def end_comparison(simulation: Simulation) -> DataTable:
     """Residuals and directions at the end by both models."""
     rows = ModelEnd(IMPULSES, simulation.impulses), ModelEnd(WIDTHS, simulation.flown)
-    columns = tuple(_columns(simulation.flown.spacecraft, simulation.extremes.until))
+    columns = tuple(_columns(simulation.flown.spacecraft))
     return DataTable("Final state by both models", columns, rows)
 
 

@@ -61,7 +61,7 @@ RATES = "t_s,omega_1_rad_s,omega_2_rad_s,omega_3_rad_s"
 
 def fit(run: Run, *arguments: str, columns: int = 200) -> str:
     """What ``fit`` shows, on one line, of a record that can be fitted."""
-    screen = run("fit", *arguments, columns=columns)
+    screen = run("fit", "-v", *arguments, columns=columns)
     assert screen.returncode == 0, screen.stderr
     return " ".join((screen.stdout + screen.stderr).split())
 

@@ -316,7 +316,7 @@ def test_a_dispersed_case_is_headed_so_and_changes_of_spin_have_no_sign(run: Run
 def test_a_schedule_does_not_use_what_is_of_the_sensor(run: Run, stage: Path) -> None:
     shown = run("disperse", "stage.yaml", "--scheme", "one-pulse", "--samples", "10", "--json", "-").stdout
     check_text("loop.unused", json.loads(shown)["unused_because"]["sensor delay"])
-    assert "sensor delay" in run("check", "stage.yaml").stdout
+    assert "sensor delay" in run("check", "stage.yaml", "-v").stdout
 
 
 def test_a_budget_is_shown_and_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -354,14 +354,14 @@ PARTICULAR = {
 def test_what_is_particular_of_a_budget_is_said(run: Run, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     follow_few_cycles(monkeypatch)
     screen = run("budget", STAGE, *settings(*PARTICULAR[name]), columns=200)
-    lines = [line for line in screen.stdout.splitlines() if line.endswith(".")]
+    lines = [line for line in screen.stdout.splitlines() if line.endswith(".") or line.startswith("warning")]
     text = f"exit {screen.returncode}{', NOT met' * ('NOT met' in screen.stdout)}\n"
     check_text(f"budget.{name.replace(' ', '-')}", text + "\n".join(lines))
 
 
 def test_without_a_loop_a_budget_says_what_is_missing(run: Run) -> None:
     growing = ("budget", "-q", *settings("dissipation.time_constant=600s"), "--largest", "10deg")
-    check_text("budget.without-loop", run(*growing).stdout.partition("requirement")[2])
+    check_text("budget.without-loop", run(*growing).stdout)
     written = run(*growing, "--csv", "-")
     assert (written.returncode, written.stdout.count("\n")) == (0, 1)
 

@@ -81,6 +81,17 @@ def test_the_screen_says_how_many_periods_the_record_has(fitted: Fitted) -> None
     assert float(periods[1]) == pytest.approx(expected, rel=5e-3)
 
 
+def test_the_default_screen_is_short(fitted: Fitted) -> None:
+    brief, full = (shown(fit_screen(fitted.core, 0.0, verbose=verbose)) for verbose in (False, True))
+    lines = brief.splitlines()
+    assert len(lines) <= 40
+    assert lines[-1].startswith("-v all values")
+    ratio, same = ([row for row in text.splitlines() if row.startswith("C/A")] for text in (brief, full))
+    assert ratio == same
+    assert "samples" in full
+    assert "samples" not in brief
+
+
 def test_values_are_shown_to_what_their_sigmas_leave() -> None:
     def row(value: float, sigma: float) -> Estimate:
         return Estimate("x", f"{value:g} ± {sigma:g}", "m", 1.0, value, sigma, 1.0, 0.5)
