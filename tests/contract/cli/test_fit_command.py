@@ -61,7 +61,7 @@ RATES = "t_s,omega_1_rad_s,omega_2_rad_s,omega_3_rad_s"
 
 def fit(run: Run, *arguments: str, columns: int = 200) -> str:
     """What ``fit`` shows, on one line, of a record that can be fitted."""
-    screen = run("fit", *arguments, columns=columns)
+    screen = run("fit", "-v", *arguments, columns=columns)
     assert screen.returncode == 0, screen.stderr
     return " ".join((screen.stdout + screen.stderr).split())
 
@@ -173,7 +173,7 @@ def test_a_channel_that_did_not_fire_is_not_calibrated(run: Run, tmp_path: Path)
     (tmp_path / "probe.csv").write_text(f"{PROBE}20,0.3,+M1\n", encoding="utf-8")
     shown = fit(run, "flight.csv", "--schedule", "probe.csv", "-o", "now.yaml")
     assert "did it fire? Its force stays as it was" in shown
-    assert "schedule 1 pulse fired meanwhile" in shown
+    assert "pulses fired meanwhile: 1" in shown
     now = nutdamp.load(tmp_path / "now.yaml")
     assert now.channels[0].thrusters[0].force == pytest.approx([0.0, -10.0, 0.0])
     assert now.dispersions is not None
@@ -195,7 +195,7 @@ def test_a_schedule_that_does_not_match_the_record_is_doubted(run: Run, tmp_path
         ("late", "The times of +M2 in the schedule are 1.000 s late against the record"),
         ("late", "the delay of +M2, -1000 ms, is not written"),
         ("other", "-M2 gave -100 % of its thrust: it pushes the other way: another channel, or reversed?"),
-        ("after", "schedule 1 pulse fired meanwhile"),
+        ("after", "pulses fired meanwhile: 1"),
         ("after", "1 of 2 pulses of the schedule is outside the record, 0 s to 30 s"),
     ):
         assert text in shown[name]
