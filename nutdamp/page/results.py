@@ -232,9 +232,10 @@ def comparison_line(compared: Comparison) -> str:
 
 def spacecraft_html(spacecraft: Spacecraft) -> str | None:
     """HTML table of a spacecraft for notebooks; None without the extra plot."""
-    from nutdamp.page.craft import spacecraft_facts
+    from nutdamp.page.document import facts_of
+    from nutdamp.views.plan_tables import derived_table
 
-    return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
+    return _block(facts_of(spacecraft.name, derived_table(spacecraft)))
 
 
 def plan_html(plan: Plan) -> str | None:
@@ -248,9 +249,11 @@ def plan_html(plan: Plan) -> str | None:
 
 def flight_html(flight: Flight) -> str | None:
     """HTML table of a flight for notebooks; None without the extra plot."""
-    from nutdamp.page.sheets import residual_sheet
+    from nutdamp.page.document import FactList
 
-    return _beside(_block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual)), flight)
+    names = ("nutation", "body_cone", "space_cone", "momentum_shift")
+    rows = tuple((name.replace("_", " "), degrees(getattr(flight.residual, name))) for name in names)
+    return _beside(_block(FactList(f"{flight.spacecraft.name}: {_summary(flight)}", rows)), flight)
 
 
 def comparison_html(compared: Comparison) -> str | None:

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from io import StringIO
+from typing import NamedTuple
 
 from rich.console import Console, Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import listed
 from nutdamp.flight.end_state import at_start
-from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
+from nutdamp.planning.decision import Comparison, Decision, notes_on
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
@@ -58,24 +60,36 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
     what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
+    head = [*title, headline(compared, decision, reason, robust)]
     if decision is None:
-        head = [Text.assemble(("NO PLAN", "bold red"), f": {reason}")]
-        return _fitted([*title, *head], [], [], [*_infeasible(compared)], _schemes(compared, ""))
+        return _fitted(head, [], [], [*_infeasible(compared)], _schemes(compared, ""))
     plan = decision.plan
-    head = [_headline(compared, decision, robust), coloured(verdict(decision), decision.met)]
-    warnings = [*_unreached(compared, plan)]
-    if not robust:  # its candidates are those that were made for the tolerances
-        warnings = [*verdicts.warnings(compared, beside_verdict=True), *warnings]
-    head += [Text.assemble(("warning: ", "bold red"), text) for text in warnings]
-    said_of = [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *_remarks(compared, plan)]
+    head.append(coloured(verdict(decision), decision.met))
+    warned = warnings(compared, decision, robust)
+    head += [Text.assemble(("warning: ", "bold red"), text) for text in warned]
     table = _schemes(compared, robust or plan.scheme)
 
     def screen(first: int) -> RenderableType:
         fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
-        required, middle = _requirements(decision), [_ends(decision), *fired]
-        return _fitted([*title, *head], required, middle, said_of, table, blocks=bool(plan.pulses.blocks))
+        required, middle = requirement_rows(decision), [ends(decision), *fired]
+        blocks = bool(plan.pulses.blocks)
+        return _fitted(head, required, middle, remarks(compared, decision), table, blocks=blocks)
 
     return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
+
+
+def warnings(compared: Comparison, decision: Decision, robust: str = "") -> list[str]:
+    """Warnings beside the headline; those of a ``robust`` plan leave out what its candidates were made for."""
+    missed = () if robust else verdicts.warnings(compared, beside_verdict=True)
+    return [*missed, *_unreached(compared, decision.plan)]
+
+
+def remarks(compared: Comparison, decision: Decision | None) -> list[str]:
+    """Notes of the screen in the order of their worth."""
+    if decision is None:
+        return [*_infeasible(compared)]
+    own = (f"{decision.plan.scheme}: {text}" for text in notes_on(decision.plan) if decision.plan in compared.plans)
+    return [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *own]
 
 
 def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
@@ -90,8 +104,10 @@ def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
         yield f"no command block fires {listed(better)}, which would meet the requirement: --timed recommends those"
 
 
-def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
-    """Headline of the plan to fly: scheme, pulses, cost and end; it says where that is not enough."""
+def headline(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> Text:
+    """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
+    if decision is None:
+        return Text.assemble(("NO PLAN", "bold red"), f": {reason}")
     plan = decision.plan
     pulses = plan.pulses
     if not len(pulses):
@@ -103,32 +119,62 @@ def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
 
-def _requirements(decision: Decision) -> list[tuple[float, bool, tuple[str | Text, ...]]]:
-    """Rows of what is required, each with the share of the limit that is left and whether it is met."""
-    rows: list[tuple[float, bool, tuple[str | Text, ...]]] = []
+class RequirementRow(NamedTuple):
+    """Requirement in words: its label, values in the cases and nominally, limit, verdict and margin.
+
+    ``used``: shares of the limit that the nominal value and that of the cases take, NaN where it is not known.
+    """
+
+    label: str
+    dispersed: str
+    nominal: str
+    limit: str
+    verdict: Text
+    margin: str
+    used: tuple[float, float]
+
+    @property
+    def met(self) -> bool:
+        """True unless it is missed."""
+        return self.verdict.plain != verdicts.VERDICT[False]
+
+    @property
+    def worth(self) -> tuple[float, bool]:
+        """Order in which requirements are shown: the least share of the limit that is left first."""
+        worst = self.used[0] if math.isnan(self.used[1]) else self.used[1]
+        return (math.inf if math.isnan(worst) else 1.0 - worst), self.met
+
+
+def requirement_rows(decision: Decision) -> list[RequirementRow]:
+    """Rows of what is required."""
+    rows = []
     cases = decision.cases
     level = "" if cases is None else f"{verdicts.exact_percent(cases.probability)}: "
     for line in decision.lines:
         if not line.bound.required:
             continue
-        dispersed = "" if cases is None or line.dispersed is None else level + _left(line.bound, line.dispersed)
-        cells = (dispersed, f"nominal {_left(line.bound, line.nominal)}", f"limit {limit(line.bound)[2:]}")
+        bound, values = line.bound, (line.nominal, None if cases is None else line.dispersed)
+        dispersed = "" if values[1] is None else level + _left(bound, values[1])
+        words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
+        used = [math.nan if value is None else value / bound.most for value in values]
         met = coloured(verdicts.VERDICT[line.met], line.met)
-        rows.append((_slack(line), line.met is not False, (line.bound.part.label, *cells, met)))
+        rows.append(RequirementRow(bound.part.label, *words, met, _margin(bound, line.margin), (used[0], used[1])))
     for aspect in decision.aspects:
-        for bound, angle, margin in cone_margins(aspect):
+        for text, angle, margin in cone_margins(aspect):
             kept = margin >= -SLACK
-            word = coloured("met" if kept else "NOT met", kept)
-            label = f"axis from {aspect.keep.name}"
-            slack = 1.0 - float(aspect.keep.used(aspect.least, aspect.largest))
-            rows.append((slack, kept, (label, "", f"nominal {degrees(angle)}", f"limit {bound}", word)))
+            words = "", f"nominal {degrees(angle)}", f"limit {text}"
+            used_up = float(aspect.keep.used(aspect.least, aspect.largest))
+            met = coloured(verdicts.VERDICT[kept], kept)
+            rows.append(
+                RequirementRow(
+                    f"axis from {aspect.keep.name}", *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)
+                )
+            )
     return rows
 
 
-def _slack(line: Line) -> float:
-    """Share of the limit that is left of it."""
-    worst = line.nominal if line.dispersed is None else line.dispersed
-    return math.inf if worst is None else 1.0 - worst / line.bound.most
+def _margin(bound: Bound, margin: float) -> str:
+    return size(bound, margin) if bound.part is Part.SPIN else f"{short_angle(margin, bound.most)} deg"
 
 
 def _left(bound: Bound, value: float | None) -> str:
@@ -142,7 +188,7 @@ def _left(bound: Bound, value: float | None) -> str:
     return f"{text} deg"
 
 
-def _ends(decision: Decision) -> RenderableType:
+def ends(decision: Decision) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
     table, formula, (least, turn) = facts(), plan.residual, limits(body)
@@ -185,14 +231,9 @@ def _infeasible(compared: Comparison) -> Iterator[str]:
             yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
 
 
-def _remarks(compared: Comparison, chosen: Plan) -> Iterator[str]:
-    """Remarks of the scheme on the plan to fly."""
-    yield from (f"{chosen.scheme}: {text}" for text in (notes_on(chosen) if chosen in compared.plans else ()))
-
-
 def _fitted(
     head: Sequence[Text],
-    required: Sequence[tuple[float, bool, tuple[str | Text, ...]]],
+    required: Sequence[RequirementRow],
     middle: Sequence[RenderableType],
     more: Sequence[str],
     schemes: FittedColumns,
@@ -205,14 +246,14 @@ def _fitted(
     lines -= 1 - len(apart)
     shown = list(required)
     if lines > LINES and len(required) > TIGHTEST:
-        tight = sorted(required, key=lambda row: row[:2])[:TIGHTEST]
-        shown = [row for row in required if not row[1] or row in tight]
+        tight = sorted(required, key=lambda row: row.worth)[:TIGHTEST]
+        shown = [row for row in required if not row.met or row in tight]
         lines -= len(required) - len(shown)
     table = facts()
     for _ in range(3):
         table.add_column()
-    for _, _, cells in shown:
-        table.add_row(*cells)
+    for row in shown:
+        table.add_row(*row[:5])
     told: list[str] = []
     for text in more:
         lines += _lines(Text(f"note: {text}"))
@@ -221,9 +262,9 @@ def _fitted(
         told.append(text)
     hidden = len(more) - len(told) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    remarks = [Text.assemble(("note: ", "bold"), text) for text in told]
+    noted = [Text.assemble(("note: ", "bold"), text) for text in told]
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *remarks, steps)
+    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *noted, steps)
 
 
 def _lines(*parts: RenderableType) -> int:

@@ -278,8 +278,9 @@ def test_a_broken_cone_is_on_every_screen_and_in_every_file(run: Run, tmp_path: 
 def test_a_broken_cone_is_on_the_page(run: Run, tmp_path: Path) -> None:
     assert run("report", *TWO, "-o", "page.html", stdin=FILE).returncode == 4
     text = parsed((tmp_path / "page.html").read_text("utf-8")).text.replace("\N{NO-BREAK SPACE}", " ")
-    assert "requirementNOT met" in text
-    assert "axis from star1.956" in text
+    assert "NOT ENOUGH: " in text
+    assert "axis from star" in text
+    assert "nominal 1.956 deg" in text
 
 
 def csv_rows(text: str) -> Iterator[dict[str, str]]:
