@@ -315,12 +315,6 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
 
 
-def outdone(fronts: Sequence[Front], chosen: Plan) -> str:
-    """Headline that a schedule of the fronts is better than the ``chosen`` one; or nothing."""
-    better = _better(fronts, chosen)
-    return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
-
-
 def beats(fronts: Sequence[Front], chosen: Plan) -> str:
     """The schedule of a front that is better than the ``chosen`` one, with its command, in a sentence; or nothing."""
     better = _better(fronts, chosen)
