@@ -41,18 +41,20 @@ from nutdamp.page.document import (
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.page.pictures import dispersion_pictures, flight_pictures, trade_picture
-from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
+from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, verdicts
 from nutdamp.views.check_tables import check_screen
+from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade import apart, beats, front_parts
-from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
+from nutdamp.views.verification import BUDGET, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
@@ -102,9 +104,10 @@ def report_page(
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
     dispersed = None if decided is None else compared.results(decided.plan)
-    headline = glance.headline(compared, decided, verdicts.reason(compared))
+    headline = glance.headline(compared, decided)
     lead = headline.spans[0].end
-    notes = glance.remarks(compared, decided)
+    remarks = glance.notes(compared, decided)
+    notes = [*map(text, (note for note in remarks if severity(note) != WARNING))]
     page = Page(
         title=control.title or _title(body),
         control=control,
@@ -178,7 +181,7 @@ def _broken(plan: Plan) -> list[str]:
 
 
 def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
-    yield from glance.warnings(compared, decided)
+    yield from (text(note) for note in glance.notes(compared, decided) if severity(note) == WARNING)
     yield from _broken(decided.plan)
     if decided.plan.spacecraft.dispersions is None:
         yield "tolerances not checked: the file gives no dispersions"
@@ -217,7 +220,7 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
 
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
-    yield Prose(sentence(verdicts.reason(compared)))
+    yield Prose(sentence(joined(reasons(compared))))
     table = scheme_table(compared, compared.recommended)
     yield sheet(table.title, table, dots=DOTS)
     chosen = compared.recommended
@@ -225,7 +228,7 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
         (plan.scheme, note)
         for plan in compared.plans
         if plan.feasible and plan is not chosen
-        for note in notes_on(plan)
+        for note in map(text, plan_notes(plan))
     ]
     rows = (*(("", note) for note in more_notes), *own)
     if rows:

@@ -9,16 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nutdamp.common.results import note
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight
 from nutdamp.page.document import Block, FactList, Prose, Sheet
 from nutdamp.planning.decision import Decision
+from nutdamp.planning.notes import ideal_code
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import verdicts
+from nutdamp.views.notes import sentences
 from nutdamp.views.pulses import MILLISECONDS, channel_text
 from nutdamp.views.schemes import limits
 from nutdamp.views.tables import Heading
@@ -74,10 +77,8 @@ SIGNED = ("sheet", "name", "signature", "date")
 
 def _uncommandable(plan: Plan) -> Iterator[str]:
     """Reasons why the pulses cannot be commanded."""
-    if not plan.commandable:
-        yield f"{plan.scheme} cannot be commanded: no command block fires its pulses."
-    if ideal := verdicts.idealised(plan):
-        yield f"{plan.scheme} cannot be commanded: {ideal}"
+    codes = [*["not-commandable"] * (not plan.commandable), *filter(None, [ideal_code(plan)])]
+    yield from sentences(note(code, scheme=plan.scheme) for code in codes)
 
 
 def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:

@@ -13,10 +13,12 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison, Decision, Simulation, decide
+from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decision_json import decision_json
+from nutdamp.views.notes import joined, sentences
 from nutdamp.views.plan_json import comparison_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
@@ -40,12 +42,12 @@ VIEWS = {
     "Spacecraft.data": "views.plan_json:spacecraft_json",
     **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
     "Plan.data": "views.plan_json:plan_json",
-    "Plan.sentences": "planning.decision:remarks",
+    "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
     **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
     "Comparison.data": "page.results:comparison_data",
-    "Comparison.sentences": "views.verdicts:warnings",
-    "Comparison.reason": "views.verdicts:reason",
+    "Comparison.sentences": "page.results:comparison_sentences",
+    "Comparison.reason": "page.results:comparison_reason",
     **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in ("csv", "table", "figure", "line", "html")},
     "RobustComparison.data": "page.results:robust_data",
     **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
@@ -86,8 +88,23 @@ def comparison_data(compared: Comparison) -> dict[str, Any]:
 
 
 def _decided(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    data = comparison_json(compared, verdicts.spoken(compared))
+    data = comparison_json(compared, decided)
     return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
+
+
+def plan_sentences(plan: Plan) -> tuple[str, ...]:
+    """Notes on a plan."""
+    return sentences(plan_notes(plan) if plan.feasible else ())
+
+
+def comparison_sentences(compared: Comparison) -> tuple[str, ...]:
+    """Warnings on the recommended plan."""
+    return sentences(comparison_warnings(compared))
+
+
+def comparison_reason(compared: Comparison) -> str:
+    """Reason for the recommendation."""
+    return joined(reasons(compared))
 
 
 def robust_data(robust: RobustComparison) -> dict[str, Any]:

@@ -7,7 +7,7 @@ the order of its worth and stands on the full screen (``-v``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import StringIO
 from typing import NamedTuple
 
@@ -15,17 +15,18 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.errors import listed
-from nutdamp.flight.end_state import at_start
-from nutdamp.planning.decision import Comparison, Decision, notes_on
+from nutdamp.common.results import Note
+from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
-from nutdamp.views.decisions import coloured, limit, notes, size, verdict
-from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text, cone_margins, lasting
+from nutdamp.views.decisions import coloured, limit, size, verdict
+from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting
 from nutdamp.views.layout import FittedColumns, facts
+from nutdamp.views.notes import WARNING, joined, ordered, screen_line, severity
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
 from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
@@ -51,8 +52,8 @@ DIGITS = 8
 """Figures of a value beside its limit, at most."""
 
 
-def glance(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> RenderableType:
-    """The screen of a comparison and the plan to fly; without one the ``reason`` why there is none.
+def glance(compared: Comparison, decision: Decision | None, robust: str = "") -> RenderableType:
+    """The screen of a comparison and the plan to fly; or of the reason why there is none.
 
     ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases.
     """
@@ -60,61 +61,46 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
     what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
-    head = [*title, headline(compared, decision, reason, robust)]
+    head = [*title, headline(compared, decision, robust)]
+    remarks = notes(compared, decision, robust)
+    more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     if decision is None:
-        return _fitted(head, [], [], [*_infeasible(compared)], _schemes(compared, ""))
+        return _fitted(head, [], [], more, _schemes(compared, ""))
     plan = decision.plan
     head.append(coloured(verdict(decision), decision.met))
-    warned = warnings(compared, decision, robust)
-    head += [Text.assemble(("warning: ", "bold red"), text) for text in warned]
+    head += [screen_line(note) for note in remarks if severity(note) == WARNING]
     table = _schemes(compared, robust or plan.scheme)
 
     def screen(first: int) -> RenderableType:
         fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
         required, middle = requirement_rows(decision), [ends(decision), *fired]
         blocks = bool(plan.pulses.blocks)
-        return _fitted(head, required, middle, remarks(compared, decision), table, blocks=blocks)
+        return _fitted(head, required, middle, more, table, blocks=blocks)
 
     return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
 
 
-def warnings(compared: Comparison, decision: Decision, robust: str = "") -> list[str]:
-    """Warnings beside the headline; those of a ``robust`` plan leave out what its candidates were made for."""
-    missed = () if robust else verdicts.warnings(compared, beside_verdict=True)
-    return [*missed, *_unreached(compared, decision.plan)]
-
-
-def remarks(compared: Comparison, decision: Decision | None) -> list[str]:
-    """Notes of the screen in the order of their worth."""
+def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
+    """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others miss."""
+    infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
     if decision is None:
-        return [*_infeasible(compared)]
-    own = (f"{decision.plan.scheme}: {text}" for text in notes_on(decision.plan) if decision.plan in compared.plans)
-    return [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *own]
+        return infeasible
+    own = plan_notes(decision.plan, cones=False) if decision.plan in compared.plans else ()
+    missed = () if robust else comparison_warnings(compared, cones=False)
+    return ordered([*missed, *decision_notes(decision), *alternatives(compared), *infeasible, *own])
 
 
-def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
-    """Warnings of what no plan that may be recommended can do, and of those that could."""
-    for aspect in at_start(compared.spacecraft):
-        if not aspect.kept:
-            where = f"the spin axis is {degrees(aspect.least)} from {aspect.keep.name} at t = 0 already"
-            yield f"{where} ({bounds_text(aspect.keep)}): no plan can keep that"
-    others = [other.scheme for other in compared.plans if other.feasible and not other.commandable]
-    better = [scheme for scheme in others if compared.meets(compared[scheme])]
-    if better and plan.commandable and not compared.meets(plan):
-        yield f"no command block fires {listed(better)}, which would meet the requirement: --timed recommends those"
-
-
-def headline(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> Text:
+def headline(compared: Comparison, decision: Decision | None, robust: str = "") -> Text:
     """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
     if decision is None:
-        return Text.assemble(("NO PLAN", "bold red"), f": {reason}")
+        return Text.assemble(("NO PLAN", "bold red"), f": {joined(reasons(compared))}")
     plan = decision.plan
     pulses = plan.pulses
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
-    blocks = f"{len(pulses.blocks)} block{'s' * (len(pulses.blocks) != 1)}, " if pulses.blocks else ""
-    count = f"{blocks}{len(pulses)} pulse{'s' * (len(pulses) != 1)}, {spent}, ends at {pulses.end:.4g} s"
+    blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
+    count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
@@ -224,18 +210,11 @@ def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     return scheme_table(compared, plan).screen("screen", between=" ")
 
 
-def _infeasible(compared: Comparison) -> Iterator[str]:
-    """Reasons of schemes without a plan."""
-    for plan in compared.plans:
-        if not plan.feasible:
-            yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
-
-
 def _fitted(
     head: Sequence[Text],
     required: Sequence[RequirementRow],
     middle: Sequence[RenderableType],
-    more: Sequence[str],
+    more: Sequence[Text],
     schemes: FittedColumns,
     *,
     blocks: bool = False,
@@ -254,17 +233,16 @@ def _fitted(
         table.add_column()
     for row in shown:
         table.add_row(*row[:5])
-    told: list[str] = []
-    for text in more:
-        lines += _lines(Text(f"note: {text}"))
-        if lines > LINES or len(told) == NOTES:
+    shown_notes: list[Text] = []
+    for note in more:
+        lines += _lines(note)
+        if lines > LINES or len(shown_notes) == NOTES:
             break
-        told.append(text)
-    hidden = len(more) - len(told) + len(required) - len(shown)
+        shown_notes.append(note)
+    hidden = len(more) - len(shown_notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    noted = [Text.assemble(("note: ", "bold"), text) for text in told]
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *noted, steps)
+    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
 
 
 def _lines(*parts: RenderableType) -> int:

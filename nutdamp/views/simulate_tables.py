@@ -10,13 +10,14 @@ from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Extremes
 from nutdamp.planning.decision import Simulation
+from nutdamp.planning.notes import model_warnings
 from nutdamp.views.decisions import decision_table, requirement
 from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_texts, blocks_screen
 from nutdamp.views.layout import columns, facts
+from nutdamp.views.notes import screen_line
 from nutdamp.views.plan_tables import header
 from nutdamp.views.pulses import pulse_table, shown_rows
 from nutdamp.views.text import degrees, longitude, moment, pointing, quantity
-from nutdamp.views.verdicts import model_warnings
 
 
 def simulation_screen(simulation: Simulation) -> RenderableType:
@@ -39,7 +40,7 @@ def simulation_screen(simulation: Simulation) -> RenderableType:
     parts += [Text(), _ends(impulses, flown, extremes.until)]
     if flight.spacecraft.attitude is None:
         parts.append(Text(f"{FRAME_N}.", style="dim"))
-    parts += [Text.assemble(("Warning: ", "bold red"), warning) for warning in model_warnings(impulses, flown)]
+    parts += map(screen_line, model_warnings(impulses, flown))
     parts += [Text(), *requirement(decided), decision_table(decided)]
     parts += [Text(), _extremes(extremes, flight)]
     return Group(*parts)

@@ -176,7 +176,7 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
 @pytest.mark.parametrize(("samples", "recommended"), [(0, "four-pulse"), (None, "two-pulse")])
 def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, recommended: str) -> None:
     both = compared_text(example_text(), CLASSIC, samples)
-    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both, {})
+    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both, None)
     (heads, *rows), *_ = (cells(table) for table in section(shown, "schemes").all("table"))
     names = [head.text for head in heads]
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
@@ -289,7 +289,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     distribution = results.distribution("nutation")
     assert distribution is not None
     assert float(first["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
-    assert float(first["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
+    assert float(first["all"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
     assert bool(part.all("svg")) == good  # of the good one pictures are made
     budget = part.all("details")[0]
     assert "A" in {row[0].text for row in cells(budget.all("table")[0])}
