@@ -51,7 +51,7 @@ if TYPE_CHECKING:
         TwoPulseOptions,
     )
     from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.views.check_json import CheckedFile
+    from nutdamp.views.check import CheckedFile
 
 
 __all__ = [
@@ -120,7 +120,7 @@ _HOMES = {
     "nutdamp.planning.robust": ("RobustComparison",),
     "nutdamp.planning.tradeoff": ("Trade",),
     "nutdamp.spacecraft.model": ("Spacecraft",),
-    "nutdamp.views.check_json": ("CheckedFile",),
+    "nutdamp.views.check": ("CheckedFile",),
 }
 """Modules of the public classes; options of schemes are those of the catalogue, functions those of `nutdamp.api`."""
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.tradeoff import Trade
     from nutdamp.schemes.planner import Choice
     from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.views.check_json import CheckedFile
+    from nutdamp.views.check import CheckedFile
 
 PathName = str | PathLike[str]
 
@@ -110,7 +110,7 @@ def check(path: PathName | Mapping[str, object]) -> CheckedFile:
     True
     """
     from nutdamp.files.reader import source_of
-    from nutdamp.views.check_json import checked
+    from nutdamp.views.check import checked
 
     return checked(source := source_of(path), source.name, [])
 

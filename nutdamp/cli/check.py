@@ -36,12 +36,14 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
 @set_option
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
+@verbose_option
 @quiet_option
-def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, quiet: bool) -> None:
+def command(
+    files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
+) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""
     from nutdamp.errors import CannotRead, CannotWrite, FaultyFile
-    from nutdamp.views.check_json import check_json, checked, failed_json
-    from nutdamp.views.check_tables import check_screen
+    from nutdamp.views.check import check_json, check_screen, checked, failed_json
 
     inputs = [FileInput(file, settings) for file in files or (None,)]
     silent = expect_outputs(*(given.read for given in inputs), json=json)
@@ -59,7 +61,7 @@ def command(files: tuple[str, ...], settings: tuple[Setting, ...], json: str | N
             continue
         reports.append(result.to_dict())
         if not silent:
-            show(check_screen(result.spacecraft))
+            show(check_screen(result.spacecraft, verbose=verbose))
             if len(files) > 1:
                 click.echo()
     try:

@@ -106,8 +106,7 @@ def deliver_case(job: Job, plan: Plan | None, case: int, *, seed: int, until: fl
     screen: Callable[[], RenderableType]
     if plan is None:
         from nutdamp.control_loop.dispersion import loop_study
-        from nutdamp.views.loop_cases import loop_case_json
-        from nutdamp.views.loop_cases_tables import loop_case_screen
+        from nutdamp.views.loop_cases import loop_case_json, loop_case_screen
 
         loops = loop_study(job.spacecraft, until, seed=seed)
         flown = loops.fly([loops.case(case)])

@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 
 
@@ -20,8 +20,9 @@ from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
+@verbose_option
 @quiet_option
-def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool) -> None:
+def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
 
     TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
@@ -41,7 +42,7 @@ def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: 
     from nutdamp.api import fit
     from nutdamp.estimation.results import carried
     from nutdamp.files.editing import notes
-    from nutdamp.views.fit_tables import fit_screen
+    from nutdamp.views.fit import fit_screen
 
     with job.working("fitting"):
         fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
@@ -49,4 +50,4 @@ def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: 
     with job.working("looking ahead"):
         prospects = fitted.outlook(at) if ahead else None
     files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at, prospects)}
-    job.deliver(fitted, partial(fit_screen, fitted.core, at, prospects), more=files)
+    job.deliver(fitted, partial(fit_screen, fitted.core, at, prospects, verbose=verbose), more=files)

@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Job, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, Angles, Count, Direction, SessionCommand, UnitType
 from nutdamp.cli.screen import say
@@ -27,8 +27,9 @@ from nutdamp.units import LARGEST_SEED, thresholds, tilt
 @click.option("--track", type=OUTPUT, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
 @click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
+@verbose_option
 @quiet_option
-def command(job: Job, until: float | None, seed: int, case: int | None, samples: int) -> None:
+def command(job: Job, until: float | None, seed: int, case: int | None, samples: int, verbose: bool) -> None:
     """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
 
     A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
@@ -38,7 +39,7 @@ def command(job: Job, until: float | None, seed: int, case: int | None, samples:
 
     from nutdamp.api import loop
     from nutdamp.files.tabular import write_track
-    from nutdamp.views.loop_tables import stopped, warnings
+    from nutdamp.views.loop import loop_screen, stopped, warnings
 
     with job.working("flying"):
         plan = loop(body, until, seed=seed, case=case)
@@ -46,7 +47,8 @@ def command(job: Job, until: float | None, seed: int, case: int | None, samples:
     if job.silent:
         job.warn(warnings(body))
     pieces = partial(run.flight.pieces, samples, run.until)
-    job.deliver(plan, more={"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)})
+    track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
+    job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track)
     if run.stop.fault:
         say(f"nutdamp: the loop was stopped {stopped(run)}")
     leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
@@ -71,8 +73,9 @@ def command(job: Job, until: float | None, seed: int, case: int | None, samples:
 @click.option("--csv", type=OUTPUT, help="Write a row for each two thresholds.")
 @click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+@verbose_option
 @quiet_option
-def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int) -> None:
+def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool) -> None:
     """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.
 
     The limit cycle of the loop in the file, from event to event in closed form; and how long until damping must begin.
@@ -83,8 +86,9 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
         job.remark(f"--thresholds: warning: {reading}")
 
     from nutdamp.api import budget
+    from nutdamp.views.budget import budget_screen
 
     with job.progress("following cycles") as step:
         result = budget(body, pairs, largest=largest, seed=seed, progress=step)
-    job.deliver(result)
+    job.deliver(result, partial(budget_screen, result, verbose=verbose))
     leave(infeasible=not result.feasible, missed=result.meets_requirement is False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import flown_options, plan_or_read
-from nutdamp.cli.job import FIGURES, Job, deliver, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.job import FIGURES, Job, deliver, plot_options, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, SessionCommand, goal_options
 from nutdamp.errors import printable
@@ -80,8 +80,9 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
 @plot_options(FIGURES)
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
+@verbose_option
 @quiet_option
-def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool) -> None:
+def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool, verbose: bool) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
@@ -96,12 +97,12 @@ def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool
 
     from nutdamp.api import simulate
     from nutdamp.planning.notes import model_warnings
-    from nutdamp.views.simulate_tables import simulation_screen
+    from nutdamp.views.simulation import simulation_screen
 
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
         job.note(model_warnings(simulation.impulses, simulation.flown))
-    screens: list[Callable[[], RenderableType]] = [partial(simulation_screen, simulation)]
+    screens: list[Callable[[], RenderableType]] = [partial(simulation_screen, simulation, verbose=verbose)]
     if drawn:
         from nutdamp.figures.terminal import motion_drawing
 

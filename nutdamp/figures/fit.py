@@ -10,7 +10,7 @@ from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.results import Estimate, estimates
 from nutdamp.figures import style
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION
-from nutdamp.views.fit_tables import in_shown
+from nutdamp.views.fit import in_shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from nutdamp.figures.overview import title
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Vector
-from nutdamp.views.loop_tables import described
+from nutdamp.views.loop import described
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -48,13 +48,13 @@ from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, verdicts
-from nutdamp.views.check_tables import check_screen
+from nutdamp.views.check import check_screen
 from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade import apart, beats, front_parts
-from nutdamp.views.verification import BUDGET, budget_table, conservation, methods_table, verdict
+from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results

@@ -62,22 +62,22 @@ VIEWS = {
     "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
     "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
     "LoopDispersion.figure": "figures.dispersion:loop_cases_figure core",
-    "LoopDispersion.screen": "views.loop_cases_tables:loop_cases_screen core",
-    "LoopPlan.data": "views.loop_json:loop_json",
+    "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
+    "LoopPlan.data": "views.loop:loop_json",
     "LoopPlan.figure": "figures.loop:loop_figure",
-    "LoopPlan.screen": "views.loop_tables:loop_screen",
-    "LoopVerification.data": "views.loop_json:verified_json",
-    "LoopVerification.screen": "views.loop_tables:verification_screen",
-    "Fitted.data": "views.fit_json:fit_json core",
+    "LoopPlan.screen": "views.loop:loop_screen",
+    "LoopVerification.data": "views.loop:verified_json",
+    "LoopVerification.screen": "views.loop:verification_screen",
+    "Fitted.data": "views.fit:fit_json core",
     "Fitted.figure": "figures.fit:fit_figure core",
     "Fitted.text": "files.editing:fitted_file core",
     "Fitted.spacecraft": "files.editing:fitted_spacecraft",
     "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
     "Verified.screen": "views.verification:verification_screen plan core",
-    "Budget.data": "views.budget_files:budget_json",
-    "Budget.csv": "views.budget_files:budget_csv",
+    "Budget.data": "views.budget:budget_json",
+    "Budget.csv": "views.budget:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
-    "Budget.screen": "views.budget_tables:budget_screen",
+    "Budget.screen": "views.budget:budget_screen",
 }
 """Functions of results, see `nutdamp.common.results.view`."""
 
@@ -118,7 +118,7 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
 
 def simulation_data(simulation: Simulation) -> dict[str, Any]:
     """The object of ``simulate --json``."""
-    from nutdamp.views.simulation_json import simulation_json
+    from nutdamp.views.simulation import simulation_json
 
     return simulation_json(simulation, decisions.verdict(simulation.decision))
 

@@ -1,41 +1,272 @@
-"""Files of ``disperse --loop``: JSON of all cases together or of one, and CSV case by case."""
+"""Dispersed closed loops, for ``disperse --loop``: percentiles, share that settles, worst cases; one case alone."""
 
 from __future__ import annotations
 
 import math
-from typing import IO, Any
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import IO, Any, NamedTuple
 
 import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
 
 from nutdamp import __version__
 from nutdamp.control_loop.batch import FlownLoops
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.files.samples import column, cone_columns
-from nutdamp.files.tabular import csv_text, number
-from nutdamp.montecarlo.statistics import Array
+from nutdamp.montecarlo.inputs import DispersedInput
+from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
+from nutdamp.views import verdicts
 from nutdamp.views.dispersion import (
+    PERCENTS,
+    add_angles,
     angles_json,
+    angles_note,
+    beside,
+    cone_lines,
     cones_json,
     correlation_json,
     percentiles_json,
+    requirement_lines,
     requirement_of,
     shown,
 )
+from nutdamp.views.layout import columns
+from nutdamp.views.loop import described
 from nutdamp.views.plan_json import heading
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.text import MISSING, degrees, duration
+from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
-COLUMNS = (
-    "settled_s",
-    "quiet_nutation_deg",
-    "largest_nutation_deg",
-    "momentum_shift_deg",
-    "axis_error_deg",
-    "spin_change_rad_s",
-    "propellant_kg",
-    "firings",
+
+class LoopOutput(NamedTuple):
+    """An output of `OUTPUTS`: its ``key`` in files, its heading and unit for people, and the factor to that unit."""
+
+    name: str
+    key: str
+    heading: str
+    unit: str = "deg"
+    scale: float = 1.0
+
+    @property
+    def label(self) -> str:
+        """Heading and unit."""
+        return f"{self.heading}, {self.unit}" if self.unit else self.heading
+
+
+SHOWN_OUTPUTS = (
+    LoopOutput("settled", "settled_s", "first quiet", "s"),
+    LoopOutput("quiet", "quiet_nutation_deg", "left then"),
+    LoopOutput("nutation", "largest_nutation_deg", "largest"),
+    LoopOutput("momentum_shift", "momentum_shift_deg", "momentum shift"),
+    LoopOutput("axis_error", "axis_error_deg", "axis error"),
+    LoopOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3),
+    LoopOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
+    LoopOutput("firings", "firings", "firings", ""),
 )
-"""Columns of `OUTPUTS`, in their order."""
+"""The outputs, in the order of `OUTPUTS`."""
+
+SHARED = tuple(output for output in SHOWN_OUTPUTS if output.name in ("settled", "nutation", "propellant"))
+"""Outputs whose dependence on the inputs is shown."""
+
+RANKED = (*SHARED, SHOWN_OUTPUTS[-1])
+"""Outputs by which worst cases are shown."""
+
+
+class LoopCaseRow(NamedTuple):
+    """A case, from 0: deviations of its inputs, outputs (8,), ending, and angles (m, 2) rad to the cones."""
+
+    case: int
+    draws: dict[str, float]
+    values: list[float]
+    stop: Ending | None
+    angles: Array
+
+
+def _value(output: LoopOutput, row: LoopCaseRow) -> float | int | None:
+    """An output in the unit of its key; None where it is not known."""
+    value = row.values[OUTPUTS.index(output.name)]
+    return None if math.isnan(value) else int(value) if output.name == "firings" else shown(output.key, value)
+
+
+def _true_value(entry: DispersedInput, row: LoopCaseRow) -> float:
+    value = entry.nominal + row.draws[entry.name]
+    return math.degrees(value) if entry.unit == "rad" else value
+
+
+def _angle(at: int, row: LoopCaseRow) -> float:
+    return math.degrees(row.angles.flat[at])
+
+
+def _figures(scale: float, value: float) -> str:
+    return f"{scale * value:.4g}"
+
+
+def _columns(study: LoopStudy) -> Iterator[Column]:
+    """Columns of a case: its number (from 1), true inputs, outputs, angles to cones."""
+    yield Column("case", "case", "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
+    for entry in study.model.inputs.drawn:
+        yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
+    for output in SHOWN_OUTPUTS:
+        where, text = "csv json" + " screen" * (output in RANKED), partial(_figures, output.scale)
+        yield Column(output.key, output.heading, output.unit, partial(_value, output), text, where, kind=WHOLE)
+    yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
+    keep = study.spacecraft.keep
+    names = [f"{which} from {cone.name}" for cone in keep for which in ("least", "largest")]
+    limited = [bound for cone in keep for bound in (cone.least > 0.0, cone.most < math.pi)]
+    for at, (key, name, bounded) in enumerate(zip(cone_columns(study.spacecraft), names, limited, strict=True)):
+        yield Column(key, name, "deg", partial(_angle, at), partial(_figures, 1.0), "csv" + " screen" * bounded)
+    yield Column("", "largest inputs, in sigmas", "", partial(_largest, study), where="screen", kind=TEXT)
+
+
+def _largest(study: LoopStudy, row: LoopCaseRow) -> str:
+    """The three inputs that are farthest off."""
+    drawn = study.model.inputs.drawn
+    sigmas = [(in_words(entry.name), row.draws[entry.name] / entry.sigma) for entry in drawn if entry.sigma]
+    return ", ".join(f"{name} {sigma:+.1f}" for name, sigma in sorted(sigmas, key=lambda pair: -abs(pair[1]))[:3])
+
+
+def _cases(study: LoopStudy, rows: Iterable[LoopCaseRow]) -> DataTable:
+    return DataTable("Worst cases", tuple(_columns(study)), list(rows))
+
+
+def _worst(results: LoopResults, count: int) -> list[LoopCaseRow]:
+    study, cases = results.study, results.worst.cases[:count].tolist()
+    return [
+        LoopCaseRow(case, study.draws_of(case), results.values[:, case].tolist(), None, results.angles[:, :, case])
+        for case in cases
+    ]
+
+
+def _flown_case(study: LoopStudy, case: int, flown: FlownLoops) -> LoopCaseRow:
+    values = study.measured(flown)[0][:, 0].tolist()
+    return LoopCaseRow(case, study.draws_of(case), values, flown.pilots[0].ending[0], flown.aspects[:, :, 0])
+
+
+def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
+    """All tables of ``disperse --loop``."""
+    study = results.study
+    drawn = f"cases: {results.done:,}, seed {study.seed}"
+    if results.redrawn:
+        drawn += f", unphysical ones drawn again: {results.redrawn:,}"
+    title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
+    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results)]
+    parts += [angles_note(study.spacecraft), Text()]
+    parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
+    parts += list(_shares(results))
+    anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
+    if anew:
+        parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
+    rows = _worst(results, worst)
+    if rows:
+        table, options = _cases(study, rows), f"--seed {study.seed} --case {rows[0].case + 1}"
+        parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
+        parts.append(Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim"))
+    if study.model.inputs.unused:
+        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(study.model.inputs.unused)]
+    return Group(*parts)
+
+
+def _percentiles(results: LoopResults) -> Table:
+    table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "max")
+    for output, plan in zip(SHOWN_OUTPUTS, results.study.nominal.tolist(), strict=True):
+        distribution = results.distribution(output.name)
+        if distribution is not None and output.name == "spin_change":  # up or down, the largest change is the worst
+            distribution, plan = Exact(np.abs(results.of(output.name))), abs(plan)
+        cells = [MISSING] * (len(PERCENTS) + 2)
+        if distribution is not None:
+            values = [plan, *distribution.quantiles(np.array(PERCENTS) / 100.0).tolist(), distribution.maximum]
+            cells = _numbers(output, values, max(abs(distribution.minimum), abs(distribution.maximum)))
+        table.add_row(Text(output.label, style="dim"), *cells)
+    for shown_column in table.columns[1:]:
+        shown_column.no_wrap = True
+    return table
+
+
+def _numbers(output: LoopOutput, values: Iterable[float], largest: float) -> list[str]:
+    """Values beside the ``largest`` of them."""
+    scaled = [output.scale * shown(output.key, value) for value in values]
+    whole = output.name == "firings"
+    texts = (f"{value:.0f}" if whole else beside(value, output.scale * shown(output.key, largest)) for value in scaled)
+    return [MISSING if math.isnan(value) else text for value, text in zip(scaled, texts, strict=True)]
+
+
+def _share(results: LoopResults, count: int, of: int) -> str:
+    if not of:
+        return "no case"
+    low, high = results.interval_about(count, of)
+    share, least, most = (verdicts.percent(fraction, 0.99) for fraction in (count / of, low, high))
+    return f"{share} of cases (95 % interval {least} to {most})"
+
+
+def _settled(results: LoopResults) -> Iterator[RenderableType]:
+    stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
+    lasting = "and is not stopped, " if stopped else ""
+    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results, results.settled, results.done)}.")
+    parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
+    never = results.done - results.settled - sum(count for _, count in stopped)
+    if never:
+        parts.append(f"not down to the stop threshold in {never:,}")
+    if parts:
+        yield Text(f"Of the others: {'; '.join(parts)}.")
+    if results.idle:
+        yield Text(f"In {results.idle:,} cases the sensor never shows the start threshold, and nothing fires.")
+
+
+def _dead_band(results: LoopResults) -> Text:
+    expected = degrees(results.study.band.most)
+    share = _share(results, results.within, len(results.of("quiet")))
+    return Text.assemble(("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}.")
+
+
+def _shares(results: LoopResults) -> Iterator[RenderableType]:
+    """Shares of the inputs in the variance of the outputs."""
+    shares = {output.name: results.shares(output.name) for output in SHARED}
+    inputs = [entry for entry in results.study.model.inputs.drawn if entry.sigma]
+    if not inputs or not any(shares.values()):
+        return
+
+    def percent(output: LoopOutput, entry: DispersedInput) -> float | None:
+        share = shares[output.name]
+        return 100.0 * share[entry.name] if share else None
+
+    ranked = sorted(inputs, key=lambda entry: -max(share.get(entry.name, 0.0) for share in shares.values()))
+    table = DataTable(
+        "What it depends on",
+        (
+            Column("", "input", "", lambda entry: in_words(entry.name), where="screen", kind=TEXT),
+            Column("", "one sigma", "", size_text, where="screen"),
+            *(Column("", output.heading, "%", partial(percent, output), lambda share: f"{share:.1f}", "screen")
+              for output in SHARED),
+        ),
+        ranked[:MOST_ROWS],
+    )  # fmt: skip
+    yield from (Text(), Text(table.title, style="bold"), table.screen("screen"))
+    note = "Squared correlation over the cases that fall quiet; the rest is noise and what is not linear."
+    if results.study.model.groups:
+        note += " Of correlated inputs each has what it adds to those before it in the file's correlation."
+    yield Text(note, "dim")
+
+
+def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
+    """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
+    row = _flown_case(study, case, flown)
+    table = columns("", "nominal", "this case")
+    for output, *pair in zip(SHOWN_OUTPUTS, study.nominal.tolist(), row.values, strict=True):
+        largest = max((abs(value) for value in pair if not math.isnan(value)), default=0.0)
+        table.add_row(Text(output.label, style="dim"), *_numbers(output, pair, largest))
+    add_angles(table, study.spacecraft.keep, [study.nominal_aspects, row.angles])
+    title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
+    parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
+    if row.stop is not None and row.stop is not Ending.END:
+        parts.append(Text.assemble(("Stopped: ", "bold red"), f"{row.stop.value}."))
+    parts.append(Text(f"Firing by firing: nutdamp loop --seed {study.seed} --case {case + 1}", "dim"))
+    return Group(*parts)
 
 
 def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
@@ -52,57 +283,40 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "redrawn": results.redrawn,
         "alone_because": study.alone or None,
         "percentiles": {
-            name: percentiles_json(name, nominal, results.distribution(output))
-            for name, output, nominal in zip(COLUMNS, OUTPUTS, study.nominal.tolist(), strict=True)
+            output.key: percentiles_json(output.key, nominal, results.distribution(output.name))
+            for output, nominal in zip(SHOWN_OUTPUTS, study.nominal.tolist(), strict=True)
         },
-        "settled": _share(results, results.settled, results.done),
+        "settled": _fraction(results, results.settled, results.done),
         "never_started": results.idle,
         "dead_band": {
             "expected_deg": math.degrees(study.band.most),
-            **_share(results, results.within, len(results.of("quiet"))),
+            **_fraction(results, results.within, len(results.of("quiet"))),
         },
         "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
         "requirement": requirement_of(results),
         **cones_json(results),
-        "shares": {
-            name: results.shares(output)
-            for name, output in zip(COLUMNS, OUTPUTS, strict=True)
-            if output in ("settled", "nutation", "propellant")
-        },
+        "shares": {output.key: results.shares(output.name) for output in SHARED},
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
-        "worst": [
-            {
-                **_inputs(study, case),
-                **outputs_json(results.values[:, case]),
-                **angles_json(study.spacecraft, results.angles[:, :, case]),
-            }
-            for case in results.worst.cases[:worst].tolist()
-        ],
+        "worst": [_case_json(study, row) for row in _worst(results, worst)],
     }
 
 
 def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, Any]:
     """One case (from 0), ``flown`` alone: the true value of each input, in SI, and the outputs."""
-    values, stop = study.measured(flown)[0][:, 0], flown.pilots[0].ending[0]
-    seen = angles_json(study.spacecraft, flown.aspects[:, :, 0])
-    outputs = {"stopped": stop.name.lower(), **outputs_json(values), **seen}
-    return {"nutdamp": __version__, "seed": study.seed, "until_s": study.until, **_inputs(study, case), **outputs}
+    row = _flown_case(study, case, flown)
+    given = {"nutdamp": __version__, "seed": study.seed, "until_s": study.until}
+    return {**given, **({} if row.stop is None else {"stopped": row.stop.name.lower()}), **_case_json(study, row)}
 
 
-def _inputs(study: LoopStudy, case: int) -> dict[str, Any]:
-    draws = study.draws_of(case)
-    entries = study.model.inputs.drawn
-    return {"case": case + 1, "inputs": {entry.name: entry.nominal + draws[entry.name] for entry in entries}}
+def _case_json(study: LoopStudy, row: LoopCaseRow) -> dict[str, Any]:
+    inputs = {entry.name: entry.nominal + row.draws[entry.name] for entry in study.model.inputs.drawn}
+    (outputs,) = _cases(study, [row]).json()
+    return {"case": row.case + 1, "inputs": inputs, **outputs, **angles_json(study.spacecraft, row.angles)}
 
 
-def outputs_json(values: Array) -> dict[str, float]:
-    """The outputs (8,) of a case by their columns; unknown ones are not a number."""
-    return {name: shown(name, value) for name, value in zip(COLUMNS, values.tolist(), strict=True)}
-
-
-def _share(results: LoopResults, count: int, of: int) -> dict[str, float | None]:
+def _fraction(results: LoopResults, count: int, of: int) -> dict[str, float | None]:
     low, high = results.interval_about(count, of) if of else (None, None)
     return {"fraction": count / of if of else None, "low": low, "high": high, "confidence": CONFIDENCE}
 
@@ -114,25 +328,21 @@ class LoopCasesWriter:
     """
 
     def __init__(self, stream: IO[bytes], study: LoopStudy) -> None:
-        self._stream, self._study = stream, study
-        inputs = (column(entry) for entry in study.model.inputs.drawn)
-        header = ["case", *inputs, *COLUMNS, "stopped", *cone_columns(study.spacecraft)]
-        stream.write(csv_text(header, []).encode())
+        self._stream, self._study, self._table = stream, study, _cases(study, ())
+        stream.write(self._table.csv().encode())
         stream.flush()
 
     def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
-        entries = self._study.model.inputs.drawn
         drawn = self._study.draws_from(first, len(stops))
-        rows = []
-        for row, stop in enumerate(stops):
-            truths = [entry.nominal + float(drawn[entry.name][row]) for entry in entries]
-            inputs = [
-                number(math.degrees(value) if entry.unit == "rad" else value)
-                for entry, value in zip(entries, truths, strict=True)
-            ]
-            outputs = outputs_json(values[:, row]).values()
-            cells = ["" if math.isnan(value) else number(value) for value in outputs]
-            ending = [str(int(values[-1, row])), stop.name.lower(), *map(number, np.degrees(angles[..., row]).flat)]
-            rows.append([str(first + row + 1), *inputs, *cells[:-1], *ending])
-        self._stream.write(csv_text(rows[0], rows[1:]).encode())
+        rows = [
+            LoopCaseRow(
+                first + row,
+                {name: float(np.asarray(draws)[row]) for name, draws in drawn.items()},
+                values[:, row].tolist(),
+                stop,
+                angles[..., row],
+            )
+            for row, stop in enumerate(stops)
+        ]
+        self._stream.write(replace(self._table, rows=rows).csv().partition("\n")[2].encode())

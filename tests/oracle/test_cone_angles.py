@@ -139,5 +139,5 @@ def test_commands_disperse_and_start_free_motion_as_it_is(run: Run, tmp_path: Pa
         )
         apart = math.degrees(reference.angle(np.array(axis), np.array(momentum)))
         assert (row["nutation_deg"], apart) == pytest.approx((10.0, 10.0), rel=1e-12)
-    nutation = next(line for line in run(*simulate).stdout.splitlines() if line.startswith("nutation  "))
+    nutation = next(line for line in run(*simulate, "-v").stdout.splitlines() if line.startswith("nutation  "))
     check_text("cones.at-start", nutation)

@@ -68,6 +68,7 @@ def test_a_loop_is_flown_and_written_and_fired_again(run: Run, file: str, tmp_pa
     screen = run("loop", file, "--json", "loop.json", "--csv", "pulses.csv", "--track", "track.csv")
     assert screen.returncode == 0, screen.stderr
     check_text("loop.screen", screen.stdout)
+    check_text("loop.full", run("loop", file, "-v").stdout)
     written = json.loads((tmp_path / "loop.json").read_text())
     assert (written["stopped"], written["channel"], written["meets_requirement"]) == ("end", None, True)
     assert written["quiet_s"][0] > written["pulses"][-1]["start_s"]
@@ -98,7 +99,7 @@ def test_what_is_wired_backwards_is_named(run: Run, file: str, tmp_path: Path, s
     stopped = next(line for line in screen.stdout.splitlines() if line.startswith("Stopped"))
     checked = run("check", file, "--set", setting)
     assert checked.returncode == 0
-    warning = "".join(flat(checked.stdout).partition("Warning: loop")[1:]).partition(" the nutation")[0]
+    warning = "".join(flat(checked.stdout).partition("warning: loop")[1:]).partition(" the nutation")[0]
     wired = "channel" if "faults" in setting else "sensor"
     check_text(f"loop.wired-{wired}", "\n".join([screen.stderr, stopped, warning]))
     assert json.loads((tmp_path / "loop.json").read_text())["meets_requirement"] is False
@@ -109,7 +110,7 @@ def test_too_late_is_refused_with_what_is_allowed(run: Run, file: str) -> None:
     screen = run("loop", file, *late)
     assert (screen.returncode, screen.stdout) == (3, "")
     check_text("loop.refused-too-late", screen.stderr)
-    assert "Warning: the loop does not damp" in flat(run("check", file, *late).stdout)
+    assert "warning: the loop does not damp" in flat(run("check", file, *late).stdout)
     margins = json.loads(run("check", file, *late, "--json", "-").stdout)["files"][0]["loop"]
     assert {each["damps"] for each in margins} == {False}
     assert margins[0]["delay_margin_s"] < 0.0
@@ -315,7 +316,7 @@ def test_a_dispersed_case_is_headed_so_and_changes_of_spin_have_no_sign(run: Run
 def test_a_schedule_does_not_use_what_is_of_the_sensor(run: Run, stage: Path) -> None:
     shown = run("disperse", "stage.yaml", "--scheme", "one-pulse", "--samples", "10", "--json", "-").stdout
     check_text("loop.unused", json.loads(shown)["unused_because"]["sensor delay"])
-    assert "sensor delay" in run("check", "stage.yaml").stdout
+    assert "sensor delay" in run("check", "stage.yaml", "-v").stdout
 
 
 def test_a_budget_is_shown_and_written(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -353,14 +354,14 @@ PARTICULAR = {
 def test_what_is_particular_of_a_budget_is_said(run: Run, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     follow_few_cycles(monkeypatch)
     screen = run("budget", STAGE, *settings(*PARTICULAR[name]), columns=200)
-    lines = [line for line in screen.stdout.splitlines() if line.endswith(".")]
+    lines = [line for line in screen.stdout.splitlines() if line.endswith(".") or line.startswith("warning")]
     text = f"exit {screen.returncode}{', NOT met' * ('NOT met' in screen.stdout)}\n"
     check_text(f"budget.{name.replace(' ', '-')}", text + "\n".join(lines))
 
 
 def test_without_a_loop_a_budget_says_what_is_missing(run: Run) -> None:
     growing = ("budget", "-q", *settings("dissipation.time_constant=600s"), "--largest", "10deg")
-    check_text("budget.without-loop", run(*growing).stdout.partition("requirement")[2])
+    check_text("budget.without-loop", run(*growing).stdout)
     written = run(*growing, "--csv", "-")
     assert (written.returncode, written.stdout.count("\n")) == (0, 1)
 

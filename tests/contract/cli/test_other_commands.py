@@ -21,8 +21,8 @@ from support.process import Run
 from nutdamp import __version__, errors
 from nutdamp.cli.main import COMMANDS, group
 from nutdamp.cli.options import FileName
+from nutdamp.planning import capability
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import survey
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -81,9 +81,10 @@ def test_schema_is_json_and_the_version_is_that_of_the_package(run: Run, tmp_pat
 
 
 def test_check_prints_derived_quantities(run: Run) -> None:
-    ended = run("check")
-    assert ended.returncode == 0
+    ended, full = run("check"), run("check", "-v")
+    assert ended.returncode == full.returncode == 0
     check_text("cli.check.example", ended.stdout)
+    check_text("cli.check.full", full.stdout)
 
 
 def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
@@ -100,14 +101,14 @@ def test_check_shows_all_faults_of_all_files(run: Run, tmp_path: Path) -> None:
 
 
 def test_check_goes_on_after_what_turns_out_late(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spin_axis, problem = survey.spin_axis, "the motion changes too fast to be integrated"
+    spin_axis, problem = capability.spin_axis, "the motion changes too fast to be integrated"
 
-    def late(spacecraft: Spacecraft) -> survey.SpinAxis:
+    def late(spacecraft: Spacecraft) -> capability.SpinAxis:
         if spacecraft.name == "Late":
             raise errors.Infeasible(problem)
         return spin_axis(spacecraft)
 
-    monkeypatch.setattr(survey, "spin_axis", late)
+    monkeypatch.setattr(capability, "spin_axis", late)
     written(tmp_path, good_yaml=GOOD, late_yaml=GOOD.replace("Good", "Late"))
     ended = call(run, "check late.yaml good.yaml --json check.json")
     assert (ended.returncode, ended.stderr) == (2, f"late.yaml:1:1: {problem}\n")
@@ -181,7 +182,7 @@ dispersions:
 
 def test_check_says_what_could_be_drawn_and_what_touches_nothing_that_can_fire(run: Run, tmp_path: Path) -> None:
     written(tmp_path, sat_yaml=DISPERSED, exact_yaml=DISPERSED.partition("dispersions:")[0])
-    check_text("cli.check.dispersions", run("check", "sat.yaml").stdout)
+    check_text("cli.check.dispersions", run("check", "sat.yaml", "-v").stdout)
     inputs = ["thrust left 1", "thrust T2", "direction left 1 a", "direction left 1 b", "timing of each pulse"]
     dispersions = result(run, "check sat.yaml")["files"][0]["dispersions"]
     assert [entry["name"] for entry in dispersions["inputs"]] == inputs

@@ -56,6 +56,30 @@ def test_no_digit_is_lost_on_a_narrow_screen(run: Run, command: str) -> None:
         assert max(map(len, narrow.stdout.splitlines())) <= width
 
 
+@spread("name", sorted(path.stem for path in places.CONFIGS.glob("*.yaml")), quick=2, deep=20)
+def test_default_screens_are_short_and_cut_nothing(run: Run, name: str) -> None:
+    """Headline, requirement, one table, notes, next steps: 40 lines of 80 columns; a row of the table is one line."""
+    commands = ["check", "simulate --samples 100", "simulate --scheme none --samples 100"]
+    text = (places.CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
+    commands += ["loop"] * ("\nloop:" in text) + ["budget"] * ("\nloop:" in text and "\ndissipation:" in text)
+    for command in commands:
+        usual, wide = (call(run, f"{command} {places.CONFIGS}/{name}.yaml -q", columns=width) for width in (80, 200))
+        assert usual.returncode in (0, 4), usual.stderr
+        lines = usual.stdout.splitlines()
+        assert len(lines) <= 40
+        assert max(map(len, lines)) <= 80
+        assert lines[-1].startswith("-v all values")
+        assert sum(line.startswith("note: ") for line in lines) <= 3
+        (table, *_), (whole, *_) = (tables(ended.stdout) for ended in (usual, wide))
+        assert [row.split() for row in table] == [row.split() for row in whole]
+
+
+def tables(shown: str) -> list[list[str]]:
+    """Rows of the table of a screen, without its headings."""
+    parts = (part.splitlines() for part in shown.split("\n\n")[1:2])
+    return [[line for line in part if re.search("[0-9]", line)] for part in parts] or [[]]
+
+
 def test_a_width_into_which_nothing_fits_hides_nothing(run: Run) -> None:
     """COLUMNS=0 printed nothing, with exit status 0."""
     none, one, seven, usual = (call(run, "plan -v -q --scheme two-pulse", columns=width) for width in (0, 1, 7, 80))

@@ -20,9 +20,11 @@ ATTITUDE = "attitude={epoch: 2026-03-01T12:00:00Z, frame: EME2000, quaternion: [
 
 def test_the_screen_of_a_scheme(run: Run) -> None:
     """With right ascension and declination where the file has an attitude."""
-    plain, dated = (run("simulate", "--scheme", "two-pulse", *more) for more in ((), ("--set", ATTITUDE)))
-    assert plain.returncode == dated.returncode == 0
+    plain, full = (run("simulate", "--scheme", "two-pulse", *more) for more in ((), ("-v",)))
+    dated = run("simulate", "--scheme", "two-pulse", "-v", "--set", ATTITUDE)
+    assert plain.returncode == full.returncode == dated.returncode == 0
     check_text("cli.simulate.screen", plain.stdout)
+    check_text("cli.simulate.full", full.stdout)
     assert "right ascension" in dated.stdout
     assert "EME2000" in dated.stdout
 
@@ -128,4 +130,4 @@ def test_a_broken_cone_is_exit_4_and_said_once(run: Run, tmp_path: Path) -> None
 
 def test_with_a_target_the_screen_says_how_far_off_it_ends(run: Run) -> None:
     done = run("simulate", "--scheme", "none", "--target", "10deg,45deg", "--samples", "2")
-    assert "off the target" in done.stdout
+    assert "axis error" in done.stdout

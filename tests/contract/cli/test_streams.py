@@ -171,7 +171,7 @@ run(group)
 @spread(
     ("arguments", "module", "function"),
     [
-        ("check --json x.json", "views.check_json", "check_json"),
+        ("check --json x.json", "views.check", "check_json"),
         ("plan spacecraft.yaml --json x.json", "files.reader", "read_spacecraft"),
         ("plan --json x.json --csv x.csv", "files.tabular", "json_text"),
         ("simulate --scheme two-pulse --csv x.csv --json x.json", "files.tabular", "json_text"),

@@ -218,7 +218,7 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
     pulses = rows_of(tmp_path / "pulses.csv")
     assert row["first_utc"] == pulses[0]["utc"]
     assert len(pulses) == int(row["count"])
-    flown = run("simulate", "-", *GOAL, *BLOCKS, "--samples", "2", stdin=text)
+    flown = run("simulate", "-", "-v", *GOAL, *BLOCKS, "--samples", "2", stdin=text)
     assert flown.returncode == 0, flown.stderr
     assert flown.stderr == ""
     blocks = flown.stdout[flown.stdout.index("Command blocks") :].split("\npulse ")[0].strip()
@@ -228,7 +228,7 @@ def test_what_plan_writes_is_what_simulate_fires(run: Run, tmp_path: Path) -> No
 
 def test_an_edited_block_is_fired(run: Run, tmp_path: Path) -> None:
     (tmp_path / "blocks.csv").write_text(HEAD + "T1,3,1.001,0.1,4\nT1,20,1.5,0.1,40\n")
-    flown = run("simulate", "-", *BLOCKS, "--samples", "2", stdin=FILE)
+    flown = run("simulate", "-", "-v", *BLOCKS, "--samples", "2", stdin=FILE)
     assert flown.returncode == 4
     lines = flown.stdout.splitlines()
     assert sum(line.split()[:1] in (["1"], ["4"], ["44"]) for line in lines) >= 3

@@ -22,7 +22,7 @@ from nutdamp.estimation import forecast
 from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.planning import decision
-from nutdamp.views.fit_tables import _table, advice, fit_screen
+from nutdamp.views.fit import advice, estimate_table, fit_screen
 
 SPIN, LENGTH = math.pi, 30.0
 
@@ -75,10 +75,21 @@ def test_only_a_spacecraft_of_a_file_makes_one(fitted: Fitted) -> None:
 
 def test_the_screen_says_how_many_periods_the_record_has(fitted: Fitted) -> None:
     values = fitted.core.named
-    periods = re.search(r"0 s to 30 s, (\S+) nutation periods", shown(fit_screen(fitted.core, 0.0)))
+    periods = re.search(r"0 s to 30 s, nutation periods: (\S+)", shown(fit_screen(fitted.core, 0.0)))
     assert periods is not None
     expected = LENGTH * (1.0 - values["C/A"]) * values["omega_3"] / (2.0 * math.pi)
     assert float(periods[1]) == pytest.approx(expected, rel=5e-3)
+
+
+def test_the_default_screen_is_short(fitted: Fitted) -> None:
+    brief, full = (shown(fit_screen(fitted.core, 0.0, verbose=verbose)) for verbose in (False, True))
+    lines = brief.splitlines()
+    assert len(lines) <= 40
+    assert lines[-1].startswith("-v all values")
+    ratio, same = ([row for row in text.splitlines() if row.startswith("C/A")] for text in (brief, full))
+    assert ratio == same
+    assert "samples" in full
+    assert "samples" not in brief
 
 
 def test_values_are_shown_to_what_their_sigmas_leave() -> None:
@@ -86,8 +97,10 @@ def test_values_are_shown_to_what_their_sigmas_leave() -> None:
         return Estimate("x", f"{value:g} ± {sigma:g}", "m", 1.0, value, sigma, 1.0, 0.5)
 
     pairs = ((1.23456789, 1e-4), (1.23456789, 2.0), (1.23456789, 1.2), (0.0, 0.1), (1e-9, 1.0), (1.0, math.inf))
-    check_text("estimation.digits", shown(_table(tuple(row(*pair) for pair in pairs))))
-    (scaled,) = shown(_table((Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3),))).splitlines()[-1:]
+    check_text("estimation.digits", shown(estimate_table([row(*pair) for pair in pairs]).screen("screen")))
+    (scaled,) = shown(
+        estimate_table([Estimate("x", "x", "mm", 1e3, 0.0123, 1e-4, 0.012, 1e-3)]).screen("screen")
+    ).splitlines()[-1:]
     assert scaled.split()[:6] == ["x", "12.3", "0.1", "mm", "12", "+0.3"]
 
 

@@ -31,7 +31,7 @@ from nutdamp.schemes.sequential import ImpulseBuilder, model_of, steady_omega
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.views.check_json import checked_json
+from nutdamp.views.check import checked_json
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 DISTURBED = Options(with_disturbances=True)

@@ -28,13 +28,13 @@ from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Residual
 from nutdamp.physics import attitude, response
+from nutdamp.planning import capability
 from nutdamp.planning import plan as planning
 from nutdamp.schemes import block_model, one_pulse
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
-from nutdamp.views import survey
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 from nutdamp.views.pulses import channel_text, pulse_table
 from nutdamp.views.text import longitude, steering, vector
@@ -82,7 +82,7 @@ def test_steps_are_what_the_shortest_and_the_longest_pulse_do_to_a_pure_spin(
     channel = CALM.channels[0]
     channel = replace(channel, thrusters=tuple(replace(each, **given) for each in channel.thrusters))
     body = replace(CALM, channels=(channel,), limits=replace(CALM.limits, tick=tick))
-    (steps,) = survey.channel_steps(body)
+    (steps,) = capability.channel_steps(body)
     assert steps.smallest == pytest.approx(fired(body, shortest).nutation, rel=1e-9)
     assert steps.largest == pytest.approx(fired(body, min(longest, HALF)).nutation, rel=1e-9)
 
@@ -93,7 +93,7 @@ def test_a_channel_that_spins_up_does_most_by_a_shorter_pulse() -> None:
     By impulses: 5.42 s of T1 oppose all of ω, and no reason names a horizon that is far off.
     """
     body = read_spacecraft((CASES / "slow-89-deg.yaml").read_text(encoding="utf-8"), "slow-89-deg.yaml")
-    (steps,) = survey.channel_steps(replace(body, channels=body.channels[:1]))
+    (steps,) = capability.channel_steps(replace(body, channels=body.channels[:1]))
     assert steps.largest > math.radians(80.0)
     planned = one_pulse.schedule(body, SchemeOptions())
     assert planned.pulses[0].channel == "T1"
@@ -102,25 +102,25 @@ def test_a_channel_that_spins_up_does_most_by_a_shorter_pulse() -> None:
 
 
 def test_the_nearest_pair_is_the_least_off_the_turn_between_halves() -> None:
-    pair = survey.nearest_pair(EXAMPLE)
+    pair = capability.nearest_pair(EXAMPLE)
     assert pair is not None
     assert (pair.first.name, pair.second.name) == ("+M1", "-M2")
     assert abs(math.degrees(pair.miss)) == pytest.approx(0.086, abs=1e-3)  # 90° · (1 - cos 2.5°)
-    assert math.degrees(survey.mounting_angle(EXAMPLE)) == pytest.approx(90.0, abs=0.1)
+    assert math.degrees(capability.mounting_angle(EXAMPLE)) == pytest.approx(90.0, abs=0.1)
 
 
 @pytest.mark.parametrize("periods", [2.9, 3.1])
 def test_a_beat_over_three_horizons_is_a_resonance(periods: float) -> None:
     """The beat has the period 2π/|aω3 + r|."""
     rate = 2.0 * math.pi / (periods * EXAMPLE.horizon) - EXAMPLE.inertia.a * EXAMPLE.spin
-    (effect,) = survey.consequences(replace(EXAMPLE, disturbances=(Disturbance(1e-3 + 0j, rate=rate),)))
+    (effect,) = capability.consequences(replace(EXAMPLE, disturbances=(Disturbance(1e-3 + 0j, rate=rate),)))
     assert effect.beat_period == pytest.approx(periods * EXAMPLE.horizon, rel=1e-9)
     assert (effect.tilt is None) is bool(effect.resonant) is (periods > 3.0)
 
 
 def test_a_resonant_torque_drives_the_nutation_to_the_marks_when_reported() -> None:
     body = replace(EXAMPLE, disturbances=(Disturbance(0.4 + 0j, rate=-EXAMPLE.inertia.a * EXAMPLE.spin),))
-    (effect,) = survey.consequences(body)
+    (effect,) = capability.consequences(body)
     assert effect.tilt is None
     mark, time = effect.resonant[0]
     assert mark == pytest.approx(math.radians(10.0))
@@ -136,7 +136,7 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         (0.3j, 0.7, None),
     ):
         body = replace(CALM, disturbances=(Disturbance(torque, rate=rate),))
-        (effect,) = survey.consequences(body)
+        (effect,) = capability.consequences(body)
         assert effect.tilt is not None
         assert effect.beat is not None
         swollen = propagation.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
@@ -152,7 +152,7 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
 
 def test_sun_pulses_are_those_of_the_motion() -> None:
     """The first is a root of the Sun's azimuth in the body by the reference integrator; on average they are a turn."""
-    clock = survey.sun_clock(SUN_BODY)
+    clock = capability.sun_clock(SUN_BODY)
     assert clock is not None
     assert clock.first is not None
     start = reference.Motion(SUN_BODY.omega0, attitude.matrix(SUN_BODY.initial.quaternion))
@@ -162,16 +162,16 @@ def test_sun_pulses_are_those_of_the_motion() -> None:
     assert math.degrees(math.atan2(seen[1], seen[0])) == pytest.approx(35.0, abs=1e-5)
     times = block_model.sun_pulses(propagation.flown(SUN_BODY, Schedule(), 900.0), 900.0)
     assert (times[-1] - times[0]) / (len(times) - 1) == pytest.approx(clock.turn, rel=1e-3)
-    assert survey.sun_clock(EXAMPLE) is None
+    assert capability.sun_clock(EXAMPLE) is None
 
 
 def test_the_turn_by_one_pulse_is_what_a_flight_from_rest_does() -> None:
     body = replace(SUN_BODY, omega0=np.array([0.0, 0.0, -math.pi]))
-    (turn,) = survey.turns(body)
+    (turn,) = capability.turns(body)
     assert [turn.smallest_width, turn.largest_width] == pytest.approx([0.02, 0.9])
     for width, angle in ((turn.smallest_width, turn.smallest), (turn.largest_width, turn.largest)):
         assert angle == pytest.approx(fired(body, width).momentum_shift, rel=2e-2)
-    assert survey.turns(EXAMPLE) == ()
+    assert capability.turns(EXAMPLE) == ()
 
 
 def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Path) -> None:
@@ -180,17 +180,17 @@ def test_check_shows_disturbances_sun_cones_and_commands(run: Run, tmp_path: Pat
         " {name: tune, kind: rotating, torque: [1 mN m, 0, 0], rate: -1}]"
     )
     text = f"name: X\ninertia: {{A: 120, C: 80}}\nomega0: [0.1, 0, 3]\ndisturbances: {disturbances}\n"
-    shown = run("check", "-", "--json", "d.json", stdin=text).stdout
+    shown = run("check", "-", "-v", "--json", "d.json", stdin=text).stdout
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["disturbances"][0]["precession_rad_s"] > 0.0
     assert file["disturbances"][2]["reaches"][0]["nutation_deg"] == pytest.approx(10.0)
-    check_text("survey.disturbances", shown)
-    check_text("survey.sun", run("check", "-", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
+    check_text("capability.disturbances", shown)
+    check_text("capability.sun", run("check", "-", "-v", "--json", "d.json", stdin=SUNNY, columns=120).stdout)
     (file,) = json.loads((tmp_path / "d.json").read_text())["files"]
     assert file["sun_pulses"]["delay_step_deg"] == pytest.approx(0.36)
     assert [each["name"] for each in file["aspects"]] == ["pole", "Sun"]
     blind = SUNNY.replace("azimuth: 35 deg", "azimuth: 35 deg, elevation: -25 deg, half_width: 7 deg")
-    shown = " ".join(run("check", "-", stdin=blind).stdout.split())
+    shown = " ".join(run("check", "-", "-v", stdin=blind).stdout.split())
     seen = block_model.first_sun_pulse(read_spacecraft(blind, "blind.yaml"))
     first = block_model.first_sun_pulse(SUN_BODY)
     assert seen == pytest.approx(first + block_model.spin_turn(SUN_BODY), rel=0.02)  # it does not see the Sun at first
@@ -274,7 +274,7 @@ def test_the_plan_of_a_watched_axis_has_its_angles_and_one_that_fails_none() -> 
 def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, command: str) -> None:
     """The command that shows both models gives the angles of each, one a row."""
     options = ("--scheme", "two-pulse", "--target", "350deg,20deg", "--json", "end.json", "--quiet")
-    screen = run(command, "-", *options, *["-v"] * (command == "plan"), stdin=POINTED).stdout
+    screen = run(command, "-", *options, *["-v"] * (command != "verify"), stdin=POINTED).stdout
     written = json.loads((tmp_path / "end.json").read_text())
     written = written["plans"][0] if command == "plan" else written
     assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,13 +27,11 @@ from nutdamp.spacecraft.model import Disturbance, Spacecraft
 SHORTEST, GRID = 1e-6, 600
 """Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
 
-
 DIGITS = 9
 """Digits of misses in rad that are no rounding: among equals the pair that is named first."""
 
 
-@dataclass(frozen=True, slots=True)
-class ChannelSteps:
+class ChannelSteps(NamedTuple):
     """A channel and the nutation angles (rad) that its pulses take out or put in.
 
     ``smallest`` is that of the shortest on-time to be commanded, `constraints.shortest_on_time`, and is 0 without any;
@@ -45,8 +43,7 @@ class ChannelSteps:
     largest: float
 
 
-@dataclass(frozen=True, slots=True)
-class SunPhases:
+class SunPhases(NamedTuple):
     """The Sun pulses of the free motion: ``turn`` s from one to the next on average, the ``first`` s after t = 0.
 
     ``first`` is None where there is none, and ``refusal`` is then the reason.
@@ -68,8 +65,7 @@ def sun_clock(spacecraft: Spacecraft) -> SunPhases | None:
         return SunPhases(turn, None, str(reason))
 
 
-@dataclass(frozen=True, slots=True)
-class Turns:
+class Turns(NamedTuple):
     """Turn of H by one pulse of a command block at the spin of t = 0: least and most, rad, and their widths, s."""
 
     channel: Channel
@@ -94,8 +90,7 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
     return tuple(steps)
 
 
-@dataclass(frozen=True, slots=True)
-class PairFit:
+class PairFit(NamedTuple):
     """Two channels for Magnus' two pulses at once: ``miss`` (rad) is the error of direction of the second."""
 
     first: Channel
@@ -115,8 +110,7 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
     return tuple(steps)
 
 
-@dataclass(frozen=True, slots=True)
-class Acting:
+class Acting(NamedTuple):
     """Pulse of a command of ``on_time`` s: ``effective`` s of full thrust, its ``impulse`` N m s and ``centroid`` s.
 
     The centroid counts from the start of the command.
@@ -166,12 +160,8 @@ def mounting_angle(spacecraft: Spacecraft) -> float:
 
 def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
     """The two channels whose directions come nearest to the turn between two half pulses; None without channels."""
-    needed = cmath.rect(
-        1.0,
-        rigid_body.turn_between_halves(
-            spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.transverse_rate, spacecraft.spin
-        ),
-    )
+    inertia, rate, spin = spacecraft.inertia, spacecraft.transverse_rate, spacecraft.spin
+    needed = cmath.rect(1.0, rigid_body.turn_between_halves(inertia.A, inertia.C, rate, spin))
     usable = [channel for channel in spacecraft.channels if channel.damps]
     torques = np.array([channel.transverse for channel in usable])
     best: PairFit | None = None
@@ -183,8 +173,7 @@ def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
     return best
 
 
-@dataclass(frozen=True, slots=True)
-class Consequence:
+class Consequence(NamedTuple):
     """Effect of one disturbance in the long run.
 
     ``precession`` (rad/s) is the steady rate that it forces, K(14) fixed in the body, K(15) nearly fixed in space,
@@ -205,7 +194,6 @@ class Consequence:
 
 MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
 """Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
-
 
 RESONANT = 3.0
 """Beat period over horizon from which a disturbance counts as resonant."""
@@ -237,8 +225,7 @@ def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequenc
     return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
 
 
-@dataclass(frozen=True, slots=True)
-class SpinAxis:
+class SpinAxis(NamedTuple):
     """Principal axis 3 of inertia.
 
     ``kind`` of `body.axis_class`; ``exponent`` p² in 1/s² and ``growth_time`` s of `body.growth`; ``tilt``
@@ -255,12 +242,7 @@ class SpinAxis:
 
 def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
     """Class, stability and nutation rates of the spin axis."""
-    inertia = spacecraft.inertia
-    grows = rigid_body.growth(inertia.moments, spacecraft.spin)
-    return SpinAxis(
-        rigid_body.axis_class(inertia.moments),
-        grows.squared_exponent,
-        grows.growth_time,
-        rigid_body.principal_tilt(inertia.axes),
-        rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin),
-    )
+    inertia, spin = spacecraft.inertia, spacecraft.spin
+    kind, grows = rigid_body.axis_class(inertia.moments), rigid_body.growth(inertia.moments, spin)
+    rates = rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
+    return SpinAxis(kind, grows.squared_exponent, grows.growth_time, rigid_body.principal_tilt(inertia.axes), rates)

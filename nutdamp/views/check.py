@@ -1,0 +1,428 @@
+"""The check of a file: derived quantities, channels, valves, disturbances, tolerances; the pair for two pulses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, NamedTuple
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from nutdamp import __version__
+from nutdamp.common.numerics import finite
+from nutdamp.common.results import Data
+from nutdamp.control_loop.stability import margins
+from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
+from nutdamp.files.reader import Source
+from nutdamp.flight.end_state import at_start
+from nutdamp.montecarlo.inputs import DispersedInput, reachable
+from nutdamp.physics.thruster import Tank
+from nutdamp.planning import capability
+from nutdamp.planning.capability import Acting, Consequence
+from nutdamp.spacecraft.equipment import SunSensor
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.units import bar
+from nutdamp.views.dispersion import correlation_json
+from nutdamp.views.loop import described, margin_table, warnings
+from nutdamp.views.plan_json import aspects_json, spacecraft_json
+from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.summary import summary, warnings_of
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
+from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
+from nutdamp.views.tolerances import in_words, size_text
+
+
+def channel_table(spacecraft: Spacecraft) -> DataTable:
+    """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
+    columns = (
+        Column("name", "channel", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
+        Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
+               vector, "screen json", kind=TEXT),
+        Column("", "on-time", "", lambda row: (row.channel.min_on_time, row.channel.max_on_time), _range, "screen"),
+        Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
+        Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
+        Column("smallest_step_deg", "smallest step", "deg", lambda row: math.degrees(row.smallest),
+               lambda step: small_angle(step) if step else "any", "screen json"),
+        Column("largest_step_deg", "largest step", "deg", lambda row: math.degrees(row.largest), small_angle,
+               "screen json"),
+        Column("damps", "", "", lambda row: row.channel.damps, where="json", kind=YES_NO),
+    )  # fmt: skip
+    return DataTable("Channels", columns, capability.channel_steps(spacecraft))
+
+
+def _range(on_times: tuple[float, float]) -> str:
+    least, most = on_times
+    return f"{duration(least)} to {'any' if math.isinf(most) else duration(most)}"
+
+
+class ValveRow(NamedTuple):
+    """A pulse of a valve, and the channels that have it."""
+
+    channels: str
+    pulse: Acting
+
+
+VALVES = (
+    Column("", "channel", "", lambda row: row.channels, where="screen", kind=TEXT),
+    Column("on_time_s", "on-time commanded", "", lambda row: row.pulse.on_time, duration, "screen json"),
+    Column("effective_on_time_s", "effective on-time", "", lambda row: row.pulse.effective, duration, "screen json"),
+    Column("impulse_Nms", "impulse", "N m s", lambda row: row.pulse.impulse, lambda size: f"{size:.4g}",
+           "screen json"),
+    Column("centroid_s", "centroid after the start", "", lambda row: row.pulse.centroid, duration, "screen json"),
+)  # fmt: skip
+
+
+def valve_table(spacecraft: Spacecraft) -> DataTable:
+    """Pulses of the shortest and the longest command of each channel; channels that do alike share a row."""
+    alike: dict[tuple[float, ...], list[Acting]] = {}
+    for pulse in capability.acting(spacecraft):
+        figures = (float(f"{figure:.4g}") for figure in pulse[1:])
+        alike.setdefault(tuple(figures), []).append(pulse)
+    rows = [ValveRow(", ".join(pulse.channel.name for pulse in pulses), pulses[0]) for pulses in alike.values()]
+    return DataTable("Valves", VALVES, rows)
+
+
+TURNS = (
+    Column("name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
+    Column("smallest_turn_deg", "least turn of H", "deg", lambda row: math.degrees(row.smallest), small_angle,
+           "screen json"),
+    Column("smallest_turn_width_s", "by a pulse of", "", lambda row: row.smallest_width, duration, "screen json"),
+    Column("largest_turn_deg", "largest turn", "deg", lambda row: math.degrees(row.largest), small_angle,
+           "screen json"),
+    Column("largest_turn_width_s", "by a pulse of", "", lambda row: row.largest_width, duration, "screen json"),
+)  # fmt: skip
+
+
+def turn_table(spacecraft: Spacecraft) -> DataTable:
+    """Turn of H by one pulse of a command block of each channel."""
+    return DataTable("Command blocks", TURNS, capability.turns(spacecraft))
+
+
+TANK = (
+    Column("used_kg", "used", "kg", lambda row: row[1], lambda used: f"{used:.4g}", "screen json"),
+    Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]), bar, "screen json"),
+    Column("thrust_factor", "", "", lambda row: row[0].thrust_factor(row[1]), where="json"),
+    Column("", "thrust", "%", lambda row: 100.0 * row[0].thrust_factor(row[1]), lambda share: f"{share:.4g}",
+           "screen"),
+    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), lambda isp: f"{isp:.4g}", "screen json"),
+)  # fmt: skip
+
+
+def tank_table(tank: Tank) -> DataTable:
+    """Pressure, thrust and specific impulse of a tank full, half used and empty."""
+    return DataTable("Tank", TANK, [(tank, share * tank.propellant) for share in (0.0, 0.5, 1.0)])
+
+
+def cold_text(spacecraft: Spacecraft) -> str:
+    """Effect of cold nozzles on the thrust; empty without."""
+    if spacecraft.cold is None:
+        return ""
+    levels = ", ".join(f"{100.0 * spacecraft.cold.factor(before):.4g}" for before in range(3))
+    return f"cold nozzles: the first pulses of a channel have {levels} % … of the thrust"
+
+
+class DisturbanceRow(NamedTuple):
+    """A disturbance, counted from 1, and its consequence."""
+
+    number: int
+    result: Consequence
+
+    @property
+    def name(self) -> str:
+        """Name in the file, or its number there."""
+        return self.result.disturbance.name or f"number {self.number}"
+
+
+def _degree(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
+def _reached(row: DisturbanceRow) -> list[dict[str, float]]:
+    return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.result.resonant]
+
+
+DISTURBANCES = (
+    Column("", "disturbance", "", lambda row: row.name, where="screen", kind=TEXT),
+    Column("name", "", "", lambda row: row.result.disturbance.name or None, where="json", kind=TEXT),
+    Column("", "effect", "", lambda row: "; ".join(_effects(row.result)), where="screen", kind=TEXT),
+    Column("precession_rad_s", "", "", lambda row: row.result.precession, where="json"),
+    Column("forced_tilt_deg", "", "", lambda row: _degree(row.result.tilt), where="json"),
+    Column("beat_deg", "", "", lambda row: _degree(row.result.beat), where="json"),
+    Column("beat_period_s", "", "", lambda row: row.result.beat_period, where="json"),
+    Column("reaches", "", "", _reached, where="json"),
+    Column("spin_rate_rad_s2", "", "", lambda row: row.result.spin_rate, where="json"),
+)
+
+
+def disturbance_table(spacecraft: Spacecraft) -> DataTable:
+    """The forced tilt, the beat, or the times to reach a cone at resonance."""
+    rows = enumerate(capability.consequences(spacecraft), start=1)
+    return DataTable("Disturbances", DISTURBANCES, [DisturbanceRow(*row) for row in rows])
+
+
+def _effects(row: Consequence) -> Iterator[str]:
+    if row.resonant or row.tilt is None:
+        reached = ", ".join(f"{degrees(mark)} after {duration(time)}" for mark, time in row.resonant)
+        yield f"resonant with the nutation: drives it to {reached}"
+    elif row.disturbance.transverse != 0.0:
+        yield f"forces a tilt of {degrees(row.tilt)}, precession at {quantity(row.precession, 'rad/s')}"
+        yield f"from rest the nutation beats up to {degrees(row.beat)} every {duration(row.beat_period)}"
+    if row.spin_rate != 0.0:
+        yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
+
+
+class ToleranceRow(NamedTuple):
+    """Inputs of one tolerance of one size, and the thrusters that it is given for."""
+
+    entry: DispersedInput
+    thrusters: tuple[str, ...]
+
+
+TOLERANCES = (
+    Column("", "dispersion", "", lambda row: in_words(row.entry.tolerance), where="screen", kind=TEXT),
+    Column("", "distribution", "", lambda row: row.entry.kind, where="screen", kind=TEXT),
+    Column("", "one sigma or bias", "", lambda row: size_text(row.entry), where="screen"),
+    Column("", "thrusters", "", lambda row: ", ".join(row.thrusters), where="screen", kind=TEXT),
+)
+
+
+def tolerance_table(spacecraft: Spacecraft) -> DataTable:
+    """Differences allowed between true values and the file's; those of one size share a row."""
+    alike: dict[tuple[str, str, str], ToleranceRow] = {}
+    for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
+        key, given = (entry.tolerance, entry.kind, size_text(entry)), getattr(spacecraft.dispersions, entry.tolerance)
+        row = alike.setdefault(key, ToleranceRow(entry, ()))
+        rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
+        names = given if isinstance(given, Mapping) else ()
+        more = tuple(name for name in names if name in (rest, rest[:-2]) and name not in row.thrusters)
+        alike[key] = row._replace(thrusters=row.thrusters + more)
+    return DataTable("Dispersions", TOLERANCES, list(alike.values()))
+
+
+def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``check`` for one valid file."""
+    table, tolerances = channel_table(spacecraft), tolerance_table(spacecraft)
+    counted = f" (channels: {len(table.rows)}, tolerances: {len(tolerances.rows)})"
+    head = [Text.assemble((f"{spacecraft.name}   ", "bold"), ("VALID", "bold green"), counted)]
+    head += warnings_of(warnings(spacecraft))
+    known = (*_spin_axis(spacecraft), *sun_pulse_facts(spacecraft)) if verbose else ()
+    tables = [turn_table(spacecraft), valve_table(spacecraft), *map(tank_table, filter(None, [spacecraft.tank]))]
+    tables += [disturbance_table(spacecraft), _margins(spacecraft), tolerances]
+    return summary(
+        [*head, derived_table(spacecraft, known)],
+        partial(table.screen, "screen") if table.rows else None,
+        _remarks(spacecraft, verbose),
+        "nutdamp plan · nutdamp report",
+        more=[each.screen("screen") for each in tables if each.rows],
+        verbose=verbose,
+    )
+
+
+def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
+    """Notes on a valid file; ``verbose``: disturbances stand in a table."""
+    clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
+    if clock is not None and clock.refusal:
+        yield clock.refusal
+    alike: dict[str, list[str]] = {}
+    for name, reason in () if dispersions is None else reachable(spacecraft)[1]:
+        alike.setdefault(reason, []).append(in_words(name))
+    yield from (f"dispersions without effect: {', '.join(names)}: {reason}" for reason, names in alike.items())
+    idle = [channel.name for channel in spacecraft.channels if not channel.damps]
+    if idle:
+        yield f"never fired for damping, more axial than transverse: {', '.join(idle)}"
+    if not verbose:
+        yield from (f"disturbance {name} {effect}" for name, effect in disturbance_table(spacecraft).cells("screen"))
+    angle, pair = math.degrees(capability.mounting_angle(spacecraft)), capability.nearest_pair(spacecraft)
+    spacing = f"two pulses of fixed actuators: ideal spacing {angle:.2f} deg about axis 3, first to second"
+    if pair is None:
+        yield spacing
+    else:
+        miss = f"{abs(math.degrees(pair.miss)):.2f} deg off half a nutation turn"
+        yield f"{spacing}; nearest channels: {pair.first.name} then {pair.second.name}, {miss}"
+    yield cold_text(spacecraft)
+    if spacecraft.loop is not None:
+        yield described(spacecraft.loop)
+    pairs = () if dispersions is None else dispersions.correlation
+    yield "; ".join(f"correlated: {in_words(first)} and {in_words(second)} {size:g}" for first, second, size in pairs)
+
+
+def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    spin = capability.spin_axis(spacecraft)
+    stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
+    unstable = " (not under dissipation)" if spin.kind == "minimum" else ""
+    yield "spin axis", f"{spin.kind} moment of inertia; {stable}{unstable}"
+    body, despun, inertial = spin.rates
+    yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"
+    if not spacecraft.inertia.aligned:
+        yield "wobble", f"principal axis 3 is {degrees(spin.tilt)} off the third axis of the file"
+        for number, axis in enumerate(spacecraft.inertia.axes.T, start=1):
+            yield f"principal axis {number}", f"{vector(axis)} in the axes of the file"
+
+
+def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
+    """Times of the Sun pulses, and resolution of the timing of blocks by them."""
+    clock, sensor, commands = capability.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
+    if clock is None or sensor is None:
+        return
+    yield "Sun sensor", f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {_view(sensor)}"
+    first = clock.refusal if clock.first is None else f"the first at {moment(clock.first)}"
+    yield "Sun pulses", f"one every {duration(clock.turn)} on average; {first}"
+    if commands is not None:
+        spin = abs(spacecraft.spin)
+        step, longest = (
+            f"{duration(time)} = {degrees(spin * time)}" for time in (commands.delay_step, commands.delay_max)
+        )
+        yield "delay", f"in steps of {step} of spin, up to {longest}"
+        widths, step_of_widths = [duration(width) for width in commands.widths.tolist()], commands.width_step
+        steps = (
+            None if step_of_widths is None else f"in steps of {duration(step_of_widths)}, {widths[0]} to {widths[-1]}"
+        )
+        yield "width", steps or listed(widths, "or")
+        every = listed([str(count) for count in commands.every], "or")
+        yield "block", f"at most {commands.max_count} pulses; every: {every} of the spins"
+
+
+def _view(sensor: SunSensor) -> str:
+    """Range of angles from the spin axis in which the sensor sees the Sun."""
+    low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
+    return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
+
+
+def _margins(spacecraft: Spacecraft) -> DataTable:
+    """Margins of the channels of a loop before they feed the nutation; no rows for a file without one."""
+    return margin_table(() if spacecraft.loop is None else margins(spacecraft, spacecraft.loop))
+
+
+def check_json(reports: list[dict[str, Any]]) -> dict[str, Any]:
+    """Result of ``check --json``: all files."""
+    return {"nutdamp": __version__, "files": reports}
+
+
+def failed_json(name: str | None, wrong: FaultyFile | CannotRead, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+    """A file that could not be read or is faulty; ``doubts`` are warnings."""
+    faults = [Fault(wrong.path, 0, 0, "", wrong.reason)] if isinstance(wrong, CannotRead) else wrong.faults
+    report = {"file": name, "valid": False, "faults": _faults_json(faults), "warnings": _faults_json(doubts)}
+    return {**report, "spacecraft": None, "channels": [], "two_pulse": None}
+
+
+def _faults_json(faults: Iterable[Fault]) -> list[dict[str, Any]]:
+    """Faults, each with its ``place`` as messages have it; line and column are null where it is no place in a file."""
+    return [
+        {
+            "place": fault.place,
+            "line": fault.line or None,
+            "column": fault.column or None,
+            "where": fault.where,
+            "problem": fault.problem,
+        }
+        for fault in faults
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedFile(Data):
+    """A valid ``spacecraft`` file, with ``doubts`` on numbers that are hardly meant."""
+
+    spacecraft: Spacecraft
+    doubts: tuple[Fault, ...]
+    data: Mapping[str, Any] = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of the file in ``check --json``."""
+        return finite(dict(self.data))
+
+
+def checked(
+    source: Source, name: str | None, doubts: list[Fault], warn: Callable[[Fault], object] = lambda _: None
+) -> CheckedFile:
+    """Check of a source called ``name``; ``doubts`` are added to the list, and ``warn`` is called with each.
+
+    Derived quantities may be faulty, too. Raises FaultyFile.
+    """
+    body = source.read(doubts.append)
+    for doubt in doubts:
+        warn(doubt)
+    try:
+        return CheckedFile(body, tuple(doubts), checked_json(name, body, doubts))
+    except NutdampError as wrong:
+        raise FaultyFile([Fault(name or source.name, 1, 1, "", str(wrong))]) from wrong
+
+
+def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Fault] = ()) -> dict[str, Any]:
+    """A valid file: derived quantities, channels with their steps, the mounting angle for two pulses."""
+    pair = capability.nearest_pair(spacecraft)
+    return {
+        "file": name,
+        "valid": True,
+        "faults": [],
+        "warnings": _faults_json(doubts),
+        "spacecraft": spacecraft_json(spacecraft),
+        "channels": _channels_json(spacecraft),
+        **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
+        "spin_axis": _spin_axis_json(spacecraft),
+        **aspects_json(at_start(spacecraft)),
+        "sun_pulses": _sun_pulses_json(spacecraft),
+        "disturbances": disturbance_table(spacecraft).json(),
+        **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),
+        "dispersions": _dispersions_json(spacecraft),
+        "two_pulse": {
+            "mounting_angle_deg": math.degrees(capability.mounting_angle(spacecraft)),
+            "nearest": None if pair is None else [pair.first.name, pair.second.name],
+            "nearest_off_deg": None if pair is None else abs(math.degrees(pair.miss)),
+        },
+    }
+
+
+def _channels_json(spacecraft: Spacecraft) -> list[dict[str, Any]]:
+    """Channels; one with a valve has the pulses of its shortest and its longest command."""
+    rows, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
+    for row, channel in zip(rows, spacecraft.channels, strict=True):
+        if channel.valve is not None:
+            own = [ValveRow(channel.name, pulse) for pulse in pulses if pulse.channel is channel]
+            row["commands"] = DataTable("", VALVES, own).json()
+    return rows
+
+
+def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    axis = capability.spin_axis(spacecraft)
+    return {
+        "class": axis.kind,
+        "squared_exponent_1_s2": axis.exponent,
+        "growth_time_s": axis.growth_time,
+        "tilt_deg": math.degrees(axis.tilt),
+        "nutation_rate_body_rad_s": axis.rates.body,
+        "nutation_rate_despun_rad_s": axis.rates.despun,
+        "nutation_rate_inertial_rad_s": axis.rates.inertial,
+        "dissipation_growth_1_s": spacecraft.growth,
+    }
+
+
+def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
+    """Times of the Sun pulses, and capability of command blocks; None without Sun or sensor in the file."""
+    clock, commands = capability.sun_clock(spacecraft), spacecraft.commands
+    if clock is None:
+        return None
+    spin = math.degrees(abs(spacecraft.spin))
+    return {
+        "period_s": clock.turn,
+        "first_s": clock.first,
+        "why": clock.refusal or None,
+        "delay_step_deg": None if commands is None else spin * commands.delay_step,
+        "delay_max_deg": None if commands is None else spin * commands.delay_max,
+        "channels": turn_table(spacecraft).json(),
+    }
+
+
+def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
+    """Inputs that a study could draw, sizes in SI or as factors, and those without effect on any actuator."""
+    if spacecraft.dispersions is None:
+        return None
+    inputs, unused = reachable(spacecraft)
+    return {
+        "inputs": [entry._asdict() for entry in inputs],
+        "unused": {entry.name: entry.reason for entry in unused},
+        **correlation_json(spacecraft),
+    }

@@ -1,0 +1,277 @@
+"""The fit to telemetry: estimates and their accuracy, signals and their residuals, forecast with more telemetry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.forecast import Outlook, Prospect
+from nutdamp.estimation.parameters import untold
+from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
+from nutdamp.files.editing import notes
+from nutdamp.views.plan_json import heading
+from nutdamp.views.summary import opening, summary
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.text import degrees, mass
+from nutdamp.views.verdicts import exact_percent, percent
+
+FAR = 4.0
+"""Sigmas of the file from which on a change is remarked upon."""
+
+NOTHING = 1e-3
+"""Sigmas below which a value, or a change, is zero."""
+
+MOST_PAIRS = 6
+"""Largest number of correlations named."""
+
+
+def in_shown(signal: str) -> tuple[str, float]:
+    """Unit in which a signal is shown, and its factor from SI."""
+    if signal == "acceleration":
+        return "m/s²", 1.0
+    return ("ms", 1e3) if signal == "sun_pulse" else ("deg" if signal == "axis" else "deg/s", 180.0 / math.pi)
+
+
+def _scaled(name: str, row: Estimate) -> float | None:
+    """A field of an estimate in its unit; None where it is not known, or infinite."""
+    value = getattr(row, name)
+    return None if value is None or math.isinf(value) else value * row.factor
+
+
+def _value(row: Estimate) -> str:
+    """The value to the digits that its sigma leaves, 0 where it is within rounding of it."""
+    shown = row.value if math.isinf(row.sigma) or abs(row.value) > NOTHING * row.sigma else 0.0
+    return f"{shown * row.factor:.{_digits(row)}g}"
+
+
+def _file(row: Estimate) -> str | None:
+    return None if row.file is None else f"{row.file * row.factor:.{max(_digits(row) - 2, 4)}g}"
+
+
+def _changed(change: float) -> str:
+    """A change in sigmas, to two digits or to whole ones."""
+    return "0" if abs(change) <= NOTHING else f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
+
+
+def _digits(estimate: Estimate) -> int:
+    """Significant digits of a value that its sigma leaves, and one more."""
+    if estimate.value == 0.0 or estimate.sigma <= 0.0 or math.isinf(estimate.sigma):
+        return 4
+    return min(max(2 + math.ceil(math.log10(max(abs(estimate.value) / estimate.sigma, 1.0))), 2), 9)
+
+
+ESTIMATES = (
+    Column("quantity", "", "", lambda row: row.key, where="json", kind=TEXT),
+    Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
+    Column("value", "", "", lambda row: row.value * row.factor, where="json"),
+    Column("", "value", "", _value, where="screen"),
+    Column("", "sigma", "", lambda row: _scaled("sigma", row), lambda sigma: f"{sigma:.2g}", "screen"),
+    Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
+    Column("unit", "unit", "", lambda row: row.unit, where="screen json", kind=TEXT),
+    Column("file", "", "", lambda row: _scaled("file", row), where="json"),
+    Column("", "file", "", _file, where="screen"),
+    Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
+    Column("change_sigmas", "change", "sigmas", lambda row: row.change, _changed, "screen json"),
+    Column("from", "from", "", lambda row: row.source, where="screen json", kind=TEXT),
+)
+
+
+def estimate_table(rows: Sequence[Estimate]) -> DataTable:
+    """The estimates."""
+    return DataTable("Estimates", ESTIMATES, rows)
+
+
+class SignalRow(NamedTuple):
+    """A signal of a record, counted from 0."""
+
+    fit: Fit
+    at: int
+    name: str
+
+    @property
+    def outliers(self) -> int:
+        """Samples left out."""
+        return int(((self.fit.model.signal == self.at) & ~self.fit.used).sum())
+
+    @property
+    def verdict(self) -> str:
+        """Result of the residual test."""
+        if not self.fit.resolved[self.at]:
+            return "limited by resolution"
+        return "white" if self.fit.white(self.at) else "NOT white, sigmas too small"
+
+
+SIGNALS = (
+    Column("signal", "signal", "", lambda row: row.name, where="screen json", kind=TEXT),
+    Column("samples", "samples", "", lambda row: int((row.fit.model.signal == row.at).sum()), where="screen json",
+           kind=WHOLE),
+    Column("outliers", "outliers", "", lambda row: row.outliers, where="screen json", kind=WHOLE),
+    Column("noise_SI", "", "", lambda row: float(row.fit.noise[row.at]), where="json"),
+    Column("", "noise", "", lambda row: float(row.fit.noise[row.at]) * in_shown(row.name)[1],
+           lambda noise: f"{noise:.3g}", "screen"),
+    Column("", "unit", "", lambda row: in_shown(row.name)[0], where="screen", kind=TEXT),
+    Column("white", "", "", lambda row: row.fit.white(row.at), where="json", kind=YES_NO),
+    Column("", "residuals", "", lambda row: row.verdict, where="screen", kind=TEXT),
+)  # fmt: skip
+
+
+def signal_table(fit: Fit) -> DataTable:
+    """The signals of the record, with the test of their residuals."""
+    return DataTable("Signals", SIGNALS, [SignalRow(fit, at, name) for at, name in enumerate(fit.model.signals)])
+
+
+def _probe(row: Prospect) -> str | None:
+    return f"{row.probe}, {row.on_time:.3g} s" if row.probe else None
+
+
+def prospect_table(ahead: Outlook) -> DataTable:
+    """A row for each coast and probe pulse of the forecast."""
+    level = exact_percent(ahead.probability)
+    columns = (
+        Column("coast_s", "", "", lambda row: row.length, where="json"),
+        Column("", "coast", "s", lambda row: f"{row.length:.4g}" + " (now)" * (row is ahead.now), where="screen",
+               kind=TEXT),
+        Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
+        Column("", "probe pulse", "", _probe, where="screen"),
+        Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
+        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, lambda ratio: f"{ratio:.2g}",
+               "screen json"),
+        Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
+        Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
+               lambda thrust: f"{thrust:.2g}", "screen"),
+        Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
+               lambda angle: f"{angle:.3g}", "screen json"),
+        Column("met_fraction", "", "", lambda row: row.met, where="json"),
+        Column("", "comply", "%", lambda row: None if row.met is None else 100.0 * row.met,
+               lambda share: f"{share:.4g}", "screen"),
+        Column("propellant_kg", "", "", lambda row: row.propellant, where="json"),
+    )  # fmt: skip
+    return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
+
+
+def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``fit``; the motion is that at ``time`` s, ``ahead`` the forecast with more telemetry."""
+    rows, signals = estimates(fit, time), signal_table(fit)
+    colored = [row.name for row in signals.rows if fit.resolved[row.at] and not fit.white(row.at)]
+    test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
+    outliers = sum(row.outliers for row in signals.rows)
+    test += f"; outliers left out: {outliers}" if outliers else ""
+    headline = Text.assemble("FIT ", (", ".join(fit.model.signals), "bold"), f", {_record(fit)}")
+    head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
+    table = estimate_table(rows)
+    return summary(
+        [*head, Text(f"motion at t = {time:g} s")],
+        lambda first=None: table.screen("screen", first=first and max(first, 3)),
+        [*(advice(ahead) if ahead is not None else ()), *told(fit, rows)],
+        "-o now.yaml · --plot fit.png" + " · --next" * (ahead is None),
+        more=[signals.screen("screen"), *[prospect_table(each).screen("screen") for each in (ahead,) if each]],
+        verbose=verbose,
+    )
+
+
+def _record(fit: Fit) -> str:
+    """Length of the record, and the pulses fired in it."""
+    record, values = fit.model.record, fit.named
+    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", fit.model.spacecraft.spin))  # in the body, small angles
+    turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
+    fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
+    return f"{record.start:g} s to {record.end:g} s{turns}{fired}"
+
+
+def advice(ahead: Outlook) -> Iterator[str]:
+    """Clauses on the value of more telemetry."""
+    now, longer, probe = ahead.now, ahead.longer, ahead.probe
+    level = exact_percent(ahead.probability)
+    today = f"the {ahead.scheme} plan from this estimate leaves at most {degrees(now.nutation)} in {level} of cases"
+    if ahead.enough:
+        met = percent(now.met or 0.0, ahead.probability)
+        yield f"{today}; {met} of cases comply ({level} required): neither a longer coast nor a probe pulse is needed"
+        return
+    if longer is None:
+        last = ahead.coasts[-1]
+        yield f"{today}; a coast of {last.length:.4g} s would leave {degrees(last.nutation)}: it does not pay"
+    else:
+        yield f"{today}; a coast of {longer.length:.4g} s would leave {degrees(longer.nutation)}: it pays"
+    if probe is not None:
+        pulse = f"one probe pulse of {probe.probe}, {probe.on_time:.3g} s, amid a coast of {probe.length:.4g} s"
+        yield f"{pulse} would leave {degrees(probe.nutation)}: it pays; fit it with --schedule"
+        if probe.propellant is not None and ahead.propellant is not None:
+            spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
+            yield f"the probe pulse takes {spent}"
+    elif ahead.probes:
+        yield "no single probe pulse of a channel of the plan pays"
+
+
+def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[str]:
+    """Clauses on parameters that the data do not determine, or only together, and on unexpected estimates."""
+    yield from doubts(fit)
+    yield from untold(fit.model.record)
+    kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
+    if kept:
+        yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
+    tied = [f"{first} and {second} {value:+.4f}" for first, second, value in _moments(fit)]
+    tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
+    if tied:
+        yield f"correlated: {', '.join(tied)}"
+    changes = [(row.label, row.change) for row in rows if row.change is not None]
+    far = [f"{label} ({_changed(change)})" for label, change in changes if abs(change) > FAR]
+    if far:
+        yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
+    if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
+        yield "I1 and I2 differ: the file has one A for both"
+
+
+def _moments(fit: Fit) -> Iterator[tuple[str, str, float]]:
+    """The correlation of A and C, where both are estimated."""
+    known = carried(fit, fit.model.start)
+    if known.sigmas[0] > 0.0:
+        yield "A", "C", float(known.correlation[0, 1])
+
+
+def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()) -> dict[str, Any]:
+    """Estimates with sigmas, values of the file, signals, covariance of the inputs of dispersions; prospects.
+
+    ``warnings`` of reading the record go into the notes, before the doubts about the estimates.
+    """
+    model = fit.model
+    return {
+        **heading(model.spacecraft),
+        "record": {
+            "start_s": model.record.start,
+            "end_s": model.record.end,
+            "pulses": len(model.record.fired),
+            "signals": signal_table(fit).json(),
+        },
+        "time_s": at_time.time,
+        "estimates": estimate_table(estimates(fit, at_time.time)).json(),
+        "kept": list(fit.kept),
+        "information": fit.information.tolist(),
+        "parameters": [parameter.name for parameter in model.parameters],
+        "values_SI": fit.values.tolist(),
+        "covariance_SI": fit.region.tolist(),
+        "dispersed": {
+            "inputs": list(at_time.names),
+            "values_SI": at_time.values.tolist(),
+            "sigmas_SI": at_time.sigmas.tolist(),
+            "correlation": at_time.correlation.tolist(),
+        },
+        "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, at_time)],
+        "next": None if ahead is None else _outlook(ahead),
+    }
+
+
+def _outlook(ahead: Outlook) -> dict[str, Any]:
+    longer, probe = ahead.longer, ahead.probe
+    return {
+        "scheme": ahead.scheme,
+        "propellant_kg": ahead.propellant,
+        "probability": ahead.probability,
+        "longer_coast_s": None if longer is None else longer.length,
+        "probe": None if probe is None else probe.probe,
+        "prospects": prospect_table(ahead).json(),
+    }

@@ -1,0 +1,290 @@
+"""The closed loop flown: firings, margins before they feed the nutation, dead band; and the same flown by DOP853."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from nutdamp.control_loop.controller import Fired
+from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
+from nutdamp.control_loop.law import Ending
+from nutdamp.control_loop.simulation import LoopRun
+from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
+from nutdamp.planning.decision import Decision
+from nutdamp.planning.notes import decision_notes
+from nutdamp.spacecraft.equipment import GYRO, Loop
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views.decisions import cost, statement
+from nutdamp.views.end_tables import end_table
+from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
+from nutdamp.views.pulses import pulse_table, seconds
+from nutdamp.views.summary import Remark, margin_lines, opening, summary, warnings_of
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.text import degrees, duration, moment, most, small_angle
+
+SHOWN = 40
+"""Largest number of firings in a table of a screen."""
+
+ROUNDING = 1e-12
+"""Share of the nutation that a firing leaves by rounding alone."""
+
+
+class FiringRow(NamedTuple):
+    """A firing, counted from 0, with the nutation before and after it, rad, and its differences by DOP853.
+
+    ``apart``: start and on-time, s, and nutation before the firing, rad.
+    """
+
+    at: int
+    firing: Fired
+    before: float
+    after: float = math.nan
+    apart: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+
+
+def _apart(value: float) -> str:
+    return f"{value:.1e}"
+
+
+FIRINGS = (
+    Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
+    Column("channel", "channel", "", lambda row: row.firing.pulse.channel, where="verified verified_json", kind=TEXT),
+    Column("", "start", "s", lambda row: row.firing.pulse.start, seconds, "screen"),
+    Column("start_s", "start", "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
+    Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
+    Column("", "on-time", "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
+    Column("on_time_s", "on-time", "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
+    Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
+    Column("", "channel", "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
+    Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
+    Column("seen_deg", "nutation seen", "deg", lambda row: math.degrees(row.firing.seen), small_angle, "screen json"),
+    Column("", "before", "deg", lambda row: math.degrees(row.before), small_angle, "screen"),
+    Column("", "after", "deg", lambda row: math.degrees(row.after), small_angle, "screen"),
+    Column("", "nutation", "deg", lambda row: math.degrees(row.firing.true_nutation), small_angle, "verified"),
+    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
+           "verified verified_json"),
+)  # fmt: skip
+
+
+def firing_table(run: LoopRun) -> DataTable:
+    """The firings of a run."""
+    before, after = run.flight.around_pulses()
+    angles = zip(run.fired, before.nutation.tolist(), after.nutation.tolist(), strict=True)
+    return DataTable("Firings", FIRINGS, [FiringRow(index, *row) for index, row in enumerate(angles)])
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+MARGINS = (
+    Column("channel", "channel", "", lambda row: row.channel, where="screen json", kind=TEXT),
+    Column("late_deg", "late", "deg", lambda row: math.degrees(row.late), lambda late: f"{late:.4g}", "screen json"),
+    Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
+    Column("gain", "", "", lambda row: row.gain, where="json"),
+    Column("", "remaining", "%", lambda row: 0.0 if row.gain < ROUNDING else 100.0 * row.gain,
+           lambda left: f"{left:.4g}", "screen"),
+    Column("growth", "", "", lambda row: row.growth, where="json"),
+    Column("", "growth in a period", "%", lambda row: 100.0 * (row.growth - 1.0), lambda growth: f"{growth:.3g}",
+           "screen"),
+    Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
+           "screen"),
+    Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
+    Column("damps", "", "", lambda row: row.damps, where="json", kind=YES_NO),
+    Column("reversed", "", "", lambda row: row.cause.turned, where="json", kind=YES_NO),
+)  # fmt: skip
+
+
+def margin_table(rows: tuple[Margin, ...]) -> DataTable:
+    """Margin of each channel before it feeds the nutation, at the start threshold."""
+    return DataTable("Margins", MARGINS, rows)
+
+
+def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
+    """The screen of ``loop``."""
+    run, decision = plan.flown_run, Decision(plan)
+    (_, spent), (_, end) = cost(decision)
+    fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
+    headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
+    head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan, decision)]
+    head += [*warnings_of(warnings(plan.spacecraft)), *margin_lines(decision, "this case" if run.case else "nominal")]
+    return summary(
+        head,
+        partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
+        _remarks(plan, decision),
+        "--plot loop.png · nutdamp disperse --loop",
+        more=[margin_table(plan.margins).screen("screen"), end_table(plan.flight, plan.aspects)],
+        verbose=verbose,
+    )
+
+
+def _remarks(plan: LoopPlan, decision: Decision) -> Iterator[Remark]:
+    """Notes on the run: idealisations, dead band, margin, law and sensor."""
+    run = plan.flown_run
+    yield from decision_notes(decision, looped=True)
+    band = f"dead band at most {degrees(plan.band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet"
+    largest, when = plan.largest
+    since = f"; largest nutation since first quiet {degrees(largest)} at {moment(when)}"
+    yield band if run.settled is None else band + since
+    least = min(plan.margins, key=lambda margin: margin.delay, default=None)
+    if least is not None and least.delay >= 0.0:
+        yield f"least delay margin before a firing feeds the nutation: {duration(least.delay)}, of {least.channel}"
+    yield described(run.loop)
+    case = "" if run.case is None else f", dispersed case {run.case}"
+    yield f"flown 0 to {moment(run.until)}, noise of seed {run.seed}{case}"
+
+
+def _verdict(plan: LoopPlan, decision: Decision) -> Iterator[Text]:
+    """The verdict on a run, or the reason for its stop."""
+    run = plan.flown_run
+    if run.stop.fault:
+        yield Text.assemble(("Stopped: ", "bold red"), f"{stopped(run)}.")
+    elif run.case is not None:
+        met = {None: "", True: " meets the requirement", False: " does NOT meet the requirement"}
+        yield Text(f"Dispersed case {run.case} of seed {run.seed}{met[plan.meets_requirement]}.")
+    elif run.lost and decision.nominal and not decision.strays:
+        full = run.stop is Ending.FULL
+        why = "limits.max_pulses is reached" if full else "the loop is never down to its stop threshold"
+        yield Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), ".")
+    else:
+        yield statement(decision)
+
+
+def described(loop: Loop, *, thresholds: bool = True) -> str:
+    """The loop in a line: law, sensor, thresholds."""
+    sensor = loop.sensor
+    kind = "gyros" if sensor.kind == GYRO else "an accelerometer"
+    rate = "a continuous signal" if sensor.rate is None else f"{sensor.rate:g} Hz"
+    timing = "firings centred on their moments" if loop.predict else "firings begun as the sensor shows their moment"
+    band = f"; fires from {most(loop.start)} down to {most(loop.stop)}" if thresholds else ""
+    return f"Loop: {loop.law}, from {kind} ({rate}){band}; {timing}"
+
+
+def stopped(run: LoopRun) -> str:
+    """The reason why the loop was stopped; empty where it was flown to its end."""
+    if not run.stop.fault:
+        return ""
+    after = f"at {moment(run.fired[-1].pulse.end)}, firings: {len(run.fired)}: " if run.fired else ""
+    name, fired = run.channel, " and ".join(dict.fromkeys(firing.pulse.channel for firing in run.fired))
+    reasons = {
+        Ending.EMPTY: "the tank is empty, and nothing fires any more",
+        Ending.SENSOR: f"the sensor is reversed, or else {fired} are all wired backwards: each firing changed what the "
+        "sensor shows against what it should",
+        Ending.CHANNEL: f"channel {name} is wired backwards: it fed the nutation, and another channel damps it",
+        Ending.UNCLEAR: f"channel {name} is wired backwards, or the sensor is reversed: no other channel fired to tell",
+        Ending.IDLE: f"channel {name} does nothing, or much less than its torque should",
+        Ending.FED: "the firings feed the nutation: sensor or channels are reversed, or they come at the wrong time; "
+        "bias, noise or delay hide which",
+        Ending.FEEDS: f"a firing of {name} fed the nutation: it came at the wrong time",
+    }
+    return after + reasons[run.stop]
+
+
+def warnings(spacecraft: Spacecraft) -> Iterator[str]:
+    """Parts of the loop in the file that will feed the nutation, or waste propellant: before it is flown."""
+    loop = spacecraft.loop
+    if loop is None:
+        return
+    per_channel = margins(spacecraft, loop)
+    turned = [margin.channel for margin in per_channel if margin.cause.turned]
+    if turned and len(turned) == len(per_channel) and loop.sensor.scale < 0.0:
+        scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
+        yield f"{scale} is a reversed sensor: every firing feeds the nutation"
+    elif turned:
+        yield f"loop: firings feed the nutation, wired backwards against the sensor: {' and '.join(turned)}"
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        yield too_late(late)
+    band = dead_band(spacecraft, loop)
+    if band.step > loop.start * (1.0 + 1e-9):
+        yield (
+            f"loop.start is below {degrees(band.step)}, which the smallest pulse takes away: such a firing leaves "
+            "up to as much as before; a start above it needs less propellant"
+        )
+    if 0.5 * band.step > loop.stop > 0.0:
+        yield (
+            f"half of {degrees(band.step)}, which the smallest pulse takes away, is above loop.stop: a firing may "
+            "leave more than stop that no pulse lowers, and the loop then never pauses"
+        )
+    if band.noise > loop.start:
+        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.start: they set off firings"
+    elif band.noise > loop.stop > 0.0:
+        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.stop"
+
+
+def _settled(run: LoopRun) -> str:
+    """The time when the loop was first quiet."""
+    if run.settled is not None:
+        return f"at {moment(run.settled)}"
+    if not run.fired and not run.lost:
+        return "always: it never shows the start threshold"
+    return "never: the loop is not down to the stop threshold" if run.loop.stop > 0.0 else "never: loop.stop is 0"
+
+
+def verification_screen(verification: LoopVerification) -> RenderableType:
+    """The loop beside the same by DOP853."""
+    run, other = verification.run, verification.other
+    parts = [*opening(run.spacecraft, verbose=True), Text(described(run.loop), style="bold"), Text()]
+    if other is None:
+        return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {verification.missing}."))
+    result = f"DOP853 on the full tensor, {verification.evaluations:,} evaluations, fires "
+    if verification.agree:
+        result += f"alike: {len(run.fired)} firings, times within {verification.worst:.1g} s ({AGREE:g} s allowed)."
+    elif verification.same:
+        result += f"DIFFERENTLY: times differ by up to {verification.worst:.2g} s ({AGREE:g} s allowed)."
+    else:
+        result += f"DIFFERENTLY: {len(other.fired)} firings instead of {len(run.fired)}, or other channels."
+    return Group(*parts, _differences(verification).screen("verified", first=SHOWN - 1), Text(), Text(result))
+
+
+def _differences(verification: LoopVerification) -> DataTable:
+    pairs = enumerate(zip(verification.run.fired, verification.pairs, strict=False))
+    rows = [FiringRow(index, firing, firing.true_nutation, apart=apart) for index, (firing, apart) in pairs]
+    return DataTable("Differences by DOP853", FIRINGS, rows)
+
+
+def loop_json(plan: LoopPlan) -> dict[str, Any]:
+    """Firings with the nutation seen, final motion, dead band, and margin of each channel before it feeds."""
+    run, body = plan.flown_run, plan.spacecraft
+    pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
+    return {
+        **heading(body),
+        "law": run.loop.law,
+        "seed": run.seed,
+        "case": run.case,
+        "until_s": run.until,
+        "stopped": run.stop.name.lower(),
+        "channel": run.channel,
+        "meets_requirement": False if run.stop.fault else plan.meets_requirement,
+        "requirement": requirement_json(plan),
+        "quiet_s": list(run.quiet),
+        "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
+        "dead_band_deg": math.degrees(plan.band.most),
+        "pulses": [pulse | firing for pulse, firing in pulses],
+        "total_impulse_Nms": plan.total_impulse,
+        "propellant_kg": plan.propellant,
+        "end_s": plan.end,
+        "flown": residual_json(plan.flight.residual),
+        "final": final_json(plan.flight),
+        "target": target_json(body),
+        "margins": margin_table(plan.margins).json(),
+    }
+
+
+def verified_json(verification: LoopVerification) -> dict[str, Any]:
+    """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
+    run = verification.run
+    return {
+        **heading(run.spacecraft),
+        "scheme": "loop",
+        "agree": None if verification.missing else verification.agree,
+        "missing": verification.missing or None,
+        "evaluations": verification.evaluations,
+        "until_s": run.until,
+        "firings": _differences(verification).json("verified_json"),
+    }
