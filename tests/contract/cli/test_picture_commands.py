@@ -283,9 +283,9 @@ def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: 
         deep("--disperse", "20,000 cases, seed 1"),
         weekly("--disperse -o report.html", "20,000 cases, seed 1"),
         weekly("--disperse spacecraft.yaml", "20,000 cases, seed 1"),
-        weekly("--trade 2", "first-order least"),
-        weekly("--trade spacecraft.yaml", "first-order least"),
-        weekly("spacecraft.yaml --trade", "first-order least"),
+        weekly("--trade 2", "small-angle bound"),
+        weekly("--trade spacecraft.yaml", "small-angle bound"),
+        weekly("spacecraft.yaml --trade", "small-angle bound"),
     ],
 )
 def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path, options: str, text: str) -> None:

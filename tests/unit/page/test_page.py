@@ -289,7 +289,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     distribution = results.distribution("nutation")
     assert distribution is not None
     assert float(first["90 %"]) == pytest.approx(math.degrees(distribution.quantiles(np.array([0.9]))[0]), rel=2e-3)
-    assert float(first["all"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
+    assert float(first["max"]) == pytest.approx(math.degrees(distribution.maximum), rel=1e-3)
     assert bool(part.all("svg")) == good  # of the good one pictures are made
     budget = part.all("details")[0]
     assert "A" in {row[0].text for row in cells(budget.all("table")[0])}
