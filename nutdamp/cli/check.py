@@ -79,12 +79,13 @@ def command(
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
+@verbose_option
 @quiet_option
-def verify_command(job: Job, looped: bool) -> None:
+def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
-    Shows the largest differences, what is conserved, and what each imperfection alone costs. Motions too long for
-    DOP853 and Basilisk are not confirmed: exit status 3.
+    Shows the largest differences and what is conserved, with -v what each imperfection alone leaves. Motions too long
+    for DOP853 and Basilisk are not confirmed: exit status 3.
     """
     if looped and any(job.flown):
         raise click.UsageError("name what to verify: one of --scheme, --schedule, --blocks and --loop")
@@ -94,12 +95,13 @@ def verify_command(job: Job, looped: bool) -> None:
         return
 
     from nutdamp.api import verify
+    from nutdamp.views.verification import verification_brief
 
     plan = plan_or_read(job)
     with job.working("verifying"):
         verified = verify(plan)
     core = verified.core
-    job.deliver(verified)
+    job.deliver(verified, *([] if verbose else [lambda: verification_brief(plan, core)]))
     if core.disagreeing:
         others = " and ".join(core.disagreeing)
         say(f"nutdamp: the flown motion and {others} do not agree; please report this")

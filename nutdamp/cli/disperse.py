@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.flown import flown_options, plan_or_read
-from nutdamp.cli.job import Job, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Job, plot_options, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave, stoppable
 from nutdamp.cli.options import END, OUTPUT, SAMPLES, Count, SessionCommand, goal_options
 from nutdamp.cli.screen import say
@@ -39,11 +39,12 @@ FIGURES = ("overview", "cases", "momentum")
 @click.option("--until", type=END, help="End of --loop; default: the horizon after the nutation is at start.")
 @click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
 @click.option(
-    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases to show."
+    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases with -v."
 )
 @click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
+@verbose_option
 @quiet_option
 def command(
     job: Job,
@@ -54,11 +55,13 @@ def command(
     until: float | None,
     case: int | None,
     worst: int,
+    verbose: bool,
 ) -> None:
     """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
 
-    Shows percentiles of what is left, the share of cases that comply, which tolerance counts, and the worst cases.
-    Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp plan`.
+    Shows percentiles of what is left, the share of cases that comply, and which tolerance counts; with -v the tolerance
+    budget and the worst cases. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp
+    plan`.
     """
     if case is not None and (job.written["csv"] or job.written["plot"]):
         raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
@@ -71,6 +74,7 @@ def command(
 
     from nutdamp import api
     from nutdamp.spacecraft.requirements import expect_dispersions, expect_loop
+    from nutdamp.views.dispersion import dispersion_brief
 
     if looped:
         expect_loop(body)
@@ -80,14 +84,16 @@ def command(
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
+    brief: list[Callable[[], RenderableType]] = []
     hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"]}
     with stoppable() as stopped, job.progress("flying") as step:
         hooks |= {"progress": step, "stopped": stopped}
         if plan is None:
             flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
         else:
-            flown = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
-    job.deliver(flown, unsaved=[flown.unsaved], worst=worst)
+            flown = study = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
+            brief += [partial(dispersion_brief, study.core, scheme=plan.scheme)] * (not verbose)
+    job.deliver(flown, *brief, unsaved=[flown.unsaved], worst=worst)
     if stopped.number is not None and flown.core.done < samples:
         say(f"interrupted: {flown.core.done} of {samples} cases are done")
         sys.exit(128 + stopped.number)
@@ -108,8 +114,7 @@ def deliver_case(job: Job, plan: Plan | None, case: int, *, seed: int, until: fl
         screen = partial(loop_case_screen, loops, case, flown)
     else:
         from nutdamp.montecarlo.study import study_of
-        from nutdamp.views.dispersion_json import case_json
-        from nutdamp.views.dispersion_tables import case_screen
+        from nutdamp.views.dispersion import case_json, case_screen
 
         study = study_of(plan.spacecraft, plan.pulses, seed=seed)
         if study.lightening_error:

@@ -82,7 +82,8 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
     ``judged``: a verdict on the screen names the cones that are broken.
     """
     from nutdamp.errors import Infeasible
-    from nutdamp.planning.decision import infeasibility, remarks
+    from nutdamp.planning.decision import infeasibility
+    from nutdamp.planning.notes import plan_notes
 
     scheme, schedule, blocks = job.flown
     if schedule is not None:
@@ -92,8 +93,7 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
     plan = _recommended(job, judged=judged) if scheme is None else _planned(job, scheme)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
-    for text in remarks(plan, cones=scheme is not None and not judged):
-        job.remark(text)
+    job.note(plan_notes(plan, cones=scheme is not None and not judged))
     return plan
 
 
@@ -119,16 +119,17 @@ def _planned(job: Job, scheme: str) -> Plan:
 def _recommended(job: Job, *, judged: bool) -> Plan:
     """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
-    from nutdamp.views import verdicts
+    from nutdamp.planning.notes import comparison_warnings, reasons
+    from nutdamp.views.notes import joined
 
     compared = compared_with(job, ())
     plan = compared.recommended
     show_failures(compared)
     if plan is not None:
-        job.remark(f"no --scheme and no --schedule named: using the recommended plan, {plan.scheme}")
-    job.warn(verdicts.warnings(compared, beside_verdict=judged))
+        job.remark(f"using the recommended plan, {plan.scheme}")
+    job.note(comparison_warnings(compared, cones=not judged))
     if plan is None:
-        raise Infeasible(f"{verdicts.reason(compared)}; `nutdamp plan` says more")
+        raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")
     return plan
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
+    from nutdamp.common.results import Note
     from nutdamp.errors import CannotWrite
     from nutdamp.files.overrides import Setting
     from nutdamp.files.reader import Source
@@ -241,6 +242,13 @@ class Job:
         """Print warnings about results on standard error, unless quiet."""
         for warning in warnings:
             self.remark(f"warning: {warning}")
+
+    def note(self, notes: Iterable[Note]) -> None:
+        """Print notes on results on standard error, unless quiet."""
+        from nutdamp.views.notes import message
+
+        for entry in notes:
+            self.remark(message(entry))
 
     def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""

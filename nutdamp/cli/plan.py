@@ -67,8 +67,8 @@ def command(job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
 
     from nutdamp.planning.decision import decide
+    from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.requirements import expect_dispersions
-    from nutdamp.views import verdicts
     from nutdamp.views.schemes import scheme_table
 
     if robust:
@@ -90,7 +90,7 @@ def command(job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed
     more |= _schedule_files(chosen, figure) | _proof_files(proof, figure)
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
-        job.warn(verdicts.warnings(compared))
+        job.note(comparison_warnings(compared))
     job.deliver(None, partial(_screen, compared, decided, dispersed, verbose), more=more, unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
@@ -177,16 +177,14 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
 def _screen(
     compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None, verbose: bool
 ) -> RenderableType:
-    from nutdamp.views import robust_verdicts, verdicts
     from nutdamp.views.glance import glance
 
     if dispersed is not None:
-        from nutdamp.views.robust_tables import robust_screen
+        from nutdamp.views.robust import robust_screen
 
-        reason = robust_verdicts.robust_reason(dispersed)
-        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, reason, dispersed.name)
+        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, dispersed.name)
     if verbose:
         from nutdamp.views.plan_tables import comparison_screen
 
         return comparison_screen(compared)
-    return glance(compared, decided, verdicts.reason(compared))
+    return glance(compared, decided)

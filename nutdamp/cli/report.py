@@ -108,7 +108,7 @@ def command(
     trade: int | None,
     **control: str | None,
 ) -> None:
-    """Write a report: decision, spacecraft, method, schemes, schedule, manoeuvre sheet, verification, how to repeat it.
+    """Write a report: decision, motion, dispersion, schemes, verification, manoeuvre sheet, input.
 
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output. Needs the extra plot.

@@ -96,12 +96,12 @@ def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool
     plan = plan_or_read(job, jitter=True, judged=not job.silent)
 
     from nutdamp.api import simulate
+    from nutdamp.planning.notes import model_warnings
     from nutdamp.views.simulation import simulation_screen
-    from nutdamp.views.verdicts import model_warnings
 
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
-        job.warn(model_warnings(simulation.impulses, simulation.flown))
+        job.note(model_warnings(simulation.impulses, simulation.flown))
     screens: list[Callable[[], RenderableType]] = [partial(simulation_screen, simulation, verbose=verbose)]
     if drawn:
         from nutdamp.figures.terminal import motion_drawing

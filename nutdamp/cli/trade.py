@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import fronts_of
-from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument
+from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
     FOLDER,
@@ -53,8 +53,9 @@ if TYPE_CHECKING:
 @click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
 @click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@verbose_option
 @quiet_option
-def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None) -> None:
+def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
 
     Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
@@ -62,7 +63,7 @@ def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedul
     """
     from nutdamp.planning.decision import CUT
     from nutdamp.planning.tradeoff import numbered
-    from nutdamp.views.trade_files import schedule_paths
+    from nutdamp.views.trade import schedule_paths, trade_brief
 
     allowed = allow or (0.0, math.inf)
     for shift in allow:
@@ -75,7 +76,8 @@ def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedul
         if point.plan.cut:
             job.remark(f"point {index}: {CUT}")
     files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
-    job.deliver(traded, files=files, unsaved=unsaved)
+    brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
+    job.deliver(traded, *brief, files=files, unsaved=unsaved)
     leave(infeasible=not traded.plans)
 
 
@@ -83,7 +85,7 @@ def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list
     """A file of each schedule, or the error where the folder cannot be made."""
     from nutdamp.errors import CannotWrite
     from nutdamp.files.tabular import make_folder
-    from nutdamp.views.trade_files import schedule_files
+    from nutdamp.views.trade import schedule_files
 
     try:
         make_folder(folder)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from operator import attrgetter
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,31 @@ Table = NDArray[np.void]
 
 _home: list[str] = []
 """Module that has the table of `view`."""
+
+
+Value = str | int | float | None
+"""A value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …"""
+
+
+class Note(NamedTuple):
+    """A statement about a result: the code of a sentence in ``guide/notes.md``, and the values that it names."""
+
+    code: str
+    items: tuple[tuple[str, Value], ...] = ()
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Values by their names."""
+        return dict(self.items)
+
+    def of(self, scheme: str) -> Note:
+        """The note with the scheme that it is about."""
+        return Note(self.code, (("scheme", scheme), *(item for item in self.items if item[0] != "scheme")))
+
+
+def note(code: str, **values: Value) -> Note:
+    """A `Note` with ``values``."""
+    return Note(code, tuple(values.items()))
 
 
 def register(module: str) -> None:

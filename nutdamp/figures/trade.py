@@ -17,7 +17,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front, numbered
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.text import cost as written
-from nutdamp.views.trade_tables import FAILS, fails, front_name, missing, schemes_of
+from nutdamp.views.trade import FAILS, fails, front_name, missing, schemes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

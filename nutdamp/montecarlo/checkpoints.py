@@ -1,63 +1,112 @@
-"""Abort criteria: where most dispersed cases are after some of the pulses."""
+"""Ranges of dispersed cases for the manoeuvre sheet: at t = 0, after some of the pulses, and of a shifted start."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.propagated import sun_seen
+from nutdamp.montecarlo.cases import DispersedCases
+from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import STRIDE, Study, study_of
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.schedule import Schedule
 
-CASES = STRIDE
-"""Dispersed cases that are flown to each milestone: the first ones of the study."""
+CASES = 2 * STRIDE
+"""Dispersed cases that are flown for each range: the first ones of the study."""
 
-Range = tuple[float, float]
+TAILS = (0.0015, 0.9985)
+"""Quantiles of the cases between which a flight is as expected."""
 
-
-@dataclass(frozen=True, slots=True)
-class Milestone:
-    """Milestone after so many ``pulses``: values that a share of the cases does not exceed.
-
-    ``nutation`` rad is not exceeded; ``spin`` (rad/s) and ``sun_angle`` (rad, of H, None without a Sun) are between
-    least and most, beyond which lies as much of the rest on either side.
-    """
-
-    pulses: int
-    nutation: float
-    spin: Range
-    sun_angle: Range | None
+STEPS, HALVINGS = 16, 5
+"""Even steps in which the edge of a window is sought, and halvings of the one that holds it."""
 
 
-def milestones(study: Study, after: Sequence[int], probability: float) -> Iterator[Milestone]:
-    """Milestones that the share ``probability`` of the cases of a ``study`` keeps ``after`` pulses of its schedule."""
-    body, schedule = study.model.spacecraft, study.model.schedule
-    drawn, _ = study.source().block(0)
-    draws = {name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()}
-    tails = np.array([0.5 * (1.0 - probability), 0.5 * (1.0 + probability)])
-    for count in after:
-        part = study_of(body, first_pulses(schedule, count), seed=study.seed)
-        cases = part.model.cases(draws)
-        ends, outcome = part.flies(cases), np.empty((len(OUTPUTS), CASES))
-        measure(part.model, ends, outcome)
-        sun_angle = None
-        if body.sun is not None:
-            momentum = np.array([np.broadcast_to(component, CASES) for component in ends.after])
-            sun = sun_seen(part.model, cases, CASES)
-            across = np.linalg.norm(np.cross(momentum, sun, axis=0), axis=0)
-            sun_angle = _range(np.arctan2(across, np.sum(momentum * sun, axis=0)), tails)
-        spin = _range(np.broadcast_to(np.asarray(ends.spin, dtype=float), CASES), tails)
-        yield Milestone(count, float(np.quantile(outcome[0], probability)), spin, sun_angle)
+class Range(NamedTuple):
+    """Least and largest value."""
+
+    least: float
+    most: float
 
 
-def _range(values: NDArray[np.float64], tails: NDArray[np.float64]) -> Range:
-    least, most = np.quantile(values, tails).tolist()
-    return least, most
+class Checkpoints:
+    """Ranges of the first cases of a ``study``."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        drawn, _ = study.source().block(0)
+        self._draws: Draws = {
+            name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()
+        }
+
+    @cached_property
+    def _initial(self) -> DispersedCases:
+        return self.study.model.cases(self._draws)
+
+    @property
+    def spin(self) -> Range:
+        """Spin at t = 0, rad/s."""
+        return _range(self._initial.omega0[2])
+
+    @property
+    def nutation(self) -> Range:
+        """Angle from H to the spin axis at t = 0, rad."""
+        pairs = zip(self._initial.moments, self._initial.omega0, strict=True)
+        first, second, axial = (np.asarray(moment * rate, dtype=np.float64) for moment, rate in pairs)
+        return _range(np.arctan2(np.hypot(first, second), np.abs(axial)))
+
+    def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
+        """Nutation, rad, after the first ``counts`` pulses."""
+        body, schedule = self.study.model.spacecraft, self.study.model.schedule
+        for count in counts:
+            part = study_of(body, first_pulses(schedule, count), seed=self.study.seed)
+            yield _range(self._flown(part, self._draws)[0][0])
+
+    def window(self, probability: float) -> Range | None:
+        """Shifts (s) of all pulses with which the share ``probability`` of the cases complies, about none.
+
+        As far as half a turn of the spin, and no pulse before t = 0; None where too few comply without a shift.
+        """
+        schedule = self.study.model.schedule
+        half, first = math.pi / abs(self.study.model.spacecraft.spin), min(pulse.loaded[0] for pulse in schedule)
+        if not self._complies(0.0, probability):
+            return None
+        return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))
+
+    def _reach(self, sense: float, most: float, probability: float) -> float:
+        """Largest shift one way, s, up to ``most``: in even steps, then by halving the one that is too far."""
+        step = most / STEPS
+        good = next(
+            (step * count for count in range(STEPS) if not self._complies(sense * step * (count + 1), probability)),
+            most,
+        )
+        if good < most:
+            for _ in range(HALVINGS):
+                step *= 0.5
+                good += step * self._complies(sense * (good + step), probability)
+        return good
+
+    def _complies(self, shift: float, probability: float) -> bool:
+        """True where the share ``probability`` of the cases complies with all pulses ``shift`` s later."""
+        late = self._draws.get("timing offset", 0.0) + shift
+        _, severity = self._flown(self.study, {**self._draws, "timing offset": late})
+        return float(np.mean(severity <= 1.0)) >= probability
+
+    def _flown(self, study: Study, draws: Draws) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Outputs (5, n) and severity (n,) of the cases."""
+        ends, outputs = study.flies(study.model.cases(draws)), np.empty((len(OUTPUTS), CASES))
+        measure(study.model, ends, outputs)
+        return outputs, np.broadcast_to(study.severity(outputs, ends), CASES)
+
+
+def _range(values: object) -> Range:
+    return Range(*np.quantile(np.broadcast_to(np.asarray(values, dtype=np.float64), CASES), TAILS).tolist())
 
 
 def first_pulses(schedule: Schedule, count: int) -> Schedule:

@@ -1,59 +1,67 @@
-"""The contents of the page of ``report``: spacecraft, schemes, schedule, pictures, error budget, repetition."""
+"""The contents of the page of ``report``: the first screen, and the sections below it."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 import platform
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from rich.console import Group
 
 from nutdamp import __version__
-from nutdamp.errors import listed, printable
+from nutdamp.errors import printable
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
-from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.verification import verify
-from nutdamp.page.craft import ends_note, ends_sheet, spacecraft_blocks
+from nutdamp.page.background import assumptions, method_blocks
 from nutdamp.page.document import (
     UNCONTROLLED,
+    Beside,
     Block,
+    Contender,
     Control,
+    Details,
     FactList,
-    Figure,
     Listing,
     Page,
     PageSection,
+    Points,
     Prose,
-    Remarks,
+    RequirementBar,
     blocks_of,
+    facts_of,
+    plain,
     sheet,
     sheet_of,
 )
-from nutdamp.page.manoeuvre import manoeuvre_section
-from nutdamp.page.method import assumption_blocks, checks_sheet, method_blocks
+from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
-from nutdamp.page.pictures import dispersion_pictures_of, pictures_of, trade_picture_of
-from nutdamp.page.sheets import aspects_sheet
-from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide, notes_on
+from nutdamp.page.pictures import dispersion_pictures, flight_pictures, trade_picture
+from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import Plan, unrounded
-from nutdamp.planning.recommendation import Gain, Standing
+from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
-from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, verdicts
-from nutdamp.views.end_tables import bounds_text, direction_text, lasting, spin_text, target_text
+from nutdamp.views import decisions, glance, verdicts
+from nutdamp.views.check import check_screen
+from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
-from nutdamp.views.text import degrees, sentence
-from nutdamp.views.trade_tables import apart, beats, front_parts, outdone
-from nutdamp.views.verify_tables import BUDGET, budget_note, budget_table, conservation, methods_table, verdict
+from nutdamp.views.text import mass, quantity, sentence
+from nutdamp.views.trade import apart, beats, front_parts
+from nutdamp.views.verification import BUDGET, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
+
+
+DOTS = ("end", "impulse", "propellant", "nutation", "momentum shift", "axis error")
+"""Columns of the comparison of schemes in which dots show the numbers to scale."""
 
 
 class Repeat(NamedTuple):
@@ -66,6 +74,11 @@ class Repeat(NamedTuple):
     name: str
     text: str
     settings: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the input file; empty without one."""
+        return hashlib.sha256(self.text.encode()).hexdigest() if self.text else ""
 
 
 def called(body: Spacecraft, how: str) -> Repeat:
@@ -90,115 +103,76 @@ def report_page(
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
-    sections = [
-        PageSection("spacecraft", "Spacecraft", tuple(spacecraft_blocks(body))),
-        PageSection("method", "Method", tuple(method_blocks(compared))),
-        _schemes(compared),
-    ]
-    if traded:
-        sections.append(_trade(compared, traded))
-    dispersed: Results | None = None
-    if decided is not None:
-        chosen = decided.plan
-        sections.append(_schedule(chosen))
-        dispersed = compared.results(chosen)
-        sections.append(manoeuvre_section(chosen, dispersed))
-        sections.append(PageSection("pictures", "Pictures", (moving_of(chosen), *pictures_of(chosen))))
-        sections.append(_verification(chosen))
-        if dispersed is not None:
-            sections.append(_dispersion(chosen, dispersed))
-    sections.append(PageSection("assumptions", "Assumptions and limits", tuple(assumption_blocks())))
-    return Page(
+    dispersed = None if decided is None else compared.results(decided.plan)
+    headline = glance.headline(compared, decided)
+    lead = headline.spans[0].end
+    remarks = glance.notes(compared, decided)
+    notes = [*map(text, (note for note in remarks if severity(note) != WARNING))]
+    page = Page(
         title=control.title or _title(body),
         control=control,
-        verdict=_verdict(compared, decided, traded),
+        source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
+        state=_state(decided),
+        good=decided is not None and _good(decided),
         met=None if decided is None else decided.met,
-        good=decided is not None
-        and decided.met is not False
-        and decided.plan.standing is Standing.COMPLIES
-        and decided.plan.commandable
-        and not _broken(decided.plan),
-        decision=() if decided is None else tuple(_decision(decided)),
-        figures=tuple(_unplanned(body) if decided is None else _figures(decided)),
-        sections=(*sections, _repeat(repeat, dispersed)),
-        made_by=f"Made by nutdamp {__version__}.",
+        headline=(headline.plain[:lead], headline.plain[lead:]),
+        verdict="" if decided is None else decisions.verdict(decided),
+        margins=() if decided is None else tuple(map(_margin, glance.requirement_rows(decided))),
+        facts=None if decided is None else facts_of("Final state", glance.ends(decided)),
+        warnings=() if decided is None else tuple(_warnings(compared, decided)),
+        notes=tuple(notes[: glance.NOTES]),
+        motion=() if decided is None else (moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
+        contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
+        sections=(),
+        made_by=f"nutdamp {__version__}",
     )
+    return page.with_sections(_sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :]))
+
+
+def _sections(
+    compared: Comparison,
+    decided: Decision | None,
+    dispersed: Results | None,
+    repeat: Repeat,
+    page: Page,
+    traded: Sequence[Front],
+    more_notes: Sequence[str],
+) -> Iterator[PageSection]:
+    """Sections below the first screen."""
+    if decided is not None and dispersed is not None:
+        yield PageSection("dispersion", "Dispersion", tuple(_dispersion(decided.plan, dispersed)))
+    yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
+    if traded:
+        yield PageSection("trade", "Time against cost", tuple(_trade(compared, traded)))
+    if decided is not None:
+        title = f"Manoeuvre sheet: {compared.spacecraft.name}, {decided.plan.scheme}"
+        identity = [("document", page.control.line), ("input file", _file_line(repeat))]
+        known = [(name, text) for name, text in identity if text]
+        blocks = manoeuvre_blocks(decided, dispersed, known, page.summary)
+        # Before the sheet, which is a page of its own in print: one line after it would be another.
+        yield PageSection("verification", "Verification", tuple(_verification(decided.plan)))
+        yield PageSection("manoeuvre", title, tuple(blocks))
+    yield PageSection("background", "Background", tuple(_background(compared, decided, dispersed, repeat)))
 
 
 def _title(body: Spacecraft) -> str:
     """Title of the page: the task."""
-    turn = "" if body.goal.axis is None else f" and turning the spin axis by {degrees(body.to_turn)}"
-    return f"{body.name}: damping {degrees(body.tilt)} of nutation{turn}"
+    turn = "" if body.goal.axis is None else f", turn by {math.degrees(body.to_turn):.4g}°"
+    return f"{body.name} · damp {math.degrees(body.tilt):.4g}° nutation{turn}"
 
 
-def _verdict(compared: Comparison, decided: Decision | None, traded: Sequence[Front]) -> str:
-    reason = verdicts.reason(compared)
-    if decided is None:
-        return f"No recommendation: {reason}. “Schemes compared” says why, and what would help."
-    recommended = f"Recommended: {decided.plan.scheme} – {reason}."
-    schedule = f"Schedule of the file {decided.plan.scheme}, as it is."
-    recommendation = f"{decisions.statement(decided)} {schedule if decided.plan.from_file else recommended}"
-    needless = verdicts.needless(compared)
-    nothing = [] if needless is None else [f"no pulse is needed: {needless}"]
-    others = map(compared.recommendation.alternatives.get, (Gain.REAL, Gain.COMMANDED))
-    fired = [verdicts.hint(compared, entry) for entry in dict.fromkeys(others) if entry is not None]
-    notes = [sentence(note.removesuffix(".")) for note in (*nothing, *decisions.notes(decided), *fired)]
-    notes += map(sentence, _broken(decided.plan))
-    notes += filter(None, [outdone(traded, decided.plan)])
-    return " ".join((recommendation, *notes, *verdicts.warnings(compared, beside_verdict=True)))
+def _state(decided: Decision | None) -> str:
+    """Name of the colour of the decision."""
+    if decided is None or decided.met is False:
+        return "missed"
+    return "met" if decided.cases is not None and _good(decided) else "caution"
 
 
-def _decision(decided: Decision) -> Iterator[Block]:
-    """The parts of the requirement with their margins, and the directions that are watched."""
-    cases = decided.cases
-    how = "nominal values" if cases is None else f"nominal values, and in {cases.samples:,} dispersed cases"
-    when = lasting(decided.flight)
-    title = f"The requirement, what {decided.plan.scheme} leaves with {how}, and the margin{when and f' ({when})'}"
-    yield replace(sheet_of(title, decisions.decision_table(decided)), sortable=False, stacked=True)
-    if decided.aspects:
-        yield aspects_sheet(decided)
-
-
-def _figures(decided: Decision) -> Iterator[Figure]:
-    """The numbers to read first: the verdict, the final pointing, the cost; all but the first nominal."""
-    body, final = decided.plan.spacecraft, decided.final
-    yield Figure("requirement", decisions.verdict(decided))
-    nominal = "" if decided.cases is None else ", nominal"
-    for name, end in (("spin axis ends at", final.axis), ("H ends at", final.momentum)):
-        yield Figure(f"{name}{nominal}", direction_text(body, end), target_text(body, end))
-    goal = "" if body.goal.spin is None else f"target: {spin_text(body.goal.spin)}"
-    yield Figure(f"final spin{nominal}", spin_text(final.spin), goal)
-    for aspect in decided.aspects:
-        angles = f"{degrees(aspect.least)} to {degrees(aspect.largest)}"
-        yield Figure(f"axis from {aspect.keep.name}", angles, _keeping(aspect))
-    for name, value in decisions.cost(decided):
-        yield Figure(name, value)
-
-
-def _keeping(aspect: Aspect) -> str:
-    """Limits of the spin axis to a direction, and the verdict on them; empty where it is only watched."""
-    bounds = bounds_text(aspect.keep)
-    return f"{bounds}: {decisions.KEPT[aspect.kept]}" if bounds else ""
-
-
-def _unplanned(body: Spacecraft) -> Iterator[Figure]:
-    """The numbers to read first where there is no plan: the requirement."""
-    yield Figure("requirement", "NOT met: no scheme is feasible", verdicts.required(body))
-    if body.goal.axis is not None:
-        way = f"{degrees(body.to_turn)} from H at t = 0"
-        yield Figure("target", direction_text(body, body.goal.axis), way)
-    yield Figure("nutation at t = 0", degrees(body.tilt))
-
-
-def _schemes(compared: Comparison) -> PageSection:
-    """The comparison, the reasons why schemes are infeasible, and the remarks of the others."""
-    remarks = tuple((plan.scheme, remark) for plan in compared.plans for remark in (*notes_on(plan), *_broken(plan)))
-    hints = tuple(Prose(hint) for hint in verdicts.hints(compared))
-    table = scheme_table(compared, compared.recommended)
-    blocks: list[Block] = [sheet(table.title, table), *hints, *map(Prose, _reading(compared))]
-    if remarks:
-        blocks.append(Remarks(remarks))
-    return PageSection("schemes", "Schemes compared", tuple(blocks))
+def _good(decided: Decision) -> bool:
+    """True where nothing is missed, whether required or not."""
+    plan = decided.plan
+    kept = plan.standing is Standing.COMPLIES and plan.commandable and not _broken(plan)
+    return kept and decided.met is not False
 
 
 def _broken(plan: Plan) -> list[str]:
@@ -206,94 +180,110 @@ def _broken(plan: Plan) -> list[str]:
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
-def _reading(compared: Comparison) -> Iterator[str]:
-    """Notes on names and numbers of the comparison."""
-    feasible = [plan for plan in compared.plans if plan.feasible]
-    if any(COUNTS.get(plan.scheme, len(plan.pulses)) != len(plan.pulses) for plan in feasible):
-        yield (
-            "A scheme fires more pulses than its name says where the thrusters cannot give its impulse in so many, "
-            "and fewer where fewer take out the nutation."
-        )
-    commanded = [plan.scheme for plan in feasible if plan.scheme in catalogue.COMMANDED]
-    if commanded and len(commanded) < len(feasible):
-        yield (
-            f"Command blocks can fire the plan of {listed(commanded)} only; the pulses of the others have to be timed "
-            "one by one."
-        )
+def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
+    yield from (text(note) for note in glance.notes(compared, decided) if severity(note) == WARNING)
+    yield from _broken(decided.plan)
+    if decided.plan.spacecraft.dispersions is None:
+        yield "tolerances not checked: the file gives no dispersions"
 
 
-COUNTS = {"one-pulse": 1, "two-pulse": 2, "four-pulse": 4}
-"""Pulses by the names of schemes."""
+def _margin(row: glance.RequirementRow) -> RequirementBar:
+    texts = (row.label, row.nominal, row.dispersed, row.limit, f"margin {row.margin}", row.verdict.plain)
+    return RequirementBar(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
 
 
-def _trade(compared: Comparison, traded: Sequence[Front]) -> PageSection:
-    """The cost of an earlier end, as ``trade`` has it."""
-    tables: list[Block] = [*blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))]
-    chosen = compared.recommended
-    notes = [] if chosen is None else [note for say in (beats, apart) if (note := say(traded, chosen))]
-    tables += [Remarks((("Note", note),)) for note in notes]
-    drawn = any(len(front.points) > 1 for front in traded)  # one point for each shows no trade
-    pictures = (trade_picture_of(compared, traded),) if drawn else ()
-    return PageSection("trade", "Time against cost", (*tables, *pictures))
+def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
+    """One scheme with its cost, and the share of cases that comply or the verdict."""
+    if not plan.feasible:
+        return Contender(plan.scheme, (verdicts.no_plan(plan),), False)
+    pulses = plan.pulses
+    spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
+    share = compared.shares.get(plan)
+    word = verdicts.share_text(share) if share is not None else verdicts.VERDICT[compared.meets(plan)]
+    return Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
 
 
-def _schedule(chosen: Plan) -> PageSection:
-    title = f"Recommended schedule: {chosen.scheme}"
-    ends = (ends_sheet(chosen.flight), ends_note(chosen.flight))
-    if not len(chosen.pulses):
-        return PageSection("schedule", title, (Prose("No pulse is needed."), *ends))
-    note = Prose(
-        "A pulse is on from its start for its on-time. Spin phase: ∫ω3 dt from t = 0 to the start, the angle by which "
-        "the body has turned about axis 3, modulo 360 deg. The cones are those before and after the pulse"
-        f"{', the largest of the free motion then' * (not chosen.spacecraft.inertia.symmetric)}."
-    )
-    return PageSection(
-        "schedule", title, (sheet(f"Pulses of {chosen.scheme}", pulse_table(chosen.flight, phased=True)), note, *ends)
-    )
+def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
+    """Verdict, distributions and percentiles of the cases; budget and worst cases behind a title."""
+    from nutdamp.views.dispersion import cone_lines, dispersion_screen, requirement_lines
 
-
-def _verification(chosen: Plan) -> PageSection:
-    expected = chosen.options.with_disturbances
-    verified = verify(chosen.spacecraft, chosen.pulses, unrounded(chosen), expected=expected)
-    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
-    blocks: list[Block] = [
-        Prose(f"{verdict(verified)} {conservation(verified)}"),
-        checks_sheet(chosen, verified),
-        sheet_of(
-            "The schedule flown by independent means; differences are the largest on the way", methods_table(verified)
-        ),
-        *([Remarks(missing)] if missing else []),
-        sheet_of(
-            BUDGET,
-            budget_table(chosen.spacecraft, verified),
-        ),
-        *[Prose(note) for note in (budget_note(verified, aimed=chosen.spacecraft.goal.axis is not None),) if note],
-    ]
-    return PageSection("budget", "Verification and error budget", tuple(blocks))
-
-
-def _dispersion(chosen: Plan, dispersed: Results) -> PageSection:
-    from nutdamp.views.dispersion_tables import dispersion_screen
-
-    blocks = [*blocks_of("What is left, by cases", dispersion_screen(dispersed, scheme=chosen.scheme, worst=5))]
+    lines = [Prose(plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
     if note := dispersed.study.lightening_error:
-        blocks.append(Prose(f"Note: {note}."))
-    blocks += dispersion_pictures_of(dispersed, chosen.scheme)
-    return PageSection("dispersion", "Dispersion", tuple(blocks))
+        lines.append(Prose(f"Note: {note}."))
+    yield from lines
+    yield Beside(dispersion_pictures(dispersed, chosen.scheme))
+    screen = dispersion_screen(dispersed, scheme=chosen.scheme, worst=5)
+    title, percentiles, *rest = blocks_of("What is left, by share of the cases", screen)
+    yield percentiles
+    yield Details("Tolerance budget and worst cases", (title, *(block for block in rest if block not in lines)))
 
 
-def _repeat(repeat: Repeat, dispersed: Results | None) -> PageSection:
-    blocks: list[Block] = [Listing("Command", printable(repeat.command)), FactList("Versions", tuple(_versions()))]
-    facts = [] if dispersed is None else [("seed of the dispersed cases", str(dispersed.study.seed))]
-    if repeat.text:
-        facts.append(("SHA-256 of the input file", hashlib.sha256(repeat.text.encode()).hexdigest()))
-    if facts:
-        blocks.append(FactList("Input", tuple(facts)))
-    if repeat.text:
-        blocks.append(Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n")))
+def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
+    """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
+    yield Prose(sentence(joined(reasons(compared))))
+    table = scheme_table(compared, compared.recommended)
+    yield sheet(table.title, table, dots=DOTS)
+    chosen = compared.recommended
+    own = [
+        (plan.scheme, note)
+        for plan in compared.plans
+        if plan.feasible and plan is not chosen
+        for note in map(text, plan_notes(plan))
+    ]
+    rows = (*(("", note) for note in more_notes), *own)
+    if rows:
+        yield Details("Notes on the schemes", (Points(rows),))
+
+
+def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
+    """The cost of an earlier end, as ``trade`` has it."""
+    if any(len(front.points) > 1 for front in traded):  # one point for each shows no trade
+        yield trade_picture(compared, traded)
+    chosen = compared.recommended
+    yield from (Prose(note) for say in (beats, apart) if chosen is not None and (note := say(traded, chosen)))
+    yield from blocks_of("Schedules by their ends", Group(*front_parts(compared.spacecraft, traded)))
+
+
+def _verification(chosen: Plan) -> Iterator[Block]:
+    body = chosen.spacecraft
+    verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
+    yield Prose(f"{verdict(verified)} {conservation(verified)}")
+    missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
+    flights = sheet_of("Differences from the flown motion are the largest on the way", methods_table(verified))
+    blocks: list[Block] = [flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified))]
+    blocks.append(Prose(BUDGET_NOTE))
+    yield Details("Independent flights and error budget", tuple(blocks))
+
+
+def _background(
+    compared: Comparison, decided: Decision | None, dispersed: Results | None, repeat: Repeat
+) -> Iterator[Block]:
+    """Reference data: spacecraft, pulses, method, assumptions, input."""
+    body = compared.spacecraft
+    yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
+    if decided is not None:
+        ends = facts_of("Final state", decisions.end_facts(decided))
+        title, fired = f"Pulses of {decided.plan.scheme}", pulse_table(decided.plan.flight, phased=True)
+        yield Details("Pulses and final state, all values", (sheet(title, fired), ends))
+    yield Details("Method and symbols", tuple(method_blocks(compared)))
+    yield Details("Assumptions", (Points(tuple(("", text) for text in assumptions(compared))),))
+    yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, dispersed)))
+
+
+def _file_line(repeat: Repeat) -> str:
+    """Name and digest of the input file; empty without one."""
+    return f"{printable(Path(repeat.name).name)}, SHA-256 {repeat.digest}" if repeat.text else ""
+
+
+def _repeat(repeat: Repeat, dispersed: Results | None) -> Iterator[Block]:
+    yield Listing("Command", printable(repeat.command))
+    facts = [("seed of the dispersed cases", str(dispersed.study.seed))] if dispersed is not None else []
+    facts += [("input file", _file_line(repeat))] if repeat.text else []
+    yield FactList("Versions", (*_versions(), *facts))
     if repeat.settings:
-        blocks.append(FactList("Set in place of what the file says", repeat.settings))
-    return PageSection("repeat", "To repeat it", tuple(blocks))
+        yield FactList("Set in place of what the file says", repeat.settings)
+    if repeat.text:
+        yield Listing(f"Input file {printable(repeat.name)}", repeat.text.rstrip("\n"))
 
 
 def _versions() -> Iterator[tuple[str, str]]:

@@ -1,19 +1,24 @@
-"""Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks."""
+"""Contents of a report, apart from their look: a page of sections, made of a few kinds of blocks.
+
+Each kind of block names the macro of the templates that shows it.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading
+from nutdamp.views.text import MISSING, sentence
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
@@ -21,20 +26,47 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Vector
 
 
+class Cell(NamedTuple):
+    """Text of one cell, flush right for a ``number``, and the place of its ``dot`` in % of the largest number."""
+
+    text: str
+    number: bool
+    dot: float | None = None
+
+    @property
+    def missed(self) -> bool:
+        """True for a requirement that is not met."""
+        return self.text.startswith("NOT ") or self.text == "FAIL"
+
+
 @dataclass(frozen=True, slots=True)
 class Sheet:
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``sortable``: the rows of a column have one unit. ``stacked``: where there is
-    little room each row becomes a block, so that nothing has to be scrolled.
+    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale.
     """
 
     title: str
     columns: tuple[Heading, ...]
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
-    sortable: bool = True
-    stacked: bool = False
+    dots: tuple[str, ...] = ()
+    kind: ClassVar[str] = "sheet"
+
+    @property
+    def cells(self) -> tuple[tuple[Cell, ...], ...]:
+        """Rows of cells."""
+        columns = [self._column(at, heading) for at, heading in enumerate(self.columns)]
+        return tuple(zip(*columns, strict=True))
+
+    def _column(self, at: int, heading: Heading) -> list[Cell]:
+        texts = [row[at] for row in self.rows]
+        if heading.name not in self.dots:
+            return [Cell(text, heading.number) for text in texts]
+        numbers = [number_in(text) for text in texts]
+        most = max((abs(number) for number in numbers if number is not None), default=0.0) or 1.0
+        places = [None if number is None else 100.0 * abs(number) / most for number in numbers]
+        return [Cell(text, heading.number, place) for text, place in zip(texts, places, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,53 +75,36 @@ class FactList:
 
     title: str
     rows: tuple[tuple[str, str], ...]
+    kind: ClassVar[str] = "facts"
 
 
 @dataclass(frozen=True, slots=True)
 class Prose:
-    """A paragraph."""
+    """A paragraph; ``alarm``: it stands in a red frame."""
 
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remarks:
-    """Remarks, each with the name of its subject."""
-
-    rows: tuple[tuple[str, str], ...]
+    alarm: bool = False
+    kind: ClassVar[str] = "prose"
 
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """A list of short paragraphs."""
+    """A list of short paragraphs, each with the name of its subject, if any."""
 
-    rows: tuple[str, ...]
-
-
-LONG = 550.0
-"""Units of a drawing of which text of 7.5 units is 9 px high on a page of 720 px."""
+    rows: tuple[tuple[str, str], ...]
+    kind: ClassVar[str] = "points"
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An ``<svg>`` element, its title, a caption, and a description for those who do not see it.
-
-    For narrow screens there is another drawing, ``narrow``, or ``views``: panels and entries of the legend as view
-    boxes on the group called ``name`` in it, which are shown as wide as they are at most, in px.
-    """
+    """An ``<svg>`` element, its title, a caption, a description, and the ``narrow`` drawing for a phone, if any."""
 
     svg: str
     title: str
     caption: str
     described: str
     narrow: str = ""
-    name: str = ""
-    views: tuple[tuple[str, int], ...] = ()
-
-    @property
-    def long(self) -> bool:
-        """True where its text is too small to read where the page is little wider than a narrow screen."""
-        return float(self.svg.split('viewBox="', 1)[1].split()[2]) > LONG
+    kind: ClassVar[str] = "picture"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +113,25 @@ class Listing:
 
     title: str
     text: str
+    kind: ClassVar[str] = "listing"
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Blocks side by side where there is room; ``still``: shown only where no script moves the view before them."""
+
+    blocks: tuple[Block, ...]
+    still: bool = False
+    kind: ClassVar[str] = "beside"
+
+
+@dataclass(frozen=True, slots=True)
+class Details:
+    """Blocks behind their title, which a click opens; they are not printed."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    kind: ClassVar[str] = "details"
 
 
 class Circle(NamedTuple):
@@ -143,25 +177,18 @@ class Moving:
     absent: str
     command: tuple[str, ...]
     data: str
+    kind: ClassVar[str] = "moving"
 
 
-Block = Sheet | FactList | Prose | Remarks | Points | Picture | Moving | Listing
+Block = Sheet | FactList | Prose | Points | Picture | Listing | Moving | Beside | Details
 
 
 class PageSection(NamedTuple):
-    """A heading with its blocks; ``name`` is the target of links."""
+    """A heading with its blocks; ``name`` is its id."""
 
     name: str
     title: str
     blocks: tuple[Block, ...]
-
-
-class Figure(NamedTuple):
-    """One of the few numbers to read first; ``note``: the number to compare it with."""
-
-    name: str
-    value: str
-    note: str = ""
 
 
 class Control(NamedTuple):
@@ -174,10 +201,14 @@ class Control(NamedTuple):
     date: str = ""
 
     @property
-    def named(self) -> tuple[tuple[str, str], ...]:
-        """Names and values of the entries given, but for the title."""
-        pairs = zip(self._fields[1:], self[1:], strict=True)
-        return tuple((name, value) for name, value in pairs if value)
+    def line(self) -> str:
+        """The entries but for the title, on one line."""
+        return " · ".join(filter(None, (self.number, self.author, self.date)))
+
+    @property
+    def number(self) -> str:
+        """Number of the document and its issue."""
+        return " ".join(filter(None, (self.document, self.issue and f"iss {self.issue}")))
 
 
 def controlled(**given: str) -> Control:
@@ -201,47 +232,78 @@ UNCONTROLLED = Control()
 """Configuration control of a page without any entry."""
 
 
+class RequirementBar(NamedTuple):
+    """One requirement as texts and as a bar: shares of its limit, of the nominal value and of the cases, in %."""
+
+    texts: tuple[str, ...]
+    met: bool
+    bar: tuple[float, float]
+
+
+class Contender(NamedTuple):
+    """One scheme on the first screen: its texts; ``chosen``: it is the one to fly."""
+
+    name: str
+    texts: tuple[str, ...]
+    chosen: bool
+
+
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report: title, verdict, the decision, numbers to read first, sections.
+    """A whole report: title, decision, motion, schemes at a glance, and sections.
 
-    ``met``: whether the requirement is, None where nothing is required; ``good``: nothing is missed at all.
+    ``state``: "met", "caution" where tolerances were not checked or a limit is broken, "missed". ``good``: nothing is
+    missed at all, required or not. ``source``: the beginning of the hash of the input file.
     """
 
     title: str
     control: Control
-    verdict: str
-    met: bool | None
+    source: str
+    state: str
     good: bool
-    decision: tuple[Block, ...]
-    figures: tuple[Figure, ...]
+    met: bool | None
+    headline: tuple[str, str]
+    verdict: str
+    margins: tuple[RequirementBar, ...]
+    facts: FactList | None
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    motion: tuple[Block, ...]
+    contenders: tuple[Contender, ...]
     sections: tuple[PageSection, ...]
     made_by: str
+
+    def with_sections(self, sections: Iterable[PageSection]) -> Page:
+        """Copy with these sections."""
+        return replace(self, sections=tuple(sections))
+
+    @property
+    def summary(self) -> str:
+        """Headline, verdict and warnings as one text."""
+        parts = ("".join(self.headline), self.verdict, *self.warnings)
+        return " ".join(sentence(part.removesuffix(".")) for part in parts if part)
 
     @property
     def footer(self) -> str:
         """Text at the foot of each sheet of paper, beside its number."""
-        document, issue, date = self.control.document, self.control.issue, self.control.date
-        return ", ".join(filter(None, (document or self.title, issue and f"issue {issue}", date)))
+        return ", ".join(
+            filter(None, (self.control.number or self.title, self.control.date, self.source, self.made_by))
+        )
 
 
-def sheet(title: str, table: DataTable, place: str = "page") -> Sheet:
+def sheet(title: str, table: DataTable, *, place: str = "page", dots: tuple[str, ...] = ()) -> Sheet:
     """A declared table as a `Sheet`."""
-    return Sheet(title, table.headings(place), table.cells(place), table.mark)
+    return Sheet(title, table.headings(place), table.cells(place), table.mark, dots)
 
 
 def sheet_of(title: str, table: Table) -> Sheet:
-    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit.
-
-    Where the first column has no heading, each row is a quantity of its own unit.
-    """
+    """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
     columns = []
     for column in table.columns:
         name, _, unit = plain(column.header).partition("\n")
         columns.append(Heading(name, unit, column.justify == "right"))
     first = columns[0]
-    headed = (first._replace(name=first.name or "quantity"), *columns[1:])
-    return Sheet(title, headed, _rows(table), sortable=bool(first.name))
+    return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table))
 
 
 def facts_of(title: str, table: Table) -> FactList:
@@ -255,10 +317,10 @@ def facts_of(title: str, table: Table) -> FactList:
     return FactList(title, tuple(rows))
 
 
-def blocks_of(title: str, screen: Group) -> Iterator[Block]:
+def blocks_of(title: str, screen: RenderableType) -> Iterator[Block]:
     """Blocks of a screen: a line straight above a table is its title, else ``title`` is."""
     above = ""
-    for part in screen.renderables:
+    for part in _parts(screen):
         if isinstance(part, Table):
             maker = sheet_of if part.show_header else facts_of
             yield maker(above or title, part)
@@ -271,6 +333,15 @@ def blocks_of(title: str, screen: Group) -> Iterator[Block]:
         yield Prose(above)
 
 
+def _parts(screen: RenderableType) -> Iterator[RenderableType]:
+    """Tables and texts of a screen, groups within it resolved."""
+    if isinstance(screen, Group):
+        for part in screen.renderables:
+            yield from _parts(part)
+    else:
+        yield screen
+
+
 def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
     cells: list[Iterable[str]] = [map(plain, column.cells) for column in table.columns]
     return tuple(zip(*cells, strict=True))
@@ -279,3 +350,14 @@ def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
 def plain(cell: object) -> str:
     """The text of a cell, which in the tables of the screens is a text with or without a style."""
     return cell.plain if isinstance(cell, Text) else str(cell)
+
+
+def number_in(text: str) -> float | None:
+    """The number in a cell, 0 for "< 1e-9"; None where it is not known or a word."""
+    if text == MISSING:
+        return None
+    try:
+        value = 0.0 if text.startswith("<") else float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

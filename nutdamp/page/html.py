@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp.errors import BadRequest, MissingExtra
 from nutdamp.figures.style import require
-from nutdamp.page.document import Block, Control, Moving, Page
-from nutdamp.views.text import MISSING
+from nutdamp.page.document import Block, Control, Page
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -52,10 +51,10 @@ def _require_jinja() -> None:
 
 def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
-    moves = any(isinstance(block, Moving) for section in page.sections for block in section.blocks)
+    moves = any(block.kind == "moving" for block in page.motion)
     style, script = (
         "\n".join(map(_part, (name, *views * moves)))
-        for name, views in (("page.css", ["view.css"]), ("sort.js", ["motion.js", "bench.js", "view.js"]))
+        for name, views in (("page.css", ["view.css"]), ("page.js", ["motion.js", "bench.js", "view.js"]))
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
@@ -79,8 +78,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(number=number_in, phrases=_phrases, labelled=_labelled, css=_css, whole=_whole)
-    environment.filters["kind"] = lambda block: type(block).__name__
+    environment.filters.update(labelled=_labelled, css=_css, whole=_whole)
     return environment
 
 
@@ -89,11 +87,6 @@ def _part(name: str) -> str:
     if data is None:
         raise FileNotFoundError(f"nutdamp/page/{name} is not installed")
     return data.decode("utf-8").strip()
-
-
-def _phrases(value: str) -> list[str]:
-    """The parts of a number to read first, which breaks at commas and arrows; never between a number and its unit."""
-    return re.split(r"(?<=[→,]) ", re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", value))
 
 
 WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
@@ -121,16 +114,6 @@ def _labelled(svg: str, described: str) -> Markup:
     return Markup(svg.replace("<svg ", f'<svg aria-label="{escape(described)}" ', 1))
 
 
-def number_in(text: str) -> float | None:
-    """The number in a cell; None where it is not known or a word."""
-    if text == MISSING:
-        return None
-    try:
-        return float(text.removeprefix("<").strip())
-    except ValueError:
-        return None
-
-
 @dataclass(frozen=True, eq=False)
 class Report:
     """The report page: its comparison, its dispersed cases, the page itself, and ``content``, the text of its file."""
@@ -142,8 +125,8 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """Sentence at the top of the page."""
-        return self.page.verdict
+        """Headline, verdict and warnings at the top of the page."""
+        return self.page.summary
 
     @property
     def met(self) -> bool | None:

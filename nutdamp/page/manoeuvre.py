@@ -1,238 +1,251 @@
-"""The manoeuvre sheet: commands to load, readings of gyros and Sun sensor to expect, and abort criteria."""
+"""The manoeuvre sheet: one page for those who fire: conditions to begin, a row a pulse or block, what to do on hold."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.errors import listed
+from nutdamp.common.results import note
 from nutdamp.flight.end_state import spin_phases
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, FactList, PageSection, Prose, Sheet, sheet
-from nutdamp.page.sheets import on_times
-from nutdamp.physics import attitude
-from nutdamp.physics import body as rigid_body
+from nutdamp.page.document import Block, FactList, Prose, Sheet
+from nutdamp.planning.decision import Decision
+from nutdamp.planning.notes import ideal_code
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import to_sun_pulse
-from nutdamp.schemes.catalogue import COMMANDED
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
+from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import verdicts
-from nutdamp.views.pulses import MILLISECONDS, block_table, channel_text
+from nutdamp.views.notes import sentences
+from nutdamp.views.pulses import MILLISECONDS, channel_text
+from nutdamp.views.schemes import limits
 from nutdamp.views.tables import Heading
-from nutdamp.views.text import MISSING, RPM, digits, in_degrees, longitude
+from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, short_angle
 
 if TYPE_CHECKING:
+    from nutdamp.montecarlo.checkpoints import Checkpoints
     from nutdamp.montecarlo.study import Results
 
 
-CHECKED = 12
-"""Largest number of pulses after which there are abort criteria."""
+CHECKED = 24
+"""Largest number of rows with a range of the nutation; of more evenly spaced ones have one."""
 
-FITTING = 5
-"""Columns of short values that a phone shows side by side."""
+FINEST = 6
+"""Largest number of decimals of times."""
 
-STILL = 1e-9
-"""deg/s of transverse rate, below which it is rounding."""
-
-
-def manoeuvre_section(plan: Plan, dispersed: Results | None) -> PageSection:
-    """The sheet of a plan; with its ``dispersed`` cases there are abort criteria."""
-    return PageSection("manoeuvre", f"Manoeuvre sheet: {plan.scheme}", tuple(_blocks(plan, dispersed)))
+ON_HOLD = (
+    "Fire none of the rows that are left: they are void. Record spin, nutation and phase with their time. Plan again "
+    "from that motion, and fire by a new sheet."
+)
 
 
-def _blocks(plan: Plan, dispersed: Results | None) -> Iterator[Block]:
-    flown, body = plan.flight, plan.spacecraft
-    if not len(plan.pulses):
-        yield Prose("No pulse is needed.")
+def manoeuvre_blocks(
+    decision: Decision, dispersed: Results | None, identity: Sequence[tuple[str, str]], summary: str
+) -> Iterator[Block]:
+    """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the decision."""
+    plan, body = decision.plan, decision.plan.spacecraft
+    obstacles = [*_uncommandable(plan)]
+    if obstacles or not len(plan.pulses):
+        yield Prose(" ".join(obstacles) or summary, alarm=bool(obstacles))
         return
-    if plan.pulses.blocks:
-        yield sheet("Command blocks to load", block_table(flown))
-    yield _firing(flown)
-    if body.commands is not None and not plan.pulses.blocks:
-        yield Prose(f"No command block fires these pulses; {listed(COMMANDED)} plans with the commands of the file.")
-    if plan.pulses.idealised:
-        yield Prose(
-            "On-time “ideal”: an impulse that takes no time, which no thruster gives; with steerable.torque in the "
-            "file it has an on-time."
-        )
-    yield Prose(_phases(plan))
-    if any(pulse.channel == STEERABLE for pulse in plan.pulses):
-        yield Prose("The angle beside steerable is the direction of its torque, from body axis +1 towards +2.")
-    yield _signature(flown)
-    swings = " The Sun angle is that of H; the spin axis swings about it by the nutation."
-    yield Prose(
-        "Gyro, square to axis 3: the largest transverse rate on the coast; about a fixed axis it oscillates with the "
-        "period given. Gyro, axis 3: the spin." + swings * (body.sun is not None)
-    )
+    zero = body.utc(0.0, MILLISECONDS) or "no epoch in the file; times count from t = 0"
+    yield FactList("Document and time", (*identity, ("UTC of t = 0", zero)))
+    yield Prose(summary, alarm=decision.met is False)
+    points = None
     if dispersed is not None:
-        yield from _criteria(flown, dispersed)
-        return
-    how = "report --disperse flies them" if body.dispersions is not None else "the file gives no dispersions"
-    yield FactList("Abort criteria", (("not known", f"they come from dispersed cases; {how}"),))
+        from nutdamp.montecarlo.checkpoints import Checkpoints
 
-
-def _phases(plan: Plan) -> str:
-    """Notes on the reference of the phases of pulses and of the delays of blocks."""
-    spin = "Spin phase: the angle by which the body has turned about axis 3 since t = 0"
-    spin += ", positive about +3, so that it falls with this spin" * (plan.spacecraft.spin < 0.0)
-    if not _senses(plan.spacecraft):
-        return f"{spin}, at the commanded start, modulo 360 deg."
-    delays = " A delay in deg is the delay times the spin: nutation near the Sun makes the Sun phase another angle."
-    return (
-        f"{spin}. Sun phase: the angle from the Sun sensor to the Sun about axis 3, against the spin. Both at the "
-        "commanded start, modulo 360 deg." + delays * bool(plan.pulses.blocks)
+        points = Checkpoints(dispersed.study)
+    yield FactList("GO at t = 0 with", tuple(_conditions(decision, points)))
+    yield _fired(plan, points)
+    yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
+    yield Sheet(
+        "Signatures",
+        tuple(Heading(name, number=False) for name in SIGNED),
+        (("prepared", "", "", ""), ("checked", "", "", "")),
     )
+
+
+SIGNED = ("sheet", "name", "signature", "date")
+"""Columns of the table for signatures."""
+
+
+def _uncommandable(plan: Plan) -> Iterator[str]:
+    """Reasons why the pulses cannot be commanded."""
+    codes = [*["not-commandable"] * (not plan.commandable), *filter(None, [ideal_code(plan)])]
+    yield from sentences(note(code, scheme=plan.scheme) for code in codes)
+
+
+def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
+    """Spin, nutation and phase at which the first row may be fired."""
+    body = decision.plan.spacecraft
+    spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.nutation)
+    if points is None:
+        why = "dispersed cases were not flown" if body.dispersions is not None else "the file gives no dispersions"
+        yield "spin", f"{spin} rpm nominal"
+        yield "nutation", f"{nutation} deg nominal"
+        yield "phase window", f"not known: {why}"
+        return
+    spins = f"{points.spin.least * RPM:.5g} to {points.spin.most * RPM:.5g} rpm"
+    yield "spin", f"{spins} (nominal {spin})"
+    yield (
+        "nutation",
+        f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg (nominal {nutation})",
+    )
+    yield "phase window", _window(body, points)
+
+
+def _window(body: Spacecraft, points: Checkpoints) -> str:
+    """Shift of all pulses in phase and in time with which enough cases comply; rounded towards none."""
+    probability = required_share(body.requirement)
+    share = verdicts.exact_percent(probability)
+    if not requirements.judged(body):
+        return "not known: nothing is required"
+    window = points.window(probability)
+    if window is None:
+        return f"none: fewer than {share} of the cases comply at the phases below"
+    turn, digits = abs(body.spin), _decimals(body)
+    phases = [_inwards(math.degrees(turn * shift), 1) for shift in window]
+    times = [_inwards(shift, digits) for shift in window]
+    return f"{phases[0]} to {phases[1]} deg from those below ({times[0]} to {times[1]} s): {share} of cases comply"
+
+
+def _inwards(value: float, digits: int) -> str:
+    scale = 10.0**digits
+    return f"{math.trunc(value * scale) / scale:+.{digits}f}"
+
+
+def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
+    """One row a pulse or block, as it is commanded, with the nutation after it."""
+    flown, body, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
+    counts = [*accumulate(block.count for block in plan.pulses.blocks)] or [*range(1, len(pulses) + 1)]
+    firsts = [0, *counts[:-1]]
+    starts = np.array([pulses[first].loaded[0] for first in firsts])
+    digits = _decimals(body)
+    columns: list[tuple[Heading, list[str]]] = [
+        (Heading("block" if plan.pulses.blocks else "pulse"), [str(number) for number in range(1, len(counts) + 1)]),
+        _when(body, starts, digits),
+        _phases(flown, starts),
+    ]
+    columns += _block_columns(plan) if plan.pulses.blocks else _pulse_columns(plan, digits)
+    _, after = flown.around_pulses()
+    least, _ = limits(body)
+    angles = after.nutation[np.array(counts) - 1].tolist()
+    columns.append((Heading("nutation after", "deg"), [short_angle(angle, least) for angle in angles]))
+    if points is not None:
+        columns.append((Heading("hold if outside", "deg"), _ranges(points, counts, angles, least)))
+    columns.append((Heading("done", number=False), ["☐"] * len(counts)))
+    rows = tuple(zip(*(cells for _, cells in columns), strict=True))
+    return Sheet("Fire", tuple(column for column, _ in columns), rows)
+
+
+def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float], limit: float) -> list[str]:
+    """Range of the nutation in flown cases after each row that has one, with that ``expected`` (rad) in it."""
+    from nutdamp.montecarlo.checkpoints import even
+
+    rows = [number - 1 for number in even(len(counts), CHECKED)]
+    texts = [MISSING] * len(counts)
+    for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
+        texts[row] = (
+            f"{short_angle(min(least, expected[row]), limit)} to {short_angle(max(most, expected[row]), limit)}"
+        )
+    return texts
+
+
+def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Heading, list[str]]]:
+    body, pulses = plan.spacecraft, plan.pulses.pulses
+    return [
+        (Heading("thrusters", number=False), [_thrusters(pulse, body) for pulse in pulses]),
+        (Heading("on-time", "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
+    ]
+
+
+def _block_columns(plan: Plan) -> list[tuple[Heading, list[str]]]:
+    blocks, commands = plan.pulses.blocks, plan.spacecraft.commands
+    names = {pulse.channel: _thrusters(pulse, plan.spacecraft) for pulse in plan.pulses.pulses}
+
+    def counted(value: float, count: int | None) -> str:
+        return f"{value:.6g}" if count is None else f"{value:.6g} ({count})"
+
+    delays = [
+        counted(block.delay, None if commands is None else commands.delay_counts(block.delay)) for block in blocks
+    ]
+    widths = [
+        counted(block.width, None if commands is None else commands.width_counts(block.width)) for block in blocks
+    ]
+    counts = "" if commands is None else " (counts)"
+    return [
+        (Heading("thrusters", number=False), [names.get(block.channel, block.channel) for block in blocks]),
+        (Heading("first Sun pulse"), [str(block.first) for block in blocks]),
+        (Heading("delay", f"s{counts}"), delays),
+        (Heading("on-time", f"s{counts}"), widths),
+        (Heading("pulses"), [str(block.count) for block in blocks]),
+        (Heading("every", "spin"), [str(block.every) for block in blocks]),
+    ]
+
+
+def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
+    """Channel of a pulse, with its thrusters where they have other names."""
+    if pulse.channel == STEERABLE:
+        return channel_text(pulse, body)
+    members = [
+        thruster.name for channel in body.channels if channel.name == pulse.channel for thruster in channel.thrusters
+    ]
+    return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
+
+
+def _when(body: Spacecraft, starts: Vector, digits: int) -> tuple[Heading, list[str]]:
+    """Column of the commanded starts: UTC where there is an epoch, else from t = 0."""
+    dates = [body.utc(start, min(digits, MILLISECONDS)) for start in starts.tolist()]
+    known = [date for date in dates if date is not None]
+    if len(known) == len(dates):
+        return Heading("start", "UTC", number=False), known
+    return Heading("start", "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
+
+
+def _phases(flown: Flight, starts: Vector) -> tuple[Heading, list[str]]:
+    """Column of the Sun phase at the starts, or of the spin phase without a Sun sensor, to 0.1 deg."""
+    name, phases = (
+        ("Sun phase", -to_sun_pulse(flown, starts))
+        if _senses(flown.spacecraft)
+        else ("spin phase", spin_phases(flown, starts))
+    )
+    return Heading(name, "deg"), [fixed(math.degrees(phase) % 360.0, 1, 360.0) for phase in phases.tolist()]
 
 
 def _senses(body: Spacecraft) -> bool:
     return body.sun is not None and body.sun_sensor is not None
 
 
-def _firing(flown: Flight) -> Sheet:
-    """One row a pulse: time, phases, duration, channel."""
-    body, pulses = flown.spacecraft, flown.schedule.pulses
-    starts = np.array([pulse.loaded[0] for pulse in pulses])
-    columns: list[tuple[Heading, list[str]]] = [
-        (Heading("pulse"), [str(index + 1) for index in range(len(pulses))]),
-        *_when(body, starts),
-        (Heading("spin phase", "deg"), _angles(spin_phases(flown, starts))),
-    ]
+def _phase_note(body: Spacecraft) -> str:
     if _senses(body):
-        columns.append((Heading("Sun phase", "deg"), _angles(-to_sun_pulse(flown, starts))))
-    columns += [
-        on_times(flown.schedule),
-        (Heading("channel", number=False), [channel_text(pulse, body) for pulse in pulses]),
-    ]
-    if flown.schedule.idealised:
-        columns.append((Heading("impulse", "N m s"), [digits(pulse.magnitude, 4) for pulse in pulses]))
-    wide = len(columns) > FITTING or any(pulse.channel == STEERABLE for pulse in pulses)
-    return _sheet("Pulses to fire", columns, stacked=wide)
+        return "Sun phase: angle from the Sun sensor to the Sun about axis 3, against the spin, at the commanded start."
+    falls = ", positive about +3, so that it falls with this spin" * (body.spin < 0.0)
+    return f"Spin phase: angle by which the body has turned about axis 3 since t = 0{falls}, at the commanded start."
 
 
-def _signature(flown: Flight) -> Sheet:
-    """One row for the coast before the first pulse or block, and one after each: expected readings of sensors."""
-    body, schedule = flown.spacecraft, flown.schedule
-    before, after = flown.around_pulses()
-    counts = np.arange(1, len(schedule) + 1)
-    if schedule.blocks:
-        counts = np.cumsum([block.count for block in schedule.blocks])
-    rows = counts - 1
-    fired = "block" if schedule.blocks else "pulse"
-    names = [f"before {fired} 1", *(f"after {fired} {index}" for index in range(1, len(counts) + 1))]
-
-    def states(name: str) -> Vector:
-        return np.concatenate([getattr(before, name)[:1], getattr(after, name)[rows]])
-
-    spins, nutation = states("rates")[:, 2], states("nutation")
-    across = np.abs(spins) * np.tan(states("body_cone"))
-    moments = body.inertia
-    shape = moments.nutating, moments.C
-    inertial = [rigid_body.inertial_period(*shape, *rate) for rate in zip(across, spins, strict=True)]
-    in_body = [rigid_body.body_period(*shape, spin) for spin in spins.tolist()]
-    turns = np.isfinite(in_body) & (np.degrees(across) >= STILL)
-    periods = [digits(time, 4) if there else MISSING for time, there in zip(in_body, turns, strict=True)]
-    columns: list[tuple[Heading, list[str]]] = [
-        (Heading("coast", number=False), names),
-        *_when(body, states("t")),
-        (Heading("gyro, axis 3", "rpm"), _rpm(spins)),
-        (Heading("gyro, square to it", "deg/s"), [_small(math.degrees(rate)) for rate in across.tolist()]),
-        (Heading("period of that rate", "s"), periods),
-        (Heading("nutation", "deg"), _plain(nutation)),
-        (Heading("nutation period", "s"), [digits(time, 4) for time in inertial]),
-    ]
-    if body.sun is not None:
-        columns.append((Heading("Sun angle", "deg"), _plain(attitude.angle_between(states("momentum"), body.sun))))
-    return _sheet(f"What gyros{' and Sun sensor' * (body.sun is not None)} should show", columns, stacked=True)
+def _totals(plan: Plan) -> str:
+    """Number of pulses, on-time, cost and end."""
+    pulses, body, digits = plan.pulses, plan.spacecraft, _decimals(plan.spacecraft)
+    on = math.fsum(pulse.loaded[1] for pulse in pulses)
+    spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
+    date = body.utc(pulses.end, min(digits, MILLISECONDS))
+    ends = f"{pulses.end:.{digits}f} s" + (f" ({date})" if date else "")
+    return f"pulses: {len(pulses)}; on-time {on:.{digits}f} s; {spent}; the last ends at {ends}"
 
 
-def _criteria(flown: Flight, dispersed: Results) -> Iterator[Block]:
-    """Limits after some pulses that most of the dispersed cases stay within."""
-    from nutdamp.montecarlo.checkpoints import CASES, even, milestones
-
-    body, probability = flown.spacecraft, dispersed.probability
-    counts = even(len(flown.schedule), CHECKED)
-    criteria = list(milestones(dispersed.study, counts, probability))
-    _, after = flown.around_pulses()
-    rows = np.array(counts) - 1
-    limits = np.array([criterion.nutation for criterion in criteria])
-    required = None if body.requirement is None else body.requirement.nutation
-    stricter = required is not None and required < float(limits[-1])
-    if stricter:
-        limits[-1] = required
-    columns: list[tuple[Heading, list[str]]] = [
-        (Heading("after pulse"), list(map(str, counts))),
-        *_when(body, after.t[rows]),
-        (Heading("nutation, nominal", "deg"), _plain(after.nutation[rows])),
-        (Heading("nutation: abort above", "deg"), _plain(limits)),
-    ]
-    if body.sun is not None:
-        nominal = attitude.angle_between(after.momentum[rows], body.sun)
-        ranges = np.array([criterion.sun_angle for criterion in criteria if criterion.sun_angle is not None])
-        columns.append((Heading("Sun angle, nominal", "deg"), _plain(nominal)))
-        columns += [
-            (Heading(f"Sun angle: abort {side}", "deg"), _plain(ranges[:, index]))
-            for index, side in enumerate(("below", "above"))
-        ]
-    spins = np.array([criterion.spin for criterion in criteria])
-    columns.append((Heading("spin, nominal", "rpm"), _rpm(after.rates[rows, 2])))
-    columns += [
-        (Heading(f"spin: abort {side}", "rpm"), _rpm(spins[:, index])) for index, side in enumerate(("below", "above"))
-    ]
-    yield _sheet("Abort criteria", columns, stacked=True)
-    share = verdicts.exact_percent(probability)
-    yield Prose(
-        f"Abort, and plan anew from the measured attitude, where after a pulse one of these is exceeded: {share} of "
-        f"{CASES:,} cases stay within each{' but the last of nutation' * stricter}, those without a "
-        f"fault of thruster, valve or sensor. They are drawn from the dispersions of the file (seed "
-        f"{dispersed.study.seed}) and flown for this table alone; their number is not that of --disperse."
-    )
-    if stricter:
-        yield Prose(
-            "After the last pulse the criterion of nutation is the requirement, which fewer cases meet: on the way a "
-            "flight within the criteria may still come to miss it."
+def _decimals(body: Spacecraft) -> int:
+    """Decimals of times in s: as many as the steps of commands need, else no finer than the tolerance of timing."""
+    tick, given = body.limits.tick, body.dispersions
+    if tick is not None:
+        return next(
+            (digits for digits in range(FINEST) if math.isclose(tick, round(tick, digits), rel_tol=1e-9)), FINEST
         )
-    elif required is not None:
-        yield Prose(
-            "A flight that is beyond the criterion after the last pulse, yet meets the requirement, needs no new plan, "
-            "but its cause should be found."
-        )
-    others = [bound.part.label for bound in requirements.required(body) if bound.part is not Part.NUTATION]
-    if others:
-        yield Prose(f"The criteria do not judge what is required of the {listed(others)}.")
-    if len(counts) < len(flown.schedule):
-        yield Prose(f"There are criteria after {CHECKED} pulses at most: the first, the last and some evenly between.")
-
-
-def _when(body: Spacecraft, times: Vector) -> list[tuple[Heading, list[str]]]:
-    """Columns of times from t = 0, and of dates where there is an epoch."""
-    dates = [body.utc(time, MILLISECONDS) for time in times.tolist()]
-    columns = [(Heading("time", "s"), [f"{time:.4f}" for time in times.tolist()])]
-    return [*columns, (Heading("UTC", number=False), [date or MISSING for date in dates])] if any(dates) else columns
-
-
-def _angles(phases: Vector) -> list[str]:
-    """Angles from 0 to below 360 deg."""
-    return [longitude(phase).removesuffix(" deg") for phase in phases.tolist()]
-
-
-def _plain(angles: Vector) -> list[str]:
-    return [in_degrees(angle) for angle in angles.tolist()]
-
-
-def _rpm(spins: Vector) -> list[str]:
-    return [digits(spin * RPM, 5) for spin in spins.tolist()]
-
-
-def _small(value: float) -> str:
-    return digits(value, 4) if abs(value) >= STILL else "0"
-
-
-def _sheet(title: str, columns: list[tuple[Heading, list[str]]], *, stacked: bool = False) -> Sheet:
-    rows = tuple(zip(*(cells for _, cells in columns), strict=True))
-    return Sheet(title, tuple(column for column, _ in columns), rows, sortable=False, stacked=stacked)
+    sizes = [] if given is None else [each.size for each in (given.timing, given.timing_offset) if each is not None]
+    coarsest = max(map(abs, sizes), default=0.0)
+    return MILLISECONDS if coarsest == 0.0 else min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)

@@ -13,10 +13,12 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison, Decision, Simulation, decide
+from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decision_json import decision_json
+from nutdamp.views.notes import joined, sentences
 from nutdamp.views.plan_json import comparison_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
@@ -40,24 +42,24 @@ VIEWS = {
     "Spacecraft.data": "views.plan_json:spacecraft_json",
     **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
     "Plan.data": "views.plan_json:plan_json",
-    "Plan.sentences": "planning.decision:remarks",
+    "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
     **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
     "Comparison.data": "page.results:comparison_data",
-    "Comparison.sentences": "views.verdicts:warnings",
-    "Comparison.reason": "views.verdicts:reason",
+    "Comparison.sentences": "page.results:comparison_sentences",
+    "Comparison.reason": "page.results:comparison_reason",
     **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in ("csv", "table", "figure", "line", "html")},
     "RobustComparison.data": "page.results:robust_data",
     **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
     **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
     **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
-    "Trade.data": "views.trade_files:trade_json spacecraft fronts",
-    "Trade.csv": "views.trade_files:trade_csv fronts",
+    "Trade.data": "views.trade:trade_json spacecraft fronts",
+    "Trade.csv": "views.trade:trade_csv fronts",
     "Trade.figure": "figures.trade:trade_figure spacecraft fronts",
-    "Trade.screen": "views.trade_tables:trade_screen spacecraft fronts",
-    "Dispersion.data": "views.dispersion_json:dispersion_json core scheme=scheme",
+    "Trade.screen": "views.trade:trade_screen spacecraft fronts",
+    "Dispersion.data": "views.dispersion:dispersion_json core scheme=scheme",
     "Dispersion.figure": "page.results:dispersion_figure",
-    "Dispersion.screen": "views.dispersion_tables:dispersion_screen core scheme=scheme nominal=core.study.nominal",
+    "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
     "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
     "LoopDispersion.figure": "figures.dispersion:loop_cases_figure core",
     "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
@@ -70,8 +72,8 @@ VIEWS = {
     "Fitted.figure": "figures.fit:fit_figure core",
     "Fitted.text": "files.editing:fitted_file core",
     "Fitted.spacecraft": "files.editing:fitted_spacecraft",
-    "Verified.data": "views.verification_json:verification_json plan.flight plan.scheme core",
-    "Verified.screen": "views.verify_tables:verification_screen plan.spacecraft plan.scheme core",
+    "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
+    "Verified.screen": "views.verification:verification_screen plan core",
     "Budget.data": "views.budget:budget_json",
     "Budget.csv": "views.budget:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
@@ -86,13 +88,28 @@ def comparison_data(compared: Comparison) -> dict[str, Any]:
 
 
 def _decided(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    data = comparison_json(compared, verdicts.spoken(compared))
+    data = comparison_json(compared, decided)
     return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
+
+
+def plan_sentences(plan: Plan) -> tuple[str, ...]:
+    """Notes on a plan."""
+    return sentences(plan_notes(plan) if plan.feasible else ())
+
+
+def comparison_sentences(compared: Comparison) -> tuple[str, ...]:
+    """Warnings on the recommended plan."""
+    return sentences(comparison_warnings(compared))
+
+
+def comparison_reason(compared: Comparison) -> str:
+    """Reason for the recommendation."""
+    return joined(reasons(compared))
 
 
 def robust_data(robust: RobustComparison) -> dict[str, Any]:
     """The object of ``plan --robust --json``."""
-    from nutdamp.views.robust_json import robust_json
+    from nutdamp.views.robust import robust_json
     from nutdamp.views.robust_verdicts import robust_reason
 
     data = _decided(robust.comparison, robust.decision)
@@ -232,9 +249,10 @@ def comparison_line(compared: Comparison) -> str:
 
 def spacecraft_html(spacecraft: Spacecraft) -> str | None:
     """HTML table of a spacecraft for notebooks; None without the extra plot."""
-    from nutdamp.page.craft import spacecraft_facts
+    from nutdamp.page.document import facts_of
+    from nutdamp.views.plan_tables import derived_table
 
-    return _block(spacecraft_facts(spacecraft, title=spacecraft.name))
+    return _block(facts_of(spacecraft.name, derived_table(spacecraft)))
 
 
 def plan_html(plan: Plan) -> str | None:
@@ -248,9 +266,11 @@ def plan_html(plan: Plan) -> str | None:
 
 def flight_html(flight: Flight) -> str | None:
     """HTML table of a flight for notebooks; None without the extra plot."""
-    from nutdamp.page.sheets import residual_sheet
+    from nutdamp.page.document import FactList
 
-    return _beside(_block(residual_sheet(f"{flight.spacecraft.name}: {_summary(flight)}", flight.residual)), flight)
+    names = ("nutation", "body_cone", "space_cone", "momentum_shift")
+    rows = tuple((name.replace("_", " "), degrees(getattr(flight.residual, name))) for name in names)
+    return _beside(_block(FactList(f"{flight.spacecraft.name}: {_summary(flight)}", rows)), flight)
 
 
 def comparison_html(compared: Comparison) -> str | None:

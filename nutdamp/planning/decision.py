@@ -1,7 +1,7 @@
-"""Comparison of plans, the decision on one of them line by line, its notes, and simulations to a given time.
+"""Comparison of plans, the decision on one of them line by line, and simulations to a given time.
 
-Notes are sentences: those of the scheme, bounds, reasons for remaining nutation or for the lack of a schedule. All else
-is data; `nutdamp.views.verdicts` and `nutdamp.views.decisions` have the words for it.
+All is data but the reason for the lack of a schedule. `nutdamp.planning.notes` has the notes on it,
+`nutdamp.views.verdicts` and `nutdamp.views.decisions` have the words for it.
 """
 
 from __future__ import annotations
@@ -13,14 +13,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from nutdamp.common import results, work
-from nutdamp.common.numerics import down
 from nutdamp.errors import NutdampError
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
 from nutdamp.flight.propagation import Final, Flight
 from nutdamp.flight.track import Extremes, Track, extremes
 from nutdamp.planning.plan import Plan, plan, reaches_spin, spinning
-from nutdamp.planning.recommendation import Hindrance, Obstacle, Recommendation, Share, Standing, recommend
+from nutdamp.planning.recommendation import Recommendation, Share, Standing, recommend
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, Limit, breaches
@@ -405,28 +404,6 @@ TELLING = math.radians(1e-6)
 CUT = "the search ended at its limit of work"
 
 
-def remarks(plan: Plan, *, cones: bool = True) -> tuple[str, ...]:
-    """Notes, those of the scheme first; without ``cones`` where broken ones are named elsewhere."""
-    notes = plan.pulses.notes
-    if plan.cut:
-        notes = (*notes, f"{CUT}: this is the best schedule found so far")
-    if plan.flown is None or not len(plan.pulses):
-        return notes
-    return (
-        *notes,
-        *_bounds(plan),
-        *_remainder(plan),
-        *_asymmetry(plan),
-        *_given_length(plan),
-        *(_cones(plan) if cones else ()),
-    )
-
-
-def _cones(plan: Plan) -> tuple[str, ...]:
-    """Warnings on broken cones of a plan without a target, which does not plan for them."""
-    return tuple(f"warning: {strays(aspect)}" for aspect in plan.aspects if not aspect.kept)
-
-
 def infeasibility(plan: Plan) -> str:
     """Reason for the lack of a schedule; empty where there is one."""
     why = _infeasibility(plan)
@@ -466,11 +443,6 @@ def strays(aspect: Aspect) -> str:
     return f"the spin axis comes to {seen} from {keep.name} at {at:.4g} s ({bound})"
 
 
-def notes_on(plan: Plan) -> tuple[str, ...]:
-    """Reason for the lack of a schedule, or the `remarks` on it."""
-    return remarks(plan) if plan.feasible else (infeasibility(plan),)
-
-
 def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
     """Broken limits and on-times of a schedule, a sentence each; empty where it keeps them all.
 
@@ -507,93 +479,3 @@ def _broken(breach: Breach) -> str:
         Limit.ON_TIME_TICK: f"has an on-time that is not a multiple of the tick of {bound}",
     }[limit]
     return f"pulse {breach.number} ({pulse.channel}, {start:.6g} s to {pulse.over:.6g} s) {how}"
-
-
-def _bounds(plan: Plan) -> Iterator[str]:
-    """Possible saving by another schedule."""
-    bounds = plan.pulses.bounds
-    if bounds is None or (bounds.unit == "kg" and plan.pulses.propellant is None):
-        return
-    spent = plan.pulses.cost_in(bounds.unit)
-    scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
-    parts = [f"{scale * spent:.4g} {unit}"]
-    # Where the nutation damps itself, waiting makes any cost small: the least of ideal pulses says nothing.
-    if bounds.first_order is not None and bounds.first_order > 0.0 and plan.spacecraft.growth >= 0.0:
-        gap = 100.0 * (spent / bounds.first_order - 1.0)
-        rest = plan.flight.residual.nutation > TELLING
-        holds = "that leaves no nutation" if rest else "that holds for small angles"
-        beside = f"gap {max(gap, 0.0):.2g} %" if gap > -1e-6 else f"{-gap:.2g} % more: {holds}"
-        parts.append(
-            f"first-order least within {bounds.within:.4g} s {scale * bounds.first_order:.4g} {unit} ({beside})"
-        )
-    if bounds.rigorous is not None and bounds.rigorous > 0.0:
-        least = f"{down(scale * bounds.rigorous):.4g} {unit}"
-        parts.append(f"no schedule of the channels that leaves as little takes less than {least}")
-    if bounds.keeping is not None:
-        parts.append(f"keeping H would take {scale * bounds.keeping:.4g} {unit} by small angles")
-    if len(parts) > 1:
-        yield "; ".join(parts)
-
-
-def _remainder(plan: Plan) -> Iterator[str]:
-    """Reasons for remaining nutation."""
-    left = plan.flight.residual.nutation
-    if left < TELLING or plan.options.uncorrected:
-        return
-    why = obstacle(plan)
-    if plan.spacecraft.goal.spin is not None and plan.meets_requirement:
-        why = "the requirement allows it, where the spin is to change"
-    yield f"{_degrees(left)} of nutation remain: {why}"
-
-
-def obstacle(plan: Plan) -> str:
-    """Obstacle to less nutation, as a clause."""
-    hindrance = plan.hindrance
-    return {
-        Obstacle.UNPLANNED_DISTURBANCES: "the plan was made without the disturbances (--with-disturbances)",
-        Obstacle.STEADY_TILT: f"the disturbances leave a steady tilt of {_degrees(hindrance.steady_tilt)}",
-        Obstacle.MAX_PULSES: f"limits.max_pulses = {plan.spacecraft.limits.max_pulses} allows no more pulses",
-        Obstacle.RESOLUTION: f"rounding to limits.tick can leave up to {_degrees(hindrance.rounding)}",
-        Obstacle.LIMITS: f"{plan.scheme} {_limited(hindrance)}",
-        Obstacle.SCHEME: f"with these channels {plan.scheme} removes no more",
-    }[hindrance.obstacle]
-
-
-def _limited(hindrance: Hindrance) -> str:
-    """Certain and possible limits of a schedule, as a clause."""
-    certain = f"is limited by {' and '.join(hindrance.binding)}" if hindrance.binding else ""
-    possible = f"may be limited by {' and '.join(hindrance.suspected)}" if hindrance.suspected else ""
-    return ", and ".join(text for text in (certain, possible) if text)
-
-
-def _asymmetry(plan: Plan) -> Iterator[str]:
-    """Nutation left by the same pulses if I1 and I2 were their mean."""
-    without, inertia = plan.left_if_symmetric, plan.spacecraft.inertia
-    if without is None:
-        return
-    first, second, _ = inertia.moments
-    left = plan.flight.residual.nutation
-    yield (
-        f"I1 ≠ I2 by {100 * abs(first - second) / inertia.A:.3g} % changes what these pulses leave by "
-        f"{_degrees(abs(left - without))}: {_degrees(left)} of nutation, {_degrees(without)} if both were their mean"
-    )
-
-
-def _given_length(plan: Plan) -> Iterator[str]:
-    """Note on equal pulses of a given length, which do not end exactly."""
-    options, body, left = plan.options, plan.spacecraft, plan.left
-    simple = body.inertia.symmetric and not body.disturbances and body.growth == 0.0
-    if left is None or simple or not options.equal or options.resizable or options.uncorrected:
-        return
-    off = float(requirements.missed(body, left.nutation, left.aim))
-    if off >= TELLING:
-        yield (
-            f"the end is off by {_degrees(off)}, nutation or direction of H, whichever is more: the pulses are planned "
-            "on the free motion of a symmetric body, and of a fixed length their starts alone cannot make up for all "
-            "of the difference; without --on-time their length is corrected too"
-        )
-
-
-def _degrees(angle: float) -> str:
-    """Angle from rad for notes; below 1e-9 deg it is rounding."""
-    return f"{math.degrees(angle):.3g}°" if math.degrees(angle) >= 1e-9 else "less than 1e-9°"

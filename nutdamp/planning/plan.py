@@ -19,7 +19,8 @@ import numpy as np
 from nutdamp import units
 from nutdamp.common import results, work
 from nutdamp.common.numerics import cleaned_change
-from nutdamp.errors import Infeasible, listed
+from nutdamp.common.results import note
+from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
 from nutdamp.flight.propagation import Flight, Residual
@@ -166,10 +167,9 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
         blocks += [replace(block, first=block.first + passed) for block in schedule.blocks]
         builder.fire(schedule)
         supply.count(schedule)
-    names, count = listed([keep.name for keep in spacecraft.keep]), len(route) - 1
-    points = f"{count} way point{'s' * (count > 1)}"
-    note = f"goes by {points}, so that the spin axis keeps its distance from {names}"
-    return replace(fired(spacecraft, blocks), notes=(note,)) if blocks else builder.schedule(note)
+    names = ", ".join(keep.name for keep in spacecraft.keep)
+    aside = note("goes-round", points=len(route) - 1, directions=names)
+    return replace(fired(spacecraft, blocks), notes=(aside,)) if blocks else builder.schedule(aside)
 
 
 def _sun_pulses(spacecraft: Spacecraft, builder: FlownBuilder) -> int:
@@ -391,7 +391,7 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
         raise KeyError(scheme)
     spun = reaches_spin(spacecraft)
     if spacecraft.nutation < NO_NUTATION and spacecraft.to_turn < NO_NUTATION and spun:
-        return Plan(spacecraft, scheme, Schedule(notes=("there is no nutation to damp",)))
+        return Plan(spacecraft, scheme, Schedule(notes=(note("no-nutation"),)))
     if not spun and scheme in catalogue.PLANNED and scheme not in catalogue.SPINNING:
         able = " and ".join(spinning(spacecraft))
         why = f"cannot set the spin; {able} can, with channels that have a torque about axis 3"

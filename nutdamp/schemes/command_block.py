@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from nutdamp.common import work
-from nutdamp.errors import Infeasible, listed
+from nutdamp.common.results import Note, note
+from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_model import BlockModel, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockSearch, FlownSequence
@@ -23,47 +23,36 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
-ANY = "finer steps of delay and width in commands, or a longer limits.horizon"
-"""Advice without a limit known to hinder."""
 
-
-def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> str:
+def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
     form, flown = search.model.left(chosen.sequence.state), left_by(propagation.flown(search.body, chosen.schedule))
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
-    several = len(chosen.schedule.blocks) > 1
-    compared = f"none of the {search.looked:,} sequences compared" if several else "no other single block"
-    scope = f"{compared} does better in closed form" if first else "of those flown none does better"
-    return (
-        f"{scope}; flown from the Sun pulses of the nutating body, nutation differs by {nutation:.2g}° and the end "
-        f"of H by {end:.2g}°"
-    )
+    if first:
+        return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
+    return note("blocks-flown", nutation_deg=nutation, end_deg=end)
 
 
-def off_ticks(tick: float | None, commands: Commands) -> tuple[str, ...]:
+def off_ticks(tick: float | None, commands: Commands) -> tuple[Note, ...]:
     """Note on blocks off the ``tick`` (s); empty where all their steps are on it."""
     if tick is None:
         return ()
     steps = np.array([commands.delay_step, *commands.widths]) / tick
     if np.abs(steps - np.rint(steps)).max() <= OFF_TICK:
         return ()
-    return (
-        f"limits.tick = {tick:g} s is not kept: blocks have the steps of commands, delays of {commands.delay_step:g} s",
-    )
+    return (note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step),)
 
 
-def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> str:
+def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
     left = left_by(propagation.flown(search.body, chosen.schedule))
     missed = {bound.part: bound.most for bound in search.bounds if float(search.share(bound, left)) > 1.0}
-    more = [f"--max-blocks {BLOCKS}"] * (len(chosen.schedule.blocks) == most < BLOCKS)
+    more = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
     named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.schedule)]
-    if shed(search.body) is not None:  # with other blocks the moments fall otherwise: no cure is sure to help
-        return "what limits these blocks, if the moments of inertia did not fall: " + listed(named or [ANY])
-    return "to leave less: " + listed(named or [ANY])
+    return named or [note("finer-commands")]
 
 
-def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float]) -> Iterator[str]:
+def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[Part, float]) -> Iterator[Note]:
     """Steps of the commands that may, half of each, cost more than the bounds that are ``missed`` (rad) allow."""
     body, commands = model.body, model.body.commands
     assert commands is not None
@@ -72,13 +61,12 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
     aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
     steps = [step for channel in channels for step in _steps(model, channel)]
     along = 0.5 * min(steps, default=0.0)
-    for part, what in ((Part.DISTANCE, "the end of H"), (Part.NUTATION, "the nutation")):
-        most = missed.get(part, math.inf)
-        if aside[part] > most:
-            angle = f"{math.degrees(2.0 * aside[part]):.2g}°"
-            yield f"a finer commands.delay_step ({commands.delay_step:g} s changes {what} by {angle})"
+    for part in (Part.DISTANCE, Part.NUTATION):
+        if aside[part] > missed.get(part, math.inf):
+            change = math.degrees(2.0 * aside[part])
+            yield note("finer-delay-step", delay_step_s=commands.delay_step, part=part.label, change_deg=change)
     if along > min(missed.values(), default=math.inf):
-        yield f"finer widths in commands.width (one step of one pulse turns H by {math.degrees(2.0 * along):.2g}°)"
+        yield note("finer-widths", change_deg=math.degrees(2.0 * along))
 
 
 def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
@@ -90,16 +78,16 @@ def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
         yield float(np.diff(turned, prepend=0.0).min())
 
 
-def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[str]:
+def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
     """Limits that the blocks of a schedule use up."""
     commands, limits = body.commands, body.limits
     assert commands is not None
     if body.horizon - schedule.end < 2.0 * spin_turn(body):
-        yield f"a longer limits.horizon (the blocks end at {schedule.end:.4g} s of {body.horizon:.4g} s)"
+        yield note("longer-horizon", end_s=schedule.end, horizon_s=body.horizon)
     if limits.max_pulses is not None and len(schedule) >= limits.max_pulses:
-        yield f"more limits.max_pulses ({limits.max_pulses})"
+        yield note("more-pulses", pulses=limits.max_pulses)
     if any(block.count == commands.max_count for block in schedule.blocks):
-        yield f"a larger commands.max_count ({commands.max_count})"
+        yield note("larger-count", count=commands.max_count)
 
 
 FLOWN_PULSES = 1000
@@ -147,7 +135,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first), *off_ticks(tick, commands)]
     if chosen.rank[1] > 1.0:
-        notes.insert(1, cures(search, chosen, options.max_blocks or BLOCKS))
+        notes[1:1] = cures(search, chosen, options.max_blocks or BLOCKS)
     return replace(chosen.schedule, notes=tuple(notes))
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nutdamp.common import work
+from nutdamp.common.results import Note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics
@@ -429,7 +430,7 @@ class FlownBuilder:
         chosen = range(max(taken - last, 0), taken)
         self.fire(correct(self.here, made, chosen=chosen, momentum=True, equal=True, resizable=resized > 0))
 
-    def schedule(self, *notes: str) -> Schedule:
+    def schedule(self, *notes: Note) -> Schedule:
         """Chosen pulses."""
         return Schedule(tuple(self.pulses), notes)
 

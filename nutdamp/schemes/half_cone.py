@@ -15,6 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from nutdamp.common import work
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
@@ -163,12 +164,11 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
     angle = spacecraft.to_turn
     ideal = precession.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
     schedule = builder.schedule()
-    note = f"{cones} half cone{'s' if cones > 1 else ''}"
-    if damped:
-        note = f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then {note}"
-    elif len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0:
-        note += f"; {schedule.total_impulse / ideal:.4f} × 2n C|ω3| tan(β/2n) = {ideal:.4g} N m s"
-    return builder.schedule(note)
+    plain = len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0
+    if plain and not damped:
+        ratio = f"{schedule.total_impulse / ideal:.4f}"
+        return builder.schedule(note("half-cones-ideal", cones=cones, ideal_Nms=ideal, ratio=ratio))
+    return builder.schedule(note("half-cones", cones=cones, damping=damped))
 
 
 def _fixed(here: Spacecraft, cones: int) -> Pulse:

@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
 from nutdamp.common import work
+from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
 from nutdamp.schemes.catalogue import (
     POINTING,
@@ -160,9 +161,8 @@ def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, option
     if not model.exact:
         schedule = schedule.without_proof
     if model.spacecraft.goal.axis is not None and not scheme.points and schedule.pulses:
-        schedule = replace(
-            schedule, notes=(*schedule.notes, f"does not point: the target is left to {', '.join(POINTING)}")
-        )
+        aside = note("does-not-point", schemes=", ".join(POINTING))
+        schedule = replace(schedule, notes=(*schedule.notes, aside))
     if model.exact:
         return schedule
     from nutdamp.schemes import correction

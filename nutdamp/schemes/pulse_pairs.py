@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
@@ -365,8 +366,8 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     schedule = _checked(spacecraft, best)
     floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
     first, two = (pulse.channel for pulse in schedule)
-    note = f"{first} then {two} after {schedule.pulses[1].t - schedule.pulses[0].t:.4g} s"
-    return Schedule(schedule.pulses, (f"{note}; {schedule.total_impulse / floor:.3f} × the floor max(A|ω0|, C|ω3|β)",))
+    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / floor:.3f}"
+    return Schedule(schedule.pulses, (note("pulse-pair", first=first, second=two, wait_s=wait, ratio=ratio),))
 
 
 def _tried(spacecraft: Spacecraft, candidates: list[PairCandidate]) -> Iterator[tuple[Schedule, float]]:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import work
+from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort, span
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
@@ -450,7 +451,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
         raise reason
     builder = correction.damped(builder, one_pulse.schedule)
     if builder.left <= ROUNDING:
-        return builder.schedule("what damps the nutation brings H to the target already: no train is needed")
+        return builder.schedule(note("no-train"))
     return _best(builder, Train(builder.here, options))
 
 
@@ -525,19 +526,17 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
     return builder.schedule(*notes), builder.left
 
 
-def _note(builder: FlownBuilder, train: Train, count: int) -> str:
+def _note(builder: FlownBuilder, train: Train, count: int) -> Note:
     """Description of the train."""
     on_time = builder.pulses[-1].on_time
-    efficiency = precession.arc_efficiency(train.here.spin, on_time)
-    line = "great circle" if train.sun is None else "rhumb line at a fixed Sun phase"
-    names = ", ".join(channel.name for channel in train.channels)
-    damped = len(builder.pulses) - count
-    return (
-        (f"{damped} pulse{'s' if damped > 1 else ''} to damp the nutation, then " if damped > 0 else "")
-        + f"{count} equal pulses"
-        + (f" of {names}" if names else "")
-        + (f", {on_time:.4g} s each," if on_time > 0.0 else "")
-        + f" along the {line} of {math.degrees(train.way):.4g}°, arc efficiency {efficiency:.4f}"
+    return note(
+        "great-circle-train" if train.sun is None else "rhumb-line-train",
+        count=count,
+        channels=", ".join(channel.name for channel in train.channels) or "the steerable torquer",
+        on_time_s=on_time,
+        way_deg=math.degrees(train.way),
+        efficiency=float(precession.arc_efficiency(train.here.spin, on_time)),
+        damping=max(len(builder.pulses) - count, 0),
     )
 
 

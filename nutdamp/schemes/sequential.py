@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, listed
 from nutdamp.physics import attitude, energy_sink, response
 from nutdamp.physics import body as rigid_body
@@ -167,7 +168,7 @@ class ImpulseBuilder:
 
     def schedule(self) -> Schedule:
         """Chosen pulses."""
-        cut = f"ends after {MOST_PULSES} pulses, the most that are planned; a longer max_on_time helps"
+        cut = note("most-pulses", pulses=MOST_PULSES)
         return Schedule(tuple(self.pulses), (cut,) if len(self.pulses) == MOST_PULSES and not self.settled else ())
 
     def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:

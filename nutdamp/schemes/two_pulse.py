@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import energy_sink, response
@@ -234,20 +235,21 @@ def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: b
     return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[str, ...]:
+def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[Note, ...]:
     inertia = spacecraft.inertia
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
     first, second = schedule.pulses
     turns = (second.t - first.t) / halves.wait
-    text = (
-        f"{candidate.channels[0].name} then {candidate.channels[1].name} after {turns:.2f} half turns of the nutation "
-        f"seen inertially; "
-        f"the second is {abs(math.degrees(candidate.miss)):.2g}° off the ideal direction, "
-        f"ideal impulses would cost {candidate.factor:.3f} × A|ω0|"
+    apart = note(
+        "half-turns-apart",
+        first=candidate.channels[0].name,
+        second=candidate.channels[1].name,
+        half_turns=f"{turns:.2f}",
+        off_deg=abs(math.degrees(candidate.miss)),
+        ratio=f"{candidate.factor:.3f}",
     )
-    if candidate.short > 1e-9:
-        text += f"; the allowed on-times miss the impulse needed by {100 * candidate.short:.2g} %"
-    return (text,)
+    missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (candidate.short > 1e-9)
+    return (apart, *missed)
 
 
 def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from nutdamp.common import work
+from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight.dynamics import lightened, shed
 from nutdamp.flight.propellant import Supply, supplied
@@ -191,29 +192,24 @@ def as_commands(
 
 def _weakened(
     spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
-) -> Iterator[str]:
+) -> Iterator[Note]:
     """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
     if correct.equal and pairs:
         yield from _unequal(pairs)
     tank = spacecraft.tank
     if tank is not None and firing.pulses:
-        full, left = (
-            f"{1e-5 * pressure:.4g}" for pressure in (tank.pressure, tank.pressure_after(firing.propellant or 0.0))
-        )
-        if full != left:
-            yield f"tank pressure falls from {full} to {left} bar"
+        full, left = 1e-5 * tank.pressure, 1e-5 * tank.pressure_after(firing.propellant or 0.0)
+        if f"{full:.4g}" != f"{left:.4g}":
+            yield note("pressure-falls", full_bar=full, left_bar=left)
 
 
-def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[str]:
+def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[Note]:
     """Note on the last equal pulses of a plan whose commands differ."""
     last = pairs[-1][0].on_time
     alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
-    shortest, longest = (f"{extreme(alike, default=0.0):.4g}" for extreme in (min, max))
-    if shortest != longest:
-        yield (
-            f"equal in impulse, and so commands of {shortest} s to {longest} s: cold nozzles or falling pressure make "
-            "some of the pulses weaker; a requested --on-time is that at full thrust"
-        )
+    shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
+    if f"{shortest:.4g}" != f"{longest:.4g}":
+        yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
 
 
 def _firing(schedule: Schedule) -> Schedule:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from nutdamp.common.results import Note
 from nutdamp.spacecraft.equipment import Block, Channel, Steerable
 from nutdamp.spacecraft.model import Vector
 
@@ -251,7 +252,7 @@ class Schedule:
     """
 
     pulses: tuple[Pulse, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     bounds: Bounds | None = None
     blocks: tuple[Block, ...] = ()
 

@@ -25,14 +25,14 @@ from nutdamp.planning.capability import Acting, Consequence
 from nutdamp.spacecraft.equipment import SunSensor
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.units import bar
-from nutdamp.views.dispersion_json import correlation_json
+from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.plan_json import aspects_json, spacecraft_json
 from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.summary import summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
-from nutdamp.views.tolerance_tables import in_words, size_text
+from nutdamp.views.tolerances import in_words, size_text
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.errors import listed
-from nutdamp.planning.decision import TELLING, Comparison, Decision, Line, strays
-from nutdamp.spacecraft import requirements
+from nutdamp.planning.decision import Comparison, Decision, Line, strays
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, reasons
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import cone_margins, end_table
 from nutdamp.views.layout import columns
-from nutdamp.views.text import MISSING, degrees, lasting, mass, moment, most, quantity
+from nutdamp.views.notes import joined, ordered, screen_line
+from nutdamp.views.text import MISSING, degrees, mass, moment, most, quantity
 
 KEPT = {True: "kept", False: "NOT kept"}
 """Words for a cone about a direction that the spin axis has to keep."""
@@ -56,74 +55,7 @@ def _at_end(decision: Decision) -> str:
         if nominal:
             return verdicts.cases_verdict(cases.complying, cases.probability)
         return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
-    result = f"{'met' if nominal else 'NOT met'} with nominal values"
-    return f"{result}; dispersed cases were not flown" if decision.undispersed else result
-
-
-def notes(decision: Decision, *, looped: bool = False) -> Iterator[str]:
-    """Notes beside the verdict: idealisations, and growth of the nutation.
-
-    ``looped``: it is the flight of a closed loop, which goes on firing.
-    """
-    if ideal := verdicts.idealised(decision.plan):
-        yield ideal
-    if looped:
-        return
-    if turned := _turned(decision):
-        yield f"{decision.plan.scheme} {listed(turned)}."
-    if not decision.plan.commandable:
-        yield f"{decision.plan.scheme} cannot be commanded: no command block fires its pulses."
-    yield from _growing(decision)
-    yield from _unaided(decision)
-    if decision.plan.spacecraft.loop is not None:
-        yield "The plan is a schedule and is judged without the closed loop of the file (nutdamp loop)."
-
-
-def _turned(decision: Decision) -> list[str]:
-    """Unrequested change of axis and spin by a plan, where it is large enough to be mentioned."""
-    body, final, changes = decision.plan.spacecraft, decision.flight.residual, []
-    if body.goal.axis is None and final.momentum_shift > TURNED:
-        changes.append(f"turns the axis (H) by {degrees(final.momentum_shift)}")
-    change = decision.final.spin - body.spin
-    if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
-        changes.append(f"changes the spin by {quantity(change, 'rad/s')}")
-    return changes
-
-
-TURNED = math.radians(0.1)
-"""Turn of H, rad, from which it is mentioned."""
-
-
-def _growing(decision: Decision) -> Iterator[str]:
-    """Time for which nutation that grows keeps the requirement after the last pulse."""
-    if not len(decision.plan.pulses):
-        return
-    left, whose, until = decision.final.nutation, "", decision.flight.until
-    if decision.cases is not None:
-        left = decision.cases.levels[Part.NUTATION]
-        whose = f" (not exceeded in {verdicts.exact_percent(decision.cases.probability)} of cases)"
-    body = decision.plan.spacecraft
-    again = requirements.outgrown(body, left)
-    if again and left > TELLING:
-        most_nutation = next(most(bound.most) for bound in requirements.required(body) if bound.part is Part.NUTATION)
-        grows = f"from {degrees(left)}{whose} to {most_nutation} in {lasting(again)}"
-        yield f"After {'the last pulse' if until is None else moment(until)} what is left grows again: {grows}."
-
-
-def _unaided(decision: Decision) -> Iterator[str]:
-    """Time up to which, or from which on, the requirement is met without a pulse."""
-    body = decision.plan.spacecraft
-    if not requirements.only_nutation(body):
-        return
-    now, idle, damped = body.nutation, requirements.outgrown(body, body.nutation), requirements.subsides(body)
-    limit_ = next((most(bound.most) for bound in requirements.required(body) if bound.part is Part.NUTATION), "")
-    if damped is not None and damped < body.horizon:
-        fallen = f"by then the nutation of {degrees(now)} at t = 0 has decayed to {limit_}"
-        sooner = ", before this plan ends" if decision.plan.end > damped else ""
-        yield f"Without a pulse the requirement is met from {quantity(damped, 's')} on{sooner}: {fallen}."
-    if idle:
-        grown = f"by then the nutation of {degrees(now)} at t = 0 has grown to {limit_}"
-        yield f"Without a pulse the requirement is met up to {quantity(idle, 's')}: {grown}."
+    return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
 def decision_table(decision: Decision, values: str = "nominal") -> Table:
@@ -192,23 +124,21 @@ def end_facts(decision: Decision) -> Table:
     return table
 
 
-def decision_screen(compared: Comparison, decision: Decision, reason: str) -> list[RenderableType]:
+def decision_screen(compared: Comparison, decision: Decision) -> list[RenderableType]:
     """The decision as the top of a screen: plan and reason, verdict, margins, and final motion."""
-    plan, missed = decision.plan, verdicts.warnings(compared, beside_verdict=True)
+    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
     return [
-        Text.assemble("Recommended: ", (plan.scheme, "bold"), f" – {reason}."),
-        *requirement(decision),
-        *[Text.assemble(("Warning: ", "bold red"), warning) for warning in missed],
-        *[Text.assemble(("Note: ", "bold"), hint) for hint in verdicts.hints(compared)],
+        Text.assemble("Recommended: ", (decision.plan.scheme, "bold"), f" – {why}."),
+        statement(decision),
+        *map(screen_line, ordered([*warnings, *decision_notes(decision), *alternatives(compared)])),
         *figures(decision),
     ]
 
 
 def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
-    """The verdict as a line of a screen, and its notes; ``looped`` as in `notes`."""
+    """The verdict as a line of a screen, and its notes; ``looped``: it is the flight of a closed loop."""
     yield statement(decision)
-    for note in notes(decision, looped=looped):
-        yield Text.assemble(("Note: ", "bold"), note)
+    yield from map(screen_line, ordered(decision_notes(decision, looped=looped)))
 
 
 def figures(decision: Decision) -> list[RenderableType]:

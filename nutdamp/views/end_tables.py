@@ -10,10 +10,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.errors import listed
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.views import verdicts
 from nutdamp.views.layout import facts
 from nutdamp.views.pulses import block_table
 from nutdamp.views.text import RPM, degrees, longitude, mass, moment, most, pointing, quantity
@@ -100,6 +102,12 @@ def bounds_text(keep: Keep) -> str:
     least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
     largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
     return " and ".join(filter(None, (least, largest)))
+
+
+def requested(body: Spacecraft) -> str:
+    """The requirement and the cones to keep, on one line; empty where there are none."""
+    cones = [f"axis {bounds_text(keep)} from {keep.name}" for keep in body.keep]
+    return listed([*filter(None, [verdicts.required(body)]), *cones])
 
 
 def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:

@@ -55,7 +55,7 @@ def _json(request: Request) -> str:
     from nutdamp.views.plan_json import comparison_json
 
     compared = Comparison(request.plan.spacecraft, (request.plan,))
-    return json_text(comparison_json(compared, {"reason": "the plan exported"}))
+    return json_text(comparison_json(compared, None))
 
 
 def _basilisk(request: Request) -> str:

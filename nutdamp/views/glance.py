@@ -7,23 +7,26 @@ the order of its worth and stands on the full screen (``-v``).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import StringIO
+from typing import NamedTuple
 
 from rich.console import Console, Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
-from nutdamp.errors import listed
-from nutdamp.flight.end_state import at_start
-from nutdamp.planning.decision import Comparison, Decision, Line, notes_on
+from nutdamp.common.results import Note
+from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
-from nutdamp.views.decisions import coloured, limit, notes, size, verdict
-from nutdamp.views.end_tables import angle_names, angle_texts, bounds_text, cone_margins, lasting
+from nutdamp.views.decisions import coloured, limit, size, verdict
+from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting
 from nutdamp.views.layout import FittedColumns, facts
+from nutdamp.views.notes import WARNING, joined, ordered, screen_line, severity
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
 from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
@@ -49,8 +52,8 @@ DIGITS = 8
 """Figures of a value beside its limit, at most."""
 
 
-def glance(compared: Comparison, decision: Decision | None, reason: str, robust: str = "") -> RenderableType:
-    """The screen of a comparison and the plan to fly; without one the ``reason`` why there is none.
+def glance(compared: Comparison, decision: Decision | None, robust: str = "") -> RenderableType:
+    """The screen of a comparison and the plan to fly; or of the reason why there is none.
 
     ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases.
     """
@@ -58,77 +61,106 @@ def glance(compared: Comparison, decision: Decision | None, reason: str, robust:
     what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
+    head = [*title, headline(compared, decision, robust)]
+    remarks = notes(compared, decision, robust)
+    more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     if decision is None:
-        head = [Text.assemble(("NO PLAN", "bold red"), f": {reason}")]
-        return _fitted([*title, *head], [], [], [*_infeasible(compared)], _schemes(compared, ""))
+        return _fitted(head, [], [], more, _schemes(compared, ""))
     plan = decision.plan
-    head = [_headline(compared, decision, robust), coloured(verdict(decision), decision.met)]
-    warnings = [*_unreached(compared, plan)]
-    if not robust:  # its candidates are those that were made for the tolerances
-        warnings = [*verdicts.warnings(compared, beside_verdict=True), *warnings]
-    head += [Text.assemble(("warning: ", "bold red"), text) for text in warnings]
-    said_of = [*notes(decision), *verdicts.hints(compared), *_infeasible(compared), *_remarks(compared, plan)]
+    head.append(coloured(verdict(decision), decision.met))
+    head += [screen_line(note) for note in remarks if severity(note) == WARNING]
     table = _schemes(compared, robust or plan.scheme)
 
     def screen(first: int) -> RenderableType:
         fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
-        required, middle = _requirements(decision), [_ends(decision), *fired]
-        return _fitted([*title, *head], required, middle, said_of, table, blocks=bool(plan.pulses.blocks))
+        required, middle = requirement_rows(decision), [ends(decision), *fired]
+        blocks = bool(plan.pulses.blocks)
+        return _fitted(head, required, middle, more, table, blocks=blocks)
 
     return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
 
 
-def _unreached(compared: Comparison, plan: Plan) -> Iterator[str]:
-    """Warnings of what no plan that may be recommended can do, and of those that could."""
-    for aspect in at_start(compared.spacecraft):
-        if not aspect.kept:
-            where = f"the spin axis is {degrees(aspect.least)} from {aspect.keep.name} at t = 0 already"
-            yield f"{where} ({bounds_text(aspect.keep)}): no plan can keep that"
-    others = [other.scheme for other in compared.plans if other.feasible and not other.commandable]
-    better = [scheme for scheme in others if compared.meets(compared[scheme])]
-    if better and plan.commandable and not compared.meets(plan):
-        yield f"no command block fires {listed(better)}, which would meet the requirement: --timed recommends those"
+def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
+    """Warnings, then notes in the order of their worth; a ``robust`` plan was made for what others miss."""
+    infeasible = [note for plan in compared.plans if not plan.feasible for note in plan_notes(plan)]
+    if decision is None:
+        return infeasible
+    own = plan_notes(decision.plan, cones=False) if decision.plan in compared.plans else ()
+    missed = () if robust else comparison_warnings(compared, cones=False)
+    return ordered([*missed, *decision_notes(decision), *alternatives(compared), *infeasible, *own])
 
 
-def _headline(compared: Comparison, decision: Decision, robust: str) -> Text:
-    """Headline of the plan to fly: scheme, pulses, cost and end; it says where that is not enough."""
+def headline(compared: Comparison, decision: Decision | None, robust: str = "") -> Text:
+    """Headline of the plan to fly: scheme, pulses, cost and end; or that it is not enough, not needed, not found."""
+    if decision is None:
+        return Text.assemble(("NO PLAN", "bold red"), f": {joined(reasons(compared))}")
     plan = decision.plan
     pulses = plan.pulses
     if not len(pulses):
         return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
-    blocks = f"{len(pulses.blocks)} block{'s' * (len(pulses.blocks) != 1)}, " if pulses.blocks else ""
-    count = f"{blocks}{len(pulses)} pulse{'s' * (len(pulses) != 1)}, {spent}, ends at {pulses.end:.4g} s"
+    blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
+    count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
     return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
 
 
-def _requirements(decision: Decision) -> list[tuple[float, bool, tuple[str | Text, ...]]]:
-    """Rows of what is required, each with the share of the limit that is left and whether it is met."""
-    rows: list[tuple[float, bool, tuple[str | Text, ...]]] = []
+class RequirementRow(NamedTuple):
+    """Requirement in words: its label, values in the cases and nominally, limit, verdict and margin.
+
+    ``used``: shares of the limit that the nominal value and that of the cases take, NaN where it is not known.
+    """
+
+    label: str
+    dispersed: str
+    nominal: str
+    limit: str
+    verdict: Text
+    margin: str
+    used: tuple[float, float]
+
+    @property
+    def met(self) -> bool:
+        """True unless it is missed."""
+        return self.verdict.plain != verdicts.VERDICT[False]
+
+    @property
+    def worth(self) -> tuple[float, bool]:
+        """Order in which requirements are shown: the least share of the limit that is left first."""
+        worst = self.used[0] if math.isnan(self.used[1]) else self.used[1]
+        return (math.inf if math.isnan(worst) else 1.0 - worst), self.met
+
+
+def requirement_rows(decision: Decision) -> list[RequirementRow]:
+    """Rows of what is required."""
+    rows = []
     cases = decision.cases
     level = "" if cases is None else f"{verdicts.exact_percent(cases.probability)}: "
     for line in decision.lines:
         if not line.bound.required:
             continue
-        dispersed = "" if cases is None or line.dispersed is None else level + _left(line.bound, line.dispersed)
-        cells = (dispersed, f"nominal {_left(line.bound, line.nominal)}", f"limit {limit(line.bound)[2:]}")
+        bound, values = line.bound, (line.nominal, None if cases is None else line.dispersed)
+        dispersed = "" if values[1] is None else level + _left(bound, values[1])
+        words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
+        used = [math.nan if value is None else value / bound.most for value in values]
         met = coloured(verdicts.VERDICT[line.met], line.met)
-        rows.append((_slack(line), line.met is not False, (line.bound.part.label, *cells, met)))
+        rows.append(RequirementRow(bound.part.label, *words, met, _margin(bound, line.margin), (used[0], used[1])))
     for aspect in decision.aspects:
-        for bound, angle, margin in cone_margins(aspect):
+        for text, angle, margin in cone_margins(aspect):
             kept = margin >= -SLACK
-            word = coloured("met" if kept else "NOT met", kept)
-            label = f"axis from {aspect.keep.name}"
-            slack = 1.0 - float(aspect.keep.used(aspect.least, aspect.largest))
-            rows.append((slack, kept, (label, "", f"nominal {degrees(angle)}", f"limit {bound}", word)))
+            words = "", f"nominal {degrees(angle)}", f"limit {text}"
+            used_up = float(aspect.keep.used(aspect.least, aspect.largest))
+            met = coloured(verdicts.VERDICT[kept], kept)
+            rows.append(
+                RequirementRow(
+                    f"axis from {aspect.keep.name}", *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)
+                )
+            )
     return rows
 
 
-def _slack(line: Line) -> float:
-    """Share of the limit that is left of it."""
-    worst = line.nominal if line.dispersed is None else line.dispersed
-    return math.inf if worst is None else 1.0 - worst / line.bound.most
+def _margin(bound: Bound, margin: float) -> str:
+    return size(bound, margin) if bound.part is Part.SPIN else f"{short_angle(margin, bound.most)} deg"
 
 
 def _left(bound: Bound, value: float | None) -> str:
@@ -142,7 +174,7 @@ def _left(bound: Bound, value: float | None) -> str:
     return f"{text} deg"
 
 
-def _ends(decision: Decision) -> RenderableType:
+def ends(decision: Decision) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
     table, formula, (least, turn) = facts(), plan.residual, limits(body)
@@ -178,23 +210,11 @@ def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
     return scheme_table(compared, plan).screen("screen", between=" ")
 
 
-def _infeasible(compared: Comparison) -> Iterator[str]:
-    """Reasons of schemes without a plan."""
-    for plan in compared.plans:
-        if not plan.feasible:
-            yield from (f"{plan.scheme}: {text}" for text in notes_on(plan))
-
-
-def _remarks(compared: Comparison, chosen: Plan) -> Iterator[str]:
-    """Remarks of the scheme on the plan to fly."""
-    yield from (f"{chosen.scheme}: {text}" for text in (notes_on(chosen) if chosen in compared.plans else ()))
-
-
 def _fitted(
     head: Sequence[Text],
-    required: Sequence[tuple[float, bool, tuple[str | Text, ...]]],
+    required: Sequence[RequirementRow],
     middle: Sequence[RenderableType],
-    more: Sequence[str],
+    more: Sequence[Text],
     schemes: FittedColumns,
     *,
     blocks: bool = False,
@@ -205,25 +225,24 @@ def _fitted(
     lines -= 1 - len(apart)
     shown = list(required)
     if lines > LINES and len(required) > TIGHTEST:
-        tight = sorted(required, key=lambda row: row[:2])[:TIGHTEST]
-        shown = [row for row in required if not row[1] or row in tight]
+        tight = sorted(required, key=lambda row: row.worth)[:TIGHTEST]
+        shown = [row for row in required if not row.met or row in tight]
         lines -= len(required) - len(shown)
     table = facts()
     for _ in range(3):
         table.add_column()
-    for _, _, cells in shown:
-        table.add_row(*cells)
-    told: list[str] = []
-    for text in more:
-        lines += _lines(Text(f"note: {text}"))
-        if lines > LINES or len(told) == NOTES:
+    for row in shown:
+        table.add_row(*row[:5])
+    shown_notes: list[Text] = []
+    for note in more:
+        lines += _lines(note)
+        if lines > LINES or len(shown_notes) == NOTES:
             break
-        told.append(text)
-    hidden = len(more) - len(told) + len(required) - len(shown)
+        shown_notes.append(note)
+    hidden = len(more) - len(shown_notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    remarks = [Text.assemble(("note: ", "bold"), text) for text in told]
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *remarks, steps)
+    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
 
 
 def _lines(*parts: RenderableType) -> int:

@@ -22,30 +22,26 @@ from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.views import verdicts
-from nutdamp.views.dispersion_json import (
-    angles_json,
-    cones_json,
-    correlation_json,
-    percentiles_json,
-    requirement_of,
-    shown,
-)
-from nutdamp.views.dispersion_tables import (
+from nutdamp.views.dispersion import (
     PERCENTS,
     add_angles,
+    angles_json,
     angles_note,
     beside,
     cone_lines,
-    inputs_table,
+    cones_json,
+    correlation_json,
+    percentiles_json,
     requirement_lines,
-    unused_table,
+    requirement_of,
+    shown,
 )
 from nutdamp.views.layout import columns
 from nutdamp.views.loop import described
 from nutdamp.views.plan_json import heading
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 from nutdamp.views.text import MISSING, degrees, duration
-from nutdamp.views.tolerance_tables import MOST_ROWS, in_words, size_text
+from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
 
 class LoopOutput(NamedTuple):

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.planning.decision import Comparison, infeasibility, remarks
+from nutdamp.planning.decision import Comparison, Decision, infeasibility
+from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.views.notes import joined, note_json
 from nutdamp.views.pulses import commanded
 
 RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
@@ -30,13 +31,16 @@ def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
-def comparison_json(compared: Comparison, spoken: Mapping[str, Any]) -> dict[str, Any]:
-    """The object of ``plan --json``; ``spoken`` are its words, such as the ``reason`` of the recommendation."""
+def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+    """The object of ``plan --json``, without the decision itself."""
+    beside = () if decided is None else decision_notes(decided)
     return {
         **heading(compared.spacecraft),
         "plans": [compared_json(compared, plan) for plan in compared.plans],
         "recommended": None if compared.recommended is None else compared.recommended.scheme,
-        **spoken,
+        "no_pulse_needed": compared.needless,
+        "reason": joined(reasons(compared)),
+        "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
     }
 
 
@@ -105,7 +109,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "target": target_json(body),
         **aspects_json(plan.aspects if plan.feasible else ()),
         "bounds": None if plan.pulses.bounds is None else plan.pulses.bounds._asdict(),
-        "notes": list(remarks(plan)),
+        "notes": [note_json(note) for note in plan_notes(plan)] if plan.feasible else [],
     }
 
 

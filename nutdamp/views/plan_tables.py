@@ -10,7 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.flight.end_state import at_start
-from nutdamp.planning.decision import Comparison, decide, notes_on
+from nutdamp.planning.decision import Comparison, decide
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
@@ -18,6 +19,7 @@ from nutdamp.views import verdicts
 from nutdamp.views.decisions import decision_screen
 from nutdamp.views.end_tables import add_aspects, blocks_screen, direction_text, spin_text
 from nutdamp.views.layout import facts
+from nutdamp.views.notes import joined, ordered, screen_line
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import beyond_floors, scheme_table, turning
 from nutdamp.views.text import degrees, duration, quantity
@@ -32,17 +34,19 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         Text(),
         scheme_table(compared, compared.recommended).transposed("full"),
     ]
-    results += _reasons(compared)
     needless = verdicts.needless(compared)
-    parts = [name] if needless is None else [name, Text.assemble(("No pulse needed: ", "bold"), f"{needless}.")]
+    parts: list[RenderableType] = [name]
+    if needless is not None:
+        parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
+    remarks = [note for plan in compared.plans for note in plan_notes(plan)]
+    results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
     if decided is None:
-        parts.append(Text(f"No recommendation: {verdicts.reason(compared)}.", style="bold"))
-        return Group(*parts, *results)
+        return Group(*parts, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
     if decided.plan.pulses.blocks:
         results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
         results += [Text(), pulse_table(decided.plan.flight).screen("full")]
-    return Group(*parts, *decision_screen(compared, decided, verdicts.reason(compared)), *results)
+    return Group(*parts, *decision_screen(compared, decided), *results)
 
 
 def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
@@ -118,13 +122,3 @@ def _actuators(spacecraft: Spacecraft) -> str:
     if spacecraft.channels:
         texts.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
     return "; ".join(texts)
-
-
-def _reasons(compared: Comparison) -> list[RenderableType]:
-    """Reasons why schemes are infeasible, and the remarks of the others; those that several share stand once."""
-    schemes_of: dict[str, list[str]] = {}
-    for plan in compared.plans:
-        for remark in notes_on(plan):
-            schemes_of.setdefault(remark, []).append(plan.scheme)
-    lines = [Text.assemble((f"{', '.join(schemes)}: ", "bold"), remark) for remark, schemes in schemes_of.items()]
-    return [Text(), *lines] if lines else []

@@ -71,7 +71,7 @@ def robust_cost(robust: RobustComparison) -> str:
 def tightened(robust: RobustComparison) -> str:
     """Tolerances that would have to shrink, and to which size, where too few cases comply; empty where not known."""
     from nutdamp.montecarlo.study import CONFIDENCE
-    from nutdamp.views.tolerance_tables import in_words, stated_text
+    from nutdamp.views.tolerances import in_words, stated_text
 
     needed, chosen = robust.tightening, robust.chosen
     if needed is None or chosen is None:

@@ -11,9 +11,11 @@ from io import StringIO
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note
 from nutdamp.planning.decision import Decision
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import decision_table
+from nutdamp.views.notes import WARNING, ordered, screen_line, severity
 from nutdamp.views.plan_tables import header
 from nutdamp.views.text import RPM, short_angle
 
@@ -38,9 +40,20 @@ def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     yield from [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
 
 
-def warnings_of(texts: Iterable[str]) -> list[Text]:
+def warnings_of(remarks: Iterable[str | Note]) -> list[Text]:
     """Warnings, each once."""
-    return [Text.assemble(("warning: ", "bold red"), text.removesuffix(".")) for text in dict.fromkeys(texts)]
+    return [_line(("warning: ", "bold red"), remark) for remark in dict.fromkeys(remarks)]
+
+
+def _line(lead: tuple[str, str], remark: str | Note) -> Text:
+    """A remark behind its severity; one of the catalogue has a code, too."""
+    return Text.assemble(lead, remark.removesuffix(".")) if isinstance(remark, str) else screen_line(remark)
+
+
+def spoken(notes: Iterable[Note]) -> tuple[list[Note], list[str | Note]]:
+    """Warnings, and other notes."""
+    kept = ordered(notes)
+    return [note for note in kept if severity(note) == WARNING], [note for note in kept if severity(note) != WARNING]
 
 
 def margin_lines(decision: Decision, values: str = "nominal") -> list[RenderableType]:
@@ -51,15 +64,14 @@ def margin_lines(decision: Decision, values: str = "nominal") -> list[Renderable
 def summary(
     head: Sequence[RenderableType],
     table: Rows | None,
-    remarks: Iterable[str],
+    remarks: Iterable[str | Note],
     steps: str,
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
 ) -> RenderableType:
     """A default screen, with ``steps`` to take next; ``verbose``: with all rows and remarks, and ``more`` parts."""
-    kept = dict.fromkeys(text.removesuffix(".") for text in remarks if text)
-    notes = [Text.assemble(("note: ", "bold"), text) for text in kept]
+    notes = [_line(("note: ", "bold"), remark) for remark in dict.fromkeys(remarks) if remark]
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:

@@ -29,7 +29,7 @@ from nutdamp.figures.history import BAR
 from nutdamp.figures.loop import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
-from nutdamp.page.pictures import dispersion_pictures_of
+from nutdamp.page.pictures import dispersion_pictures
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -169,11 +169,11 @@ def test_nothing_that_varies_is_drawn(name: str) -> None:
 
 
 @pytest.mark.deep
-@pytest.mark.parametrize("required", [None, Requirement(nutation=0.01), Requirement(momentum_shift=0.01)])
+@pytest.mark.parametrize("required", [None, Requirement(nutation=0.01), Requirement(0.01, momentum_shift=0.01)])
 def test_captions_name_no_bound_that_is_not_drawn(required: Requirement | None) -> None:
     varied = Dispersions(A=Tolerance("normal", 0.02, relative=True))
     results = studied(replace(BODY, requirement=required, dispersions=varied), 50)
-    _, momentum = dispersion_pictures_of(results, "two-pulse")
+    _, momentum = dispersion_pictures(results, "two-pulse")
     assert ("required" in momentum.caption) == (required is not None and required.momentum_shift is not None)
 
 

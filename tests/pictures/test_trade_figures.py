@@ -29,7 +29,7 @@ from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Bounds, Schedule
 from nutdamp.views.text import cost
-from nutdamp.views.trade_tables import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
+from nutdamp.views.trade import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

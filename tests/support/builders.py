@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
@@ -12,15 +12,16 @@ from types import FrameType
 import numpy as np
 from support import reference
 
+from nutdamp.common.results import Note, Value
 from nutdamp.flight.propagation import Residual
 from nutdamp.planning.decision import Comparison
+from nutdamp.planning.notes import comparison_warnings, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import recommend
 from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import Attitude, Goal, Inertia, Limits, Requirement, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views import verdicts
 
 
 def spinner(
@@ -204,14 +205,30 @@ def chosen(*plans: Plan) -> str | None:
     return None if best is None else best.scheme
 
 
-def said(*plans: Plan) -> str:
-    """The reason for it."""
-    return verdicts.reason(Comparison(plans[0].spacecraft, plans))
+def noted(notes: Iterable[Note]) -> str:
+    """Codes of notes with their values, one a line: ``momentum-shift scheme=x momentum_shift_deg=0.25``."""
+    return "\n".join(" ".join((entry.code, *map(_valued, entry.items))) for entry in notes)
 
 
-def warned(*plans: Plan) -> str:
-    """What is warned of."""
-    return " ".join(verdicts.warnings(Comparison(plans[0].spacecraft, plans)))
+def _valued(item: tuple[str, Value]) -> str:
+    name, value = item
+    return f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value}"
+
+
+def codes(notes: Iterable[Note]) -> list[str]:
+    """Codes of notes."""
+    return [entry.code for entry in notes]
+
+
+def one_of(notes: Iterable[Note], code: str) -> dict[str, Value]:
+    """Values of the one note with a code."""
+    (entry,) = (entry for entry in notes if entry.code == code)
+    return entry.values
+
+
+def recommended(what: str, compared: Comparison) -> str:
+    """The reason for the recommended plan, and the warnings of it."""
+    return f"{what}: {noted((*reasons(compared), *comparison_warnings(compared)))}"
 
 
 INFEASIBLE = Plan(spinner(), "infeasible", None, "because")

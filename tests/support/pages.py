@@ -18,11 +18,7 @@ def unpictured() -> Iterator[None]:
     """Pages are made without pictures."""
     one, several = (lambda *_: Prose("")), (lambda *_: ())
     with patch.multiple(
-        content,
-        moving_of=one,
-        pictures_of=several,
-        trade_picture_of=one,
-        dispersion_pictures_of=several,
+        content, moving_of=one, flight_pictures=several, trade_picture=one, dispersion_pictures=several
     ):
         yield
 

@@ -29,7 +29,7 @@ from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
-from nutdamp.views import guide, loop_cases, spin_table, topics, trade_files
+from nutdamp.views import guide, loop_cases, spin_table, topics
 from nutdamp.views.explain_tables import WIDEST
 from nutdamp.views.file_guide import flow, keys
 from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
@@ -262,10 +262,9 @@ def test_a_further_source_of_words_is_a_line(monkeypatch: pytest.MonkeyPatch) ->
 
 def columns_written() -> Iterator[str]:
     yield from (*EFFECTIVE, *tabular.HEADER, *telemetry.TIMES, *telemetry.MEASURED, *spin_table.HEADER)
-    yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS), *trade_files.HEADER)
-    for key, where in keys_of_columns():
-        if "json" not in where or "csv" in where:
-            yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]
+    yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
+    for key in (key for key, where in keys_of_columns() if "csv" in where or "json" not in where):
+        yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]
 
 
 def keys_of_columns() -> Iterator[tuple[str, str]]:
@@ -280,8 +279,19 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 
 def keys_written() -> Iterator[str]:
     """Names that the code gives to numbers in JSON."""
-    subjects = ("budget", "check", "fit", "loop", "loop_cases", "simulation", "trade_files")
-    paths = (*VIEWS.glob("*_json.py"), *(VIEWS / f"{subject}.py" for subject in subjects))
+    names = (
+        "budget",
+        "check",
+        "dispersion",
+        "fit",
+        "loop",
+        "loop_cases",
+        "robust",
+        "simulation",
+        "trade",
+        "verification",
+    )
+    paths = (*VIEWS.glob("*_json.py"), *(VIEWS / f"{name}.py" for name in names))
     for node in nodes(paths):
         for key in node.keys if isinstance(node, ast.Dict) else ():
             if isinstance(key, ast.Constant) and isinstance(key.value, str):

@@ -15,7 +15,7 @@ from support.loops import follow_few_cycles
 from support.process import Run
 
 import nutdamp
-from nutdamp.views.dispersion_tables import beside
+from nutdamp.views.dispersion import beside
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -30,9 +30,9 @@ COMMANDS = [
     "plan",
     "simulate --scheme two-pulse",
     "check",
-    "verify --scheme two-pulse",
-    "disperse --scheme two-pulse --samples 1e3 --worst 2",
-    "trade --points 2",
+    "verify --scheme two-pulse -v",
+    "disperse --scheme two-pulse --samples 1e3 --worst 2 -v",
+    "trade --points 2 -v",
     f"loop {STAGE} --until 400s",
     f"budget {STAGE} --thresholds 0.5deg,0.1deg --thresholds 1deg,0.1deg",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import reference
-from support.builders import channel, cross, spinner
+from support.builders import channel, cross, noted, spinner
 from support.cases import deep, weekly
 from support.golden import check_text
 from support.spinners import FILE as SPINNER
@@ -209,8 +209,8 @@ def test_what_cannot_have_falling_moments_says_so() -> None:
     within = Requirement(nutation=1e-9)
     nutating = np.array([0.01, 0.0, blocks.spin])
     bodies = [replace(body, omega0=nutating, requirement=within) for body in (blocks, lighter)]
-    cures = [command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1] for body in bodies]
-    check_text("flight.cures-of-blocks", "\n".join(cures))
+    cures = [command_block.schedule(body, CommandBlockOptions(max_blocks=1)).notes[1:] for body in bodies]
+    check_text("flight.cures-of-blocks", "\n".join(map(noted, cures)))
 
 
 @pytest.mark.parametrize("per_kg", [weekly((900.0, 900.0, 600.0)), weekly(None)])

@@ -144,7 +144,7 @@ def test_disperse_says_how_many_cases_break_the_cone(run: Run) -> None:
     assert study["requirement"]["met_fraction"] == pytest.approx(1.0 - cone["broken_fraction"], abs=0.02)
     assert cone["least_deg"] < 5.0 < cone["nominal_least_deg"] < 5.1
     assert all(one["aspects"][0]["least_deg"] < 5.0 for one in study["worst"])
-    screen = run(*options, "--samples", "2000", stdin=FILE).stdout
+    screen = run(*options, "--samples", "2000", "-v", stdin=FILE).stdout
     assert f"broken in {100 * cone['broken_fraction']:.1f} % of cases" in " ".join(screen.split())
     worst = study["worst"][0]
     row = next(line.split() for line in screen.splitlines() if line.split()[:1] == [str(worst["case"])])

@@ -138,7 +138,7 @@ def test_the_command_writes_the_file_and_says_what_it_proves(run: Run, tmp_path:
     assert result.returncode == 0
     text = (tmp_path / "proof.json").read_text()
     assert json.loads(text)["unit"] == "kg"
-    assert f"first-order least within 30 s {1e3 * check(text):.4g} g" in result.stdout
+    assert f"small-angle bound within 30 s: {1e3 * check(text):.4g} g" in result.stdout
     refutes(text, raised)
 
 

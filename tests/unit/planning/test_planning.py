@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.builders import BOTH, HALF_A_DEGREE, channel, cross, judged, spinner
+from support.builders import BOTH, HALF_A_DEGREE, channel, cross, judged, noted, spinner
 from support.cases import deep, weekly
 from support.golden import check_text
 
@@ -20,7 +20,8 @@ from nutdamp.flight import end_state
 from nutdamp.flight.end_state import seen_at
 from nutdamp.flight.propagation import by_impulses
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import broken_limits, compare, infeasibility, remarks
+from nutdamp.planning.decision import broken_limits, compare, infeasibility
+from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import plan
 from nutdamp.planning.recommendation import Ground, Standing
 from nutdamp.schemes import catalogue, two_pulse
@@ -29,7 +30,6 @@ from nutdamp.spacecraft.constraints import Limit, Windows, breaches, keeps_limit
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.views import verdicts
 
 DRIFT_ONLY = Requirement(momentum_shift=math.radians(0.2))
 KEPT = OptimalOptions(free_axis=False)
@@ -79,13 +79,13 @@ def test_without_nutation_there_is_an_empty_schedule_and_none_is_free_motion() -
         for degrees in (0.0, 1e-11):
             made = plan(spinner(degrees=degrees, channels=cross(20.0), requirement=BOTH), scheme)
             assert (made.feasible, len(made.pulses), made.meets_requirement) == (True, 0, True)
-        check_text("plan.nothing-to-damp", "\n".join(remarks(made)))
+        check_text("plan.nothing-to-damp", noted(plan_notes(made)))
     free = plan(spinner(degrees=5.0), "none")
     assert free.flown is not None
     assert len(free.pulses) == 0
     assert math.degrees(free.flown.nutation) == pytest.approx(5.0, rel=1e-14)
     body = spinner(moments=(121.2, 120.0, 80.0), channels=cross(8.0))
-    check_text("plan.no-rounding", "\n".join(remarks(plan(body, "one-pulse"))))
+    check_text("plan.no-rounding", noted(plan_notes(plan(body, "one-pulse"))))
 
 
 def raising(error: type[Exception]) -> Callable[..., object]:
@@ -149,7 +149,7 @@ def test_a_plan_that_leaves_more_than_decay_alone_by_its_end_is_infeasible_and_s
     assert made.worse is not None
     assert made.worse < 0.01 * SELF_DAMPING.nutation  # it does damp
     assert idle(SELF_DAMPING, made.worse_at) < made.worse
-    check_text("plan.worse-than-decay", f"{infeasibility(made)}\n{verdicts.reason(compared)}")
+    check_text("plan.worse-than-decay", f"{infeasibility(made)}\n{noted(reasons(compared))}")
     assert math.degrees(idle(SELF_DAMPING, 81.91)) == pytest.approx(0.05, rel=1e-3)  # the time that the text names
     late = plan(replace(SELF_DAMPING, limits=Limits(earliest=300.0)), "one-pulse")  # the default horizon is 240 s
     check_text("plan.earliest-after-horizon", infeasibility(late))

@@ -8,7 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.builders import BOTH, HALF_A_DEGREE, INFEASIBLE, POINTING, Judged, cross, judged, said, spinner, warned
+from support.builders import (
+    BOTH,
+    HALF_A_DEGREE,
+    INFEASIBLE,
+    POINTING,
+    Judged,
+    cross,
+    judged,
+    noted,
+    recommended,
+    spinner,
+)
 from support.cases import deep, weekly
 from support.golden import check_text
 from support.places import case
@@ -17,6 +28,7 @@ import nutdamp
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare, decide, usual
+from nutdamp.planning.notes import alternatives, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Gain, Ground, Standing, cheapest, recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
@@ -129,9 +141,9 @@ def plans_of(given: str, text: str) -> list[Plan]:
     return plans
 
 
-def test_the_plan_to_fly_what_decided_and_the_words_for_it_and_for_what_is_missed() -> None:
+def test_the_plan_to_fly_what_decided_and_the_notes_on_it_and_on_what_is_missed() -> None:
     """What is missed names the part, what is left, and what may be."""
-    lines = [said(INFEASIBLE) + warned(INFEASIBLE)]
+    lines = [recommended("nothing feasible", Comparison(INFEASIBLE.spacecraft, (INFEASIBLE,)))]
     for what, given, decided, text in CASES:
         (best, ground), plans = decided.split(), plans_of(given, text)
         found = recommend(plans)
@@ -143,7 +155,7 @@ def test_the_plan_to_fly_what_decided_and_the_words_for_it_and_for_what_is_misse
         ]
         assert found.count == len(equals), what
         if ground != "COST" or what.startswith(("of what", "where")):
-            lines.append(f"{what}: {said(*plans)}. {warned(*plans)}")
+            lines.append(recommended(what, Comparison(plans[0].spacecraft, tuple(plans))))
     check_text("plan.reasons", "\n".join(lines))
     for none in ([INFEASIBLE], []):
         assert (recommend(none).plan, recommend(none).standing, recommend(none).ground) == (None, None, None)
@@ -207,7 +219,7 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
         assert decision is not None
         unknown = compared.shares[compared[best]].met is None  # the budget of work ended before that was known
         assert (decision.unknown, decision.met) == (unknown, compared.meets(compared[best]) and not unknown), what
-        lines.append(" ".join((f"{what}: {verdicts.reason(compared)}.", *verdicts.warnings(compared))))
+        lines.append(recommended(what, compared))
         lines.append("; ".join(verdicts.share_text(compared.shares[one]) for one in compared))
     check_text("plan.reasons-by-cases", "\n".join(lines))
     # Nothing is required: no cases decide.
@@ -223,7 +235,7 @@ def test_where_thrusters_are_too_weak_the_plan_that_leaves_least(degrees: int) -
     left = {one.scheme: one.flown.nutation for one in compared.plans if one.flown is not None}
     assert compared.recommended is not None
     assert compared.recommended.scheme == min(left, key=lambda name: left[name]) == "four-pulse"
-    check_text(f"plan.weak-{degrees}", "\n".join((verdicts.reason(compared), *verdicts.warnings(compared))))
+    check_text(f"plan.weak-{degrees}", recommended("weak", compared))
 
 
 def test_a_spin_is_met_within_a_thousandth() -> None:
@@ -318,8 +330,7 @@ def test_only_what_the_spacecraft_can_fire_is_recommended_unless_named_or_timed(
         assert compared.eligible == eligible
         assert compared.recommended is (min(eligible, key=lambda one: one.pulses.cost) if eligible else None)
     alone = Comparison(bodies[1], (timed,))
-    assert (decide(alone), alone.reason == Comparison(bodies[1], (INFEASIBLE,)).reason) == (None, False)
-    check_text("decision.none-commanded", alone.reason)
+    assert (decide(alone), noted(reasons(alone))) == (None, "no-blocks")
 
 
 def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
@@ -337,7 +348,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
         ):
             compared = Comparison(body, those, named=named)
             assert compared.needless is idle
-            assert (verdicts.needless(compared) is not None) is idle is verdicts.spoken(compared)["no_pulse_needed"]
+            assert (verdicts.needless(compared) is not None) is idle
         chosen = Comparison(body, plans).recommended
         assert chosen is not None
         assert ((chosen.scheme == "none"), len(chosen.pulses) == 0) == (needless, needless)
@@ -347,7 +358,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
         assert ("command-block" in usual(body)) is False
 
 
-def test_the_words_for_what_a_plan_gains_and_for_what_it_is_worse_in() -> None:
+def test_the_notes_on_what_a_plan_gains_and_what_it_is_worse_in() -> None:
     lines = []
     for best, other in (
         (SHIFTED, made("still", 0.0, 12.8, 0.01)),
@@ -359,7 +370,7 @@ def test_the_words_for_what_a_plan_gains_and_for_what_it_is_worse_in() -> None:
         (BOUND, fired(0.109)),
         (BOUND, fired(9.0, BLOCK)),
     ):
-        lines.append(" ".join(verdicts.hints(Comparison(best.spacecraft, (best, other)))))
+        lines.append(noted(alternatives(Comparison(best.spacecraft, (best, other)))))
     check_text("plan.hints", "\n".join(lines))
 
 

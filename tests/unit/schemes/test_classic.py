@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.builders import Outcome, channel, cross, fan, spinner, transverse
+from support.builders import Outcome, channel, codes, cross, fan, noted, spinner, transverse
 from support.cases import spread
 from support.checker import violations
 from support.feasible import feasible_by, left
@@ -21,7 +21,8 @@ from nutdamp.errors import SenselessOption
 from nutdamp.flight import propagation
 from nutdamp.physics import body as rigid_body
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import FourPulseOptions, Options
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Limits, Spacecraft
@@ -194,7 +195,7 @@ def test_what_one_pulse_is_chosen_and_what_ticks_and_max_pulses_leave() -> None:
     plan = feasible_by("one-pulse", spinner(degrees=6.0, channels=jet, limits=Limits(max_pulses=3)))
     assert len(plan.pulses) == 3
     assert 120.0 * rate_after(plan) == pytest.approx(plan.spacecraft.least_impulse - 3 * 30.0 * 0.1, rel=1e-3)
-    check_text("classic.max-pulses", "\n".join(remarks(plan)))
+    check_text("classic.max-pulses", noted(plan_notes(plan)))
 
 
 def test_one_pulse_allowed_where_more_are_needed_does_what_one_can() -> None:
@@ -291,7 +292,7 @@ def test_on_times_too_short_leave_a_remainder_and_say_so() -> None:
     plan = feasible_by("two-pulse", spinner(channels=cross(5.0, max_on_time=1.0)))
     assert {pulse.on_time for pulse in plan.pulses} == {1.0}
     assert left(plan).nutation > math.radians(1)
-    check_text("classic.too-short", "\n".join(remarks(plan)))
+    check_text("classic.too-short", noted(plan_notes(plan)))
 
 
 @spread("channels", [fan(3, 8.0), fan(5, 8.0), cross(8.0, max_on_time=2.0)], deep=2, ids=["3", "5", "±1±2"])
@@ -355,7 +356,7 @@ def test_fine_damping_leaves_nothing(A: float, C: float, spin: float) -> None:
         plan = feasible_by("four-pulse", spinner(A, C, spin, 4.0, channels=channels))
         if rate_after(plan) > 1e-12:  # one weak channel may not be done within the horizon
             assert plan.pulses.end > plan.spacecraft.horizon - 1.1 * plan.spacecraft.body_period
-            assert any("remain" in remark for remark in remarks(plan))
+            assert any(code.startswith("remains-") for code in codes(plan_notes(plan)))
         else:
             assert left(plan).nutation < NANODEGREE
             assert len(plan.pulses) == 1 or plan.pulses.pulses[-1].on_time < plan.pulses.pulses[0].on_time

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import places, reference
-from support.builders import aimed, channel, cross, spinner
+from support.builders import aimed, channel, codes, cross, noted, one_of, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.spinners import FILE, commanded, flown_by_reference, some_body
@@ -217,7 +217,7 @@ def test_a_forbidden_cone_is_passed_in_blocks_by_way_points() -> None:
     middle = straight.momentum / np.linalg.norm(straight.momentum) + straight.target_axis
     keep = Keep("Earth", middle / np.linalg.norm(middle), least=math.radians(1.5))
     plan = planned(replace(straight, keep=(keep,)))
-    assert any("way point" in note for note in plan.pulses.notes)
+    assert "goes-round" in codes(plan.pulses.notes)
     assert aspects(plan.flight)[0].kept
     assert len(plan.pulses.blocks) > 1
     _, starts = flown_by_reference(plan.spacecraft, plan.pulses.blocks)
@@ -288,23 +288,32 @@ def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
         search = BlockSearch(body, body.channels, body.commands)
         best, plan = search.best(1), planned(body, ONE, met=False)
         flights = [search.flown(found) for found in best]
-        assert "no other single block does better in closed form" in scope_note(search, flights[0], first=True)
-        assert "no other" not in scope_note(search, flights[-1], first=False)
+        assert scope_note(search, flights[0], first=True).code == "blocks-compared"
+        assert scope_note(search, flights[-1], first=False).code == "blocks-flown"
         assert plan.pulses.blocks == min(flights, key=lambda flight: flight.rank).sequence.blocks
-        assert (plan.pulses.blocks == best[0].blocks) <= ("no other single block" in plan.pulses.notes[0])
+        assert (plan.pulses.blocks == best[0].blocks) <= (plan.pulses.notes[0].code == "blocks-compared")
 
 
 @pytest.mark.weekly
 def test_ticks_are_superseded_by_the_steps_of_commands_and_a_note_says_so_where_they_differ() -> None:
     free, ticked = planned(a_turn()), planned(a_turn(tick=0.0173))
     assert ticked.pulses.blocks == free.pulses.blocks
-    assert any("limits.tick = 0.0173 s is not kept" in note for note in ticked.pulses.notes)
+    assert one_of(ticked.pulses.notes, "tick-not-kept")["tick_s"] == 0.0173
     body = a_turn(tick=0.01)
     assert body.commands is not None
     alike = replace(body, commands=replace(body.commands, delay_step=0.02, widths=np.array([0.2, 0.3])))
-    assert not any("tick" in note for note in planned(alike, met=False).pulses.notes)
+    assert "tick-not-kept" not in codes(planned(alike, met=False).pulses.notes)
 
 
+CURES = (
+    "more-blocks",
+    "finer-delay-step",
+    "finer-widths",
+    "longer-horizon",
+    "more-pulses",
+    "larger-count",
+    "finer-commands",
+)
 COARSE = read_spacecraft(
     FILE.replace("delay_step: 2 ms", "delay_step: 200 ms").replace(
         "{step: 10 ms, min: 100 ms, max: 500 ms}", "[0.1, 0.3]"
@@ -322,7 +331,7 @@ def test_blocks_that_miss_say_what_would_help(key: str, most: tuple[float, float
     """A step of the delay is 0.2 s × 12 rpm = 14.4° of heading, on a way of 8° a move of 2°; others comply."""
     body = replace(COARSE, requirement=within(*most))
     plan = planned(replace(body, limits=Limits(horizon=horizon or 1200.0)), ONE, met=not key)
-    cures = [note for note in plan.pulses.notes if note.startswith("to leave less: ")]
+    cures = [entry for entry in plan.pulses.notes if entry.code in CURES]
     assert plan.meets_requirement == (not key) == (not cures)
     if key:
-        check_text(f"blocks.cure-{key}", "\n".join(cures))
+        check_text(f"blocks.cure-{key}", noted(cures))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -12,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import aimed, channel, cross, spinner
+from support.builders import aimed, channel, codes, cross, one_of, spinner
 from support.cases import deep, spread, weekly
 from support.golden import refused
 
+from nutdamp.common.results import Value
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.flight.verification import verify
@@ -235,19 +235,19 @@ def test_a_train_of_requested_length_closes_on_a_body_of_three_moments(
     assert [pulse.on_time for pulse in plan.pulses.pulses[-15:]] == pytest.approx([on_time] * 15)  # the train
 
 
-def said_of(made: Schedule) -> list[float]:
-    """The times in s in what is said of commands that are not equal."""
-    notes = [note for note in made.notes if note.startswith("equal in impulse")]
-    return [float(time) for note in notes for time in re.findall(r"([0-9.]+) s", note)]
+def unequal(made: Schedule) -> list[Value]:
+    """The shortest and the longest of commands that are not equal, s, as a note has them."""
+    values = one_of(made.notes, "unequal-commands")
+    return [values["shortest_s"], values["longest_s"]]
 
 
 @spread("feed", [{"cold": Cold(0.8, 4.0)}, {"tank": Tank(0.02, 22e5, 8e5, 1.0)}], deep=1, ids=["cold", "tank"])
 def test_a_train_says_where_equal_impulses_are_not_equal_commands(feed: dict[str, Any]) -> None:
     made = planning.plan(replace(TO_TURN, **feed), "rhumb-line").pulses
     lengths = [pulse.loaded[1] for pulse in made]
-    assert said_of(made) == pytest.approx([min(lengths), max(lengths)], rel=0.01)
+    assert unequal(made) == pytest.approx([min(lengths), max(lengths)], rel=0.01)
     assert max(lengths) > 1.1 * min(lengths)
-    assert not said_of(planning.plan(TO_TURN, "rhumb-line").pulses)
+    assert "unequal-commands" not in codes(planning.plan(TO_TURN, "rhumb-line").pulses.notes)
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,7 @@ def test_of_a_train_that_lost_a_pulse_the_rest_is_compared(silenced: int) -> Non
     made = valve_commands.as_commands(body, Schedule(tuple(pulses)), silencing)
     train = [pulse.loaded[1] for pulse in made.pulses[2:]]
     assert len(train) == 3
-    assert said_of(made) == pytest.approx([min(train), max(train)], rel=1e-3)
+    assert unequal(made) == pytest.approx([min(train), max(train)], rel=1e-3)
     assert max(train) < 0.05
 
 

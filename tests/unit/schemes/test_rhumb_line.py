@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import reference
-from support.builders import Outcome, aimed, channel, cross, events, fan, off_target, spinner
+from support.builders import Outcome, aimed, channel, codes, cross, events, fan, off_target, one_of, spinner
 from support.cases import spread
 from support.feasible import feasible_by
 from support.golden import check_text
@@ -18,7 +18,8 @@ from support.golden import check_text
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.physics import precession
 from nutdamp.planning import plan as planning
-from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.catalogue import Options, RhumbLineOptions
 from nutdamp.schemes.rhumb_line import Train
 from nutdamp.spacecraft.equipment import Steerable
@@ -43,11 +44,14 @@ def train(spacecraft: Spacecraft, *, near: float = 1e-9, **options: Any) -> plan
     return plan
 
 
+TRAINS = ("great-circle-train", "rhumb-line-train")
+
+
 def equal(plan: planning.Plan) -> tuple[Any, ...]:
     """The pulses that are said to be equal."""
-    count = re.search(r"([0-9]+) equal pulses", " ".join(remarks(plan)))
-    assert count
-    return plan.pulses.pulses[-int(count[1]) :]
+    (count,) = (entry.values["count"] for entry in plan_notes(plan) if entry.code in TRAINS)
+    assert isinstance(count, int)
+    return plan.pulses.pulses[-count:]
 
 
 def why_not(spacecraft: Spacecraft, **options: Any) -> str:
@@ -159,12 +163,12 @@ def test_pulses_that_damp_make_up_for_unequal_moments_where_the_width_is_given(
     body = spinner(moments=(105.0, 135.0, 180.0), degrees=degrees, channels=channels, limits=Limits(horizon=600.0))
     plan = train(aimed(body, turn, 45.0), on_time=on_time)
     assert {pulse.on_time for pulse in equal(plan)} == {on_time}
-    assert not any("without --on-time" in text for text in remarks(plan))
+    assert "fixed-length" not in codes(plan_notes(plan))
     cut = replace(plan, schedule=replace(plan.pulses, pulses=plan.pulses.pulses[:-1]))
     assert cut.flown is not None
     assert cut.left is not None
     off = math.degrees(max(cut.flown.nutation, cut.left.aim))
-    assert any(f"the end is off by {off:.3g}°" in text and "without --on-time" in text for text in remarks(cut))
+    assert one_of(plan_notes(cut), "fixed-length")["off_deg"] == pytest.approx(off)
 
 
 @spread("per_turn", [1, 2, 3], quick=1)
@@ -233,7 +237,7 @@ def test_a_fixed_sun_phase_is_longer_and_arrives_too() -> None:
     sun = body.direction_in_n(math.radians(40.0), math.radians(60.0))
     direct, rhumb = train(body), train(replace(body, goal=replace(body.goal, sun=sun)))
     assert rhumb.pulses.total_impulse > 1.02 * direct.pulses.total_impulse
-    check_text("rhumb.sun-phase", remarks(rhumb)[0])
+    assert [codes(plan_notes(plan))[0] for plan in (direct, rhumb)] == [*TRAINS]
 
 
 @spread(("turns", "pulses", "torque", "fixed"), [(2, 2, 15, False), (3, 2, 15, True), (8, 6, 5, True)], deep=2)

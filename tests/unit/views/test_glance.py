@@ -16,7 +16,6 @@ from support.golden import check_text
 import nutdamp
 from nutdamp.planning.decision import Comparison, decide
 from nutdamp.spacecraft.model import Requirement, Spacecraft
-from nutdamp.views import verdicts
 from nutdamp.views.glance import LINES, ROWS, WIDTH, glance
 from nutdamp.views.text import short_angle
 
@@ -26,7 +25,7 @@ CONFIGS = sorted(path.stem for path in places.CONFIGS.glob("*.yaml"))
 def screen(compared: Comparison) -> list[str]:
     console = Console(width=WIDTH, file=io.StringIO(), markup=False, emoji=False, highlight=False)
     with console.capture() as captured:
-        console.print(glance(compared, decide(compared), verdicts.reason(compared)))
+        console.print(glance(compared, decide(compared)))
     return [line.rstrip() for line in captured.get().splitlines()]
 
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 from support import reference
-from support.builders import Outcome, channel, cross, spinner
+from support.builders import Outcome, channel, cross, noted, spinner
 from support.cases import deep, spread, weekly
 from support.golden import check_text
 from support.optimal import as_found, flies, random_layout
 
-from nutdamp.planning.decision import infeasibility, remarks
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import plan_notes
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions, Options
 from nutdamp.schemes.optimal.linear_program import Program
@@ -121,7 +122,7 @@ def test_real_thrusters_keep_their_limits_and_leave_nothing(A: float, C: float, 
 def test_few_pulses_are_preferred_to_the_last_tenth_of_a_percent_and_the_plan_carries_its_proof() -> None:
     made = flies(spinner(channels=REAL))
     assert len(made.pulses) <= 12
-    check_text("plan.proof", "\n".join(remarks(made)))
+    check_text("plan.proof", noted(plan_notes(made)))
 
 
 @pytest.mark.deep

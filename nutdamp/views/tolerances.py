@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from rich.console import RenderableType
+from rich.table import Table
 from rich.text import Text
 
-from nutdamp.errors import listed
-from nutdamp.montecarlo.inputs import DispersedInput, together
+from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
 from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.layout import columns
+from nutdamp.views.layout import columns, facts
 from nutdamp.views.text import quantity
 
 SHOWN = {
@@ -51,7 +52,7 @@ class BudgetRow(NamedTuple):
     bias: bool
 
 
-def budget_rows(study: Study) -> list[BudgetRow]:
+def _budget_rows(study: Study) -> list[BudgetRow]:
     """The inputs that count most, the largest first, and the others together; none where nothing varies."""
     inputs, first = study.model.inputs.drawn, study.first_order
     if not any(entry.sigma for entry in inputs):
@@ -88,45 +89,42 @@ def _named(entries: list[DispersedInput]) -> tuple[str, str]:
 
 
 def tolerance_budget(results: Results) -> list[RenderableType]:
-    """Shares of the variance by input, by first order and by the cases, and which tolerance dominates."""
-    study, rows = results.study, budget_rows(results.study)
+    """Shares of the variance by input, by first order and by the cases, and the tolerances that count most."""
+    study, rows = results.study, _budget_rows(results.study)
     if not rows:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
-    inputs, first = study.model.inputs.drawn, study.first_order
-    sampled, budgeted = results.shares, budgeted_outputs(study)
-    shares = {output: first.shares(output) for output, _ in budgeted}
-    aim = "H shift" if study.model.spacecraft.goal.axis is None else "H error"
-    heads = ("nutation\ndeg", "linear\n%", "cases\n%", f"{aim}\ndeg", "linear\n%", "cases\n%")
+    inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
+    outputs = dict(budgeted_outputs(study))
+    heads = (head for label in outputs.values() for head in (f"{label}\ndeg", "linear\n%", "cases\n%"))
     table = columns("input\n", "one sigma\nor bias", *heads)
     for row in rows:
         cells = []
-        for (output, _), effect in zip(budgeted, row.effects, strict=True):
+        for output, effect in zip(outputs, row.effects, strict=True):
             seen = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
-            both = ("bias", "") if row.bias else (_share(float(shares[output][row.inputs].sum())), _share(seen))
-            cells += [f"{math.degrees(effect):.3g}", *both]
+            linear = float(first.shares(output)[row.inputs].sum())
+            cells += [f"{math.degrees(effect):.3g}", *(("bias", "") if row.bias else map(_percent, (linear, seen)))]
         name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
         table.add_row(Text(name, style="dim"), size, *cells)
-    remainder = [
-        1.0 - math.fsum(fractions[output] for fractions in sampled.values()) if first.sigma(output) > ROUNDING else 0.0
-        for output, _ in budgeted
-    ]
-    texts = [part for share in remainder for part in ("", "", _share(max(share, 0.0)))]
-    table.add_row(Text("in combination", style="dim"), "", *texts)
-    count = min(results.done, EARLY)
+    rest = (1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs)
+    shares = (max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True))
+    table.add_row(Text("interactions", "dim"), "", *(cell for share in shares for cell in ("", "", _percent(share))))
     note = (
-        f"Effect of each input alone on the nutation and on the {budgeted[1][1]}, and its share of the variance of the "
-        f"residual vector (two components), whose length the angle is: linear by derivatives of the flight, cases as "
-        f"the first {count:,} cases show it (first-order Sobol index), an estimate: its column need not add to 100 %."
+        "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
+        f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
+        "may not total 100 %."
     )
     if study.model.groups:
-        note += " Correlated inputs vary together, and their effect is the root mean square of what they do together."
-    return [Text("Tolerance budget", style="bold"), table, Text(note, style="dim"), *_dominating(results)]
+        note += " Correlated inputs vary together: their effect is the root mean square of the group."
+    return [Text("Tolerance budget", "bold"), table, Text(note, "dim"), *map(Text, main_causes(results))]
 
 
-def _dominating(results: Results) -> list[RenderableType]:
-    """The tolerances of the file with the largest shares, by name."""
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f}" if share >= 5e-4 else "0"
+
+
+def main_causes(results: Results) -> Iterator[str]:
+    """The tolerances of the file with the largest shares of each residual."""
     first = results.study.first_order
-    lines: list[RenderableType] = []
     for output, name in budgeted_outputs(results.study):
         sums: dict[str, float] = {}
         shares = first.shares(output)
@@ -136,15 +134,42 @@ def _dominating(results: Results) -> list[RenderableType]:
             sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
         ranked = sorted(sums.items(), key=lambda item: -item[1])
         leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
-        leading = leading or [ranked[0][0]]
-        verb = "dominates" if len(leading) == 1 else "dominate"
         if any(sums.values()):
-            lines.append(Text.assemble(f"The {name}: ", (listed(leading), "bold"), f" {verb}."))
-    return lines
+            yield f"Main causes of {name}: {', '.join(leading or [ranked[0][0]])}."
 
 
-def _share(share: float) -> str:
-    return f"{100 * share:.1f}" if share >= 5e-4 else "0"
+def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
+    """The outputs of the tolerance budget, and their names for people."""
+    first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
+    return (first.value, first.label), (second.value, second.label)
+
+
+def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> Table:
+    """Every input of one case: nominal, drawn, and the deviation."""
+    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
+    for entry in drawn:
+        (unit, scale), draw = unit_of_people(entry), draws[entry.name]
+        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
+        off = of_nominal(entry, draw, "+.4g") if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
+        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
+        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
+    return inputs
+
+
+def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
+    """The unit of an input for people, and the factor to it."""
+    return SHOWN.get(entry.unit, (entry.unit, 1.0))
+
+
+def unused_table(unused: Iterable[Unused]) -> Table:
+    """Inputs without effect; names that share a reason are listed together."""
+    table = facts()
+    reasons: dict[str, list[str]] = {}
+    for name, reason in unused:
+        reasons.setdefault(reason, []).append(in_words(name))
+    for reason, names in reasons.items():
+        table.add_row(", ".join(names), reason)
+    return table
 
 
 def in_words(name: str) -> str:
@@ -159,27 +184,21 @@ def size_text(entry: DispersedInput) -> str:
     """One sigma, or the bias, in the form of the file."""
     if entry.unit == "":
         return of_nominal(entry, entry.sigma or entry.size, ".3g")
-    unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
+    unit, scale = unit_of_people(entry)
     return quantity(scale * (entry.sigma or entry.size), unit, 3)
 
 
 def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) -> str:
     """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
-    share = relative and entry.nominal != 0.0
-    unit, scale = SHOWN.get(entry.unit, (entry.unit, 1.0))
-    value = 100.0 * entry.size / abs(entry.nominal) if share or (unit == "" and entry.nominal) else scale * entry.size
+    share = entry.nominal != 0.0 and (relative or entry.unit == "")
+    unit, scale = ("%", 100.0 / abs(entry.nominal)) if share else unit_of_people(entry)
+    value = scale * entry.size
     if down and value > 0.0:
         step = 10.0 ** (math.floor(math.log10(value)) - 2)
         value = step * math.floor(value / step * (1.0 + 1e-12))
-    return quantity(value, "%" if share or (unit == "" and entry.nominal) else unit, 3).strip()
+    return quantity(value, unit, 3).strip()
 
 
 def of_nominal(entry: DispersedInput, value: float, form: str) -> str:
     """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
     return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"
-
-
-def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The outputs of the tolerance budget, and their names for people."""
-    first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
-    return (first.value, first.label), (second.value, second.label)

@@ -1,0 +1,380 @@
+"""Notes on plans and decisions, as data: codes of sentences with their values.
+
+The sentences stand in ``guide/notes.md``; `nutdamp.views.notes` makes texts of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from nutdamp.common.numerics import down
+from nutdamp.common.results import Note, note
+from nutdamp.flight import end_state
+from nutdamp.flight.end_state import Aspect, at_start
+from nutdamp.flight.propagation import Flight
+from nutdamp.planning.decision import TELLING, Comparison, Decision, infeasibility
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Gain, Ground, Obstacle, Standing
+from nutdamp.schemes import catalogue
+from nutdamp.schemes.catalogue import OPTIMAL
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.requirements import Part
+
+RPM = 30.0 / math.pi
+"""Turns a minute of one rad/s."""
+
+
+def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
+    """Notes on a plan, those of its scheme first, or the reason for the lack of a schedule.
+
+    Without ``cones`` broken ones are named elsewhere.
+    """
+    if not plan.feasible:
+        return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
+    notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
+    if plan.flown is not None and len(plan.pulses):
+        notes += [*_bounds(plan), *_remainder(plan), *_asymmetry(plan), *_fixed_length(plan)]
+        notes += [broken_cone(aspect) for aspect in plan.aspects if cones and not aspect.kept]
+    return tuple(entry.of(plan.scheme) for entry in notes)
+
+
+def _bounds(plan: Plan) -> Iterator[Note]:
+    """Possible saving by another schedule."""
+    bounds = plan.pulses.bounds
+    if bounds is None or (bounds.unit == "kg" and plan.pulses.propellant is None):
+        return
+    spent = plan.pulses.cost_in(bounds.unit)
+    scale, unit = (1e3, "g") if bounds.unit == "kg" else (1.0, "N m s")
+    # Where the nutation damps itself, waiting makes any cost small: the least of ideal pulses says nothing.
+    if bounds.first_order is not None and bounds.first_order > 0.0 and plan.spacecraft.growth >= 0.0:
+        least, gap = scale * bounds.first_order, 100.0 * (spent / bounds.first_order - 1.0)
+        gap = 0.0 if abs(gap) < 1e-6 else gap
+        yield note(
+            "small-angle-bound", cost=scale * spent, unit=unit, bound=least, within_s=bounds.within, gap_percent=gap
+        )
+    if bounds.rigorous is not None and bounds.rigorous > 0.0:
+        yield note("proven-bound", bound=down(scale * bounds.rigorous), unit=unit)
+    if bounds.keeping is not None:
+        yield note("cost-of-keeping", keeping=scale * bounds.keeping, unit=unit)
+
+
+def _remainder(plan: Plan) -> Iterator[Note]:
+    """Reason for remaining nutation."""
+    left = plan.flight.residual.nutation
+    if left < TELLING or plan.options.uncorrected:
+        return
+    if plan.spacecraft.goal.spin is not None and plan.meets_requirement:
+        yield note("remains-allowed", nutation_deg=math.degrees(left))
+    else:
+        yield remaining(plan)
+
+
+def remaining(plan: Plan) -> Note:
+    """Nutation that remains, and the obstacle to less of it."""
+    hindrance, left = plan.hindrance, math.degrees(plan.flight.residual.nutation)
+    obstacle = hindrance.obstacle
+    if obstacle is Obstacle.UNPLANNED_DISTURBANCES:
+        return note("remains-unplanned", nutation_deg=left)
+    if obstacle is Obstacle.STEADY_TILT:
+        return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(hindrance.steady_tilt))
+    if obstacle is Obstacle.MAX_PULSES:
+        return note("remains-max-pulses", nutation_deg=left, pulses=plan.spacecraft.limits.max_pulses)
+    if obstacle is Obstacle.RESOLUTION:
+        return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(hindrance.rounding))
+    if obstacle is Obstacle.LIMITS:
+        certain, possible = (", ".join(keys) or "none" for keys in (hindrance.binding, hindrance.suspected))
+        return note("remains-limits", nutation_deg=left, certain=certain, possible=possible)
+    return note("remains-scheme", nutation_deg=left)
+
+
+def _asymmetry(plan: Plan) -> Iterator[Note]:
+    """Nutation left by the same pulses if I1 and I2 were their mean."""
+    without, inertia = plan.left_if_symmetric, plan.spacecraft.inertia
+    if without is not None:
+        first, second, _ = inertia.moments
+        yield note(
+            "unequal-moments",
+            inequality_percent=100.0 * abs(first - second) / inertia.A,
+            nutation_deg=math.degrees(plan.flight.residual.nutation),
+            symmetric_deg=math.degrees(without),
+        )
+
+
+def _fixed_length(plan: Plan) -> Iterator[Note]:
+    """Note on equal pulses of a given length, which do not end exactly."""
+    options, body, left = plan.options, plan.spacecraft, plan.left
+    simple = body.inertia.symmetric and not body.disturbances and body.growth == 0.0
+    if left is None or simple or not options.equal or options.resizable or options.uncorrected:
+        return
+    off = float(requirements.missed(body, left.nutation, left.aim))
+    if off >= TELLING:
+        yield note("fixed-length", off_deg=math.degrees(off))
+
+
+def broken_cone(aspect: Aspect) -> Note:
+    """A cone about a direction that the spin axis breaks."""
+    keep = aspect.keep
+    angle, at, limit = (
+        (aspect.least, aspect.least_at, keep.least)
+        if aspect.too_near
+        else (aspect.largest, aspect.largest_at, keep.most)
+    )
+    return note(
+        "cone-broken",
+        angle_deg=math.degrees(angle),
+        direction=keep.name,
+        at_s=at,
+        limit_deg=math.degrees(limit),
+    )
+
+
+TURNED = math.radians(0.1)
+"""Turn of H, rad, from which it is mentioned."""
+
+
+def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note]:
+    """Notes beside the verdict; ``looped``: it is the flight of a closed loop, which goes on firing."""
+    plan, body, final = decision.plan, decision.plan.spacecraft, decision.flight.residual
+    if decision.undispersed and requirements.judged(body):
+        yield note("tolerances-not-checked")
+    if code := ideal_code(plan):
+        yield note(code, scheme=plan.scheme)
+    if looped:
+        return
+    if not plan.commandable:
+        yield note("not-commandable", scheme=plan.scheme)
+    limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
+    if not limited and final.momentum_shift > TURNED:
+        yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
+    change = decision.final.spin - body.spin
+    if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
+        yield note("spin-change", scheme=plan.scheme, spin_change_rad_s=change)
+    yield from _growing(decision)
+    yield from _unaided(decision)
+    if body.loop is not None:
+        yield note("loop-not-judged")
+
+
+def ideal_code(plan: Plan) -> str:
+    """Code of the note on impulses which take no time; empty where the plan fires none."""
+    torquer = plan.spacecraft.torquer
+    if not plan.pulses.idealised:
+        return ""
+    if torquer is not None and plan.spacecraft.steerable is None:
+        return "ideal-torquer-assumed"
+    return "ideal-torque-missing" if torquer is not None and torquer.torque is None else "ideal-impulses"
+
+
+def _limit_of(body: Spacecraft, part: Part) -> float | None:
+    most = next((bound.most for bound in requirements.required(body) if bound.part is part), None)
+    return None if most is None else math.degrees(most)
+
+
+def _growing(decision: Decision) -> Iterator[Note]:
+    """Time for which nutation that grows keeps the requirement after the last pulse."""
+    if not len(decision.plan.pulses):
+        return
+    body, flight = decision.plan.spacecraft, decision.flight
+    cases = decision.cases
+    left = decision.final.nutation if cases is None else cases.levels[Part.NUTATION]
+    again = requirements.outgrown(body, left)
+    if again and left > TELLING:
+        after = flight.schedule.end if flight.until is None else flight.until
+        limit = _limit_of(body, Part.NUTATION)
+        yield note("grows-again", after_s=after, left_deg=math.degrees(left), limit_deg=limit, lasting_s=again)
+
+
+def _unaided(decision: Decision) -> Iterator[Note]:
+    """Time up to which, or from which on, the requirement is met without a pulse."""
+    body = decision.plan.spacecraft
+    if not requirements.only_nutation(body):
+        return
+    now, limit = math.degrees(body.nutation), _limit_of(body, Part.NUTATION)
+    idle, damped = requirements.outgrown(body, body.nutation), requirements.subsides(body)
+    if damped is not None and damped < body.horizon:
+        yield note("met-without-pulse-from", from_s=damped, nutation_deg=now, limit_deg=limit)
+    if idle:
+        yield note("met-without-pulse-until", until_s=idle, nutation_deg=now, limit_deg=limit)
+
+
+def comparison_warnings(compared: Comparison, *, cones: bool = True) -> Iterator[Note]:
+    """Requirements that the recommended plan misses, the causes, and the cones that the spin axis breaks.
+
+    Without ``cones`` a verdict names those that are broken.
+    """
+    chosen = compared.recommended
+    if chosen is None:
+        return
+    yield from _missed(chosen, compared)
+    broken = [aspect for aspect in chosen.aspects if not aspect.kept]
+    yield from (broken_cone(aspect).of(chosen.scheme) for aspect in broken if cones)
+    if broken:
+        keeping = [plan.scheme for plan in compared.plans if plan.feasible and plan.kept]
+        yield note("plans-keep-cones", schemes=", ".join(keeping) or "none")
+    for aspect in at_start(compared.spacecraft):
+        if not aspect.kept:
+            yield Note("cone-broken-at-start", tuple(item for item in broken_cone(aspect).items if item[0] != "at_s"))
+    others = [plan.scheme for plan in compared.plans if plan.feasible and not plan.commandable]
+    better = [scheme for scheme in others if compared.meets(compared[scheme])]
+    if better and chosen.commandable and not compared.meets(chosen):
+        yield note("blocks-cannot", schemes=", ".join(better))
+
+
+def _missed(chosen: Plan, compared: Comparison) -> Iterator[Note]:
+    """Requirements that the recommended plan misses, and the causes."""
+    recommendation = compared.recommendation
+    if recommendation.standing is Standing.COMPLIES:
+        return
+    share = compared.shares.get(chosen)
+    if share is not None and not share.met and chosen.standing is not Standing.MISSES:
+        if chosen.kept is False:  # the cones are the reason
+            return
+        if share.met is None:
+            yield note("undecided-cases")
+        else:
+            schemes = ", ".join(plan.scheme for plan in compared.plans if plan in compared.shares)
+            yield note("too-few-cases", schemes=schemes, required_share=100.0 * share.probability)
+        return
+    left = chosen.left
+    assert left is not None
+    for bound in chosen.shortfalls:
+        if bound.part is Part.SPIN:
+            goal = chosen.spacecraft.goal.spin or 0.0
+            yield note("spin-missed", scheme=chosen.scheme, spin_rpm=RPM * left.spin, goal_rpm=RPM * goal)
+            continue
+        yield note(
+            "requirement-missed" if bound.required else "not-damped",
+            scheme=chosen.scheme,
+            left_deg=math.degrees(requirements.left_of(bound.part, left, chosen.spacecraft)),
+            part=bound.part.label,
+            limit_deg=math.degrees(bound.most),
+        )
+    yield from _obstacles(chosen, compared)
+
+
+def _obstacles(plan: Plan, compared: Comparison) -> Iterator[Note]:
+    """Causes that prevent a smaller residual; the best cure first."""
+    body, hindrance = plan.spacecraft, plan.hindrance
+    parts = {bound.part for bound in plan.shortfalls}
+    if body.disturbances and not plan.options.with_disturbances:
+        aware = compared.with_disturbances
+        if aware is None:
+            yield note("unplanned-disturbances")
+        elif aware.standing is Standing.COMPLIES:
+            yield note("disturbances-helped", scheme=aware.scheme)
+        else:
+            yield note("disturbances-not-helped")
+    if Part.NUTATION in parts and hindrance.obstacle is not Obstacle.UNPLANNED_DISTURBANCES:
+        if hindrance.obstacle in (Obstacle.LIMITS, Obstacle.SCHEME):
+            yield note(
+                "pulses-at-limits",
+                given_Nms=plan.pulses.total_impulse,
+                needed_Nms=body.least_impulse,
+                end_s=plan.pulses.end,
+                horizon_s=body.horizon,
+                limits=", ".join((*hindrance.binding, *hindrance.suspected)) or "none",
+            )
+        else:
+            yield remaining(plan).of(plan.scheme)
+    if Part.DISTANCE in parts and plan.scheme not in (*catalogue.POINTING, *catalogue.COMMANDED):
+        yield note("scheme-does-not-turn", scheme=plan.scheme, schemes=", ".join(catalogue.POINTING))
+    if optimal_untried(compared) and parts != {Part.SPIN}:
+        yield note("optimal-not-compared")
+    elif any(channel.damps for channel in body.channels) and requirements.required(body) and parts != {Part.SPIN}:
+        yield note("try-trade")
+
+
+def optimal_untried(compared: Comparison) -> bool:
+    """True where there are channels that optimal can fire, and it was not compared."""
+    able = any(channel.damps for channel in compared.spacecraft.channels)
+    return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
+
+
+GAINS = {
+    Gain.STEADIER: "smaller-shift",
+    Gain.SIMPLER: "fewer-pulses",
+    Gain.SOONER: "ends-sooner",
+    Gain.REAL: "real-widths",
+    Gain.COMMANDED: "as-blocks",
+}
+
+
+def alternatives(compared: Comparison) -> Iterator[Note]:
+    """Plans that the reader may prefer: much better in some way for little more, each once, with its figures."""
+    recommendation = compared.recommendation
+    chosen, others = recommendation.plan, dict[int, tuple[Gain, Plan]]()
+    for gain, plan in recommendation.alternatives.items():
+        others.setdefault(id(plan), (gain, plan))
+    unit, scale, shown = ("kg", 1e3, "g") if recommendation.by_propellant else ("N m s", 1.0, "N m s")
+    for gain, other in others.values():
+        assert chosen is not None
+        assert chosen.flown is not None
+        assert other.flown is not None
+        yield note(
+            GAINS[gain],
+            scheme=other.scheme,
+            pulses=len(other.pulses),
+            than_pulses=len(chosen.pulses),
+            cost=scale * other.pulses.cost_in(unit),
+            than_cost=scale * chosen.pulses.cost_in(unit),
+            unit=shown,
+            end_s=other.pulses.end,
+            than_end_s=chosen.pulses.end,
+            axis_error_deg=math.degrees(other.flown.axis_error),
+            than_axis_error_deg=math.degrees(chosen.flown.axis_error),
+        )
+
+
+TIES = {
+    Ground.PULSES: "tie-pulses",
+    Ground.DELTA_V: "tie-delta-v",
+    Ground.SHIFT: "tie-shift",
+    Ground.END: "tie-end",
+    Ground.NOMINAL: "tie-nominal",
+}
+
+
+def reasons(compared: Comparison) -> Iterator[Note]:
+    """Reason for the recommended plan, or for none."""
+    recommendation, body = compared.recommendation, compared.spacecraft
+    ground, count = recommendation.ground, recommendation.count
+    if recommendation.plan is None:
+        if any(plan.feasible for plan in compared.plans):
+            yield note("no-blocks")
+            return
+        damped = requirements.subsides(body) if requirements.only_nutation(body) else None
+        yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
+        if optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels)):
+            yield note("optimal-not-tried")
+        return
+    if ground is Ground.ONLY:
+        yield note("as-requested" if len(compared.plans) == 1 else "only-plan")
+        return
+    if ground is Ground.CASES:
+        yield note("most-cases", count=count)
+        return
+    if recommendation.standing is Standing.COMPLIES:
+        if recommendation.plan.kept is False:
+            yield note("cheapest-at-end", count=count)
+        elif not requirements.required(body):
+            yield note("damps-at-least", count=count)
+        else:
+            yield note("least-propellant" if recommendation.by_propellant else "least-impulse", count=count)
+    elif ground is Ground.NEAREST:
+        yield note("nearest", count=count)
+    else:
+        yield note("least-left", count=count)
+    if ground in TIES:
+        yield note(TIES[ground])
+
+
+def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
+    """Difference between the impulse sum (17) and real widths at the end, where it exceeds the tolerance."""
+    for apart in end_state.deviations(impulses, flown):
+        if apart.part is Part.SPIN:
+            yield note("models-differ-in-spin", difference_rad_s=apart.error, limit_rad_s=apart.most)
+            continue
+        difference, most = math.degrees(apart.error), math.degrees(apart.most)
+        yield note("models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most)

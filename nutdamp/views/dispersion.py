@@ -1,0 +1,422 @@
+"""Results of ``disperse``: percentiles, requirement, cones, and cases; the tolerance budget is in `tolerances`.
+
+The files of loops and the screens of other commands use the same parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.files.samples import OUTPUT_COLUMNS
+from nutdamp.flight.end_state import aspects
+from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
+from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
+from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
+from nutdamp.spacecraft.model import Keep, Spacecraft
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.views import verdicts
+from nutdamp.views.end_tables import bounds_text, end_table, requested
+from nutdamp.views.layout import brief
+from nutdamp.views.plan_json import final_json, heading, target_json
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.text import degrees, digits
+from nutdamp.views.tolerances import (
+    budgeted_outputs,
+    in_words,
+    inputs_table,
+    main_causes,
+    tolerance_budget,
+    unused_table,
+)
+
+if TYPE_CHECKING:
+    from nutdamp.control_loop.dispersion import LoopResults
+
+
+PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
+LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "99.7")
+"""Their names, and those on the default screen."""
+
+BOTH = "screen full"
+"""The default screen, and that of all values."""
+
+NAMES = (
+    *((part.label, "deg", 1.0) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
+    ("spin change", "mrad/s", 1e3),
+    ("propellant", "g", 1e3),
+)
+"""Names of `OUTPUTS` for people, their units, and the factors to these from the units of files."""
+
+NOTHING = 1e-9
+"""Values, in these units, below which a number is rounding."""
+
+EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
+"""Note on a case whose tank runs empty."""
+
+
+def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
+    """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
+    head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
+    notes, case = list(main_causes(results)), ""
+    if _varies(results):
+        case = f" · {_again(results)} (worst)"
+    if unused := results.study.model.inputs.unused:
+        notes.append(f"Dispersions without effect: {', '.join(in_words(entry.name) for entry in unused)}.")
+    return brief(head, _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
+
+
+def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:
+    """All tables of ``disperse``; ``nominal``: the nominal case, where its end is to be shown too."""
+    body = results.study.model.spacecraft
+    parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results).screen("full")]
+    parts.append(angles_note(body))
+    if not results.exact:
+        parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
+    if nominal is not None:
+        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
+    parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
+    parts += [Text(), *tolerance_budget(results)]
+    if worst and _varies(results):
+        cases = _cases(results.study, _worst(results, worst))
+        parts += [Text(), Text(cases.title, "bold"), cases.screen("full")]
+        parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {_again(results)}", "dim"))
+    unused = results.study.model.inputs.unused
+    if unused:
+        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(unused)]
+    return Group(*parts)
+
+
+def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
+    """Percentiles, requirement, tolerance budget and the ``worst`` cases; angles in degrees, else SI.
+
+    ``shares`` are those of the nutation, with those of the other outputs below their names; ``effect_deg`` is that on
+    the nutation of one sigma of an input alone (or all of a bias). Of inputs in ``correlation`` each share is the
+    increment over those before it, and their sum that of all of them. ``final`` is the end of the nominal case.
+    """
+    study, body = results.study, results.study.model.spacecraft
+    nominal = study.outputs_of({}).tolist()
+    return {
+        **heading(body),
+        "scheme": scheme,
+        "samples": results.done,
+        "requested": results.requested,
+        "interrupted": results.done < results.requested,
+        "seed": study.seed,
+        "redrawn": results.redrawn,
+        "final": final_json(study.nominal),
+        "target": target_json(body),
+        "exact_percentiles": results.exact,
+        "percentiles": {
+            column: percentiles_json(column, value, results.distribution(output))
+            for column, value, output in zip(OUTPUT_COLUMNS, nominal, OUTPUTS, strict=True)
+        },
+        "requirement": requirement_of(results),
+        **cones_json(results),
+        **({"tank_empty_fraction": results.emptied / results.done} if body.tank else {}),
+        "shares": list(_shares(results)),
+        **correlation_json(body),
+        "unused": [entry.name for entry in study.model.inputs.unused],
+        "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
+        "worst": _worst(results, worst),
+    }
+
+
+def _worst(results: Results, count: int) -> list[dict[str, Any]]:
+    study, cases = results.study, results.worst.cases[:count].tolist()
+    return [case_json(study, case, study.draws_of(case)) for case in cases]
+
+
+def _title(results: Results, scheme: str) -> Text:
+    study = results.study
+    how = "ideal impulses" if model_name([study.model.schedule]) == IDEAL_IMPULSES else "full simulation"
+    drawn = f"cases: {results.done:,}, seed {study.seed}"
+    if results.redrawn:
+        drawn += f", unphysical and drawn again: {results.redrawn:,}"
+    return Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, {how}; {drawn}")
+
+
+def _again(results: Results) -> str:
+    """Options that show the worst case alone."""
+    return f"--seed {results.study.seed} --case {results.worst.cases[0] + 1}"
+
+
+def _varies(results: Results) -> bool:
+    """True where any input varies from case to case."""
+    return any(entry.sigma for entry in results.study.model.inputs.drawn)
+
+
+# --- percentiles
+
+
+def percentiles_json(
+    column: str, nominal: float | None, distribution: Distribution | None, *, lower: bool = False
+) -> dict[str, float | None]:
+    """The ``nominal`` value of an output and its distribution, in the unit of its ``column``; nulls where unknown.
+
+    ``lower``: the values that so many cases do not fall short of.
+    """
+    spread: list[float | None] = [None] * (len(PERCENTS) + 2)
+    if distribution is not None:
+        shares = np.array(PERCENTS) / 100.0
+        levels = distribution.quantiles(1.0 - shares if lower else shares).tolist()
+        spread = [distribution.minimum, *levels, distribution.maximum]
+    values = zip(("nominal", "min", *LEVELS, "max"), (nominal, *spread), strict=True)
+    return {name: None if value is None else shown(column, value) for name, value in values}
+
+
+def _percentiles(results: Results) -> DataTable:
+    """One row an output: values by shares of the cases; where any are negative, lower ones in a row of their own."""
+    rows = []
+    nominal = results.study.outputs_of({}).tolist()
+    for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, NAMES, nominal, strict=True):
+        distribution, signs = results.distribution(output), [""]
+        if distribution is not None and distribution.minimum < 0.0:
+            signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
+        for sign in signs:
+            lower = sign == " ≥"
+            given = percentiles_json(column, plan, distribution, lower=lower)
+            values = {key: math.nan if value is None else scale * value for key, value in given.items()}
+            largest = max(abs(values["min"]), abs(values["max"]))
+            row = {key: None if math.isnan(value) else beside(value, largest) for key, value in values.items()}
+            if distribution is not None:  # the nominal value has digits of its own: other places show it alone
+                row["nominal"] = "0" if abs(values["nominal"]) < NOTHING else digits(values["nominal"], 4)
+            row[""], row["max"] = f"{name}{sign}, {unit}", row["min" if lower else "max"]
+            rows.append(row)
+    return DataTable("Percentiles", PERCENTILES, rows)
+
+
+PERCENTILES = (
+    Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
+    Column("", "nominal", "", itemgetter("nominal"), where=BOTH),
+    *(Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full") for key in LEVELS),
+    Column("", "max", "", itemgetter("max"), where=BOTH),
+)
+"""Columns of rows of texts: the name without a key, the values by the names of `percentiles_json`."""
+
+
+def shown(column: str, value: float) -> float:
+    """A value in the unit of its ``column``."""
+    return math.degrees(value) if column.endswith("_deg") else value
+
+
+def beside(value: float, largest: float) -> str:
+    """A number with the decimals that show four digits of the ``largest`` beside it."""
+    if largest < NOTHING:
+        return "0"
+    if not 1e-5 <= largest < 1e6:
+        return f"{value:.2e}"
+    text = f"{value:.{max(3 - math.floor(math.log10(largest)), 0)}f}"
+    return text if float(text) else text.lstrip("-")
+
+
+def angles_note(body: Spacecraft) -> Text:
+    """Note on the reference of the angles of H in dispersed cases."""
+    aim = "H at t = 0 with nominal values" if body.goal.axis is None else "the target"
+    note = f"Momentum shift: from H at t = 0 of the same case; axis error: from {aim}."
+    return Text(f"{note} The spin axis swings about H by the nutation.", style="dim")
+
+
+# --- requirement and cones
+
+
+def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
+    """The requirement, and the verdict on the number of cases that comply."""
+    share, probability = results.met_fraction, results.probability
+    if share is None:
+        return [Text("The file has no requirement to meet.")]
+    low, high = results.interval
+    required = requested(results.study.model.spacecraft)
+    verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
+    interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
+    text = Text.assemble(("Requirement ", "bold"), f"({required}) ", verdict, f"; 95 % interval {interval}.")
+    if results.meets_requirement and low < probability:
+        few = cases_to_show(probability)
+        hint = f" It takes at least {few:,}." if results.done < few else ""
+        level = verdicts.exact_percent(probability)
+        text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
+    return [text]
+
+
+def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
+    """The share of cases that comply beside the one required; None where nothing is."""
+    if results.met_fraction is None:
+        return None
+    low, high = results.interval
+    return {
+        "met_fraction": results.met_fraction,
+        "low": low,
+        "high": high,
+        "confidence": CONFIDENCE,
+        "probability": results.probability,
+        "met": results.meets_requirement,
+    }
+
+
+def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
+    """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
+    for keep, entry in _cones(results):
+        share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
+        bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
+        least, most, *alone = (degrees(math.radians(entry[key])) for key in bounds)
+        yield Text.assemble(
+            (f"Axis {bounds_text(keep)} from {keep.name} ", "bold"),
+            (f"broken in {share} of cases", "red" if entry["broken_fraction"] else "green"),
+            f"; {least} to {most} in all cases, {alone[0]} to {alone[1]} in the nominal one.",
+        )
+
+
+def cones_json(results: Results | LoopResults) -> dict[str, Any]:
+    """Number of cases that break each cone, and least and largest angle from it to the axis; nothing without cones."""
+    entries = [entry for _, entry in _cones(results)]
+    return {"aspects": entries} if entries else {}
+
+
+def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any]]]:
+    """Each cone with its entry in files; none before the first case."""
+    body = results.study.model.spacecraft
+    nominal = np.degrees(results.study.nominal_aspects).tolist() if results.done and body.keep else ()
+    for index, (keep, (least, largest)) in enumerate(zip(body.keep, nominal, strict=False)):
+        least_of_all, largest_of_all = np.degrees(results.aspects[index]).tolist()
+        entry = {"name": keep.name, "min_deg": math.degrees(keep.least), "max_deg": math.degrees(keep.most)}
+        entry["broken_fraction"] = float(results.broken[index] / results.done)
+        entry |= {"least_deg": least_of_all, "largest_deg": largest_of_all}
+        yield keep, entry | {"nominal_least_deg": least, "nominal_largest_deg": largest}
+
+
+def _emptied(results: Results) -> Iterator[Text]:
+    """Number of cases in which the tank runs empty, where any does."""
+    if results.emptied:
+        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
+
+
+# --- cases
+
+
+def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
+    """One case (from 0): the true value of each input, in SI, and the outputs."""
+    outputs, angles = study.outputs_of(draws).tolist(), study.aspects_of(draws)
+    return {
+        "case": case + 1,
+        "inputs": {entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn},
+        **{column: shown(column, value) for column, value in zip(OUTPUT_COLUMNS, outputs, strict=True)},
+        **({} if angles is None else angles_json(study.model.spacecraft, angles)),
+    }
+
+
+def _cases(study: Study, rows: Sequence[Mapping[str, Any]]) -> DataTable:
+    """Cases as `case_json` has them, one row each; number 0 is the nominal one."""
+    return DataTable("Worst cases", tuple(_case_columns(study, rows)), rows)
+
+
+def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[Column]:
+    yield Column("", "case", "", itemgetter("case"), where="full", kind=WHOLE)
+    yield Column("", "", "", lambda row: "this case" if row["case"] else "nominal", where="case", kind=TEXT)
+    for key, (name, unit, scale) in zip(OUTPUT_COLUMNS, NAMES, strict=True):
+        largest = max((scale * abs(row[key]) for row in rows), default=0.0)
+        yield Column("", name, unit, _known(key, scale), partial(beside, largest=largest), "case")
+        if unit == "deg":
+            yield Column("", name, unit, itemgetter(key), _four, "full")
+    for at, cone in enumerate(study.model.spacecraft.keep):
+        for which in ("least", "largest"):
+            where = "full case" if which in _bounded(cone) else "case"
+            yield Column("", f"{which} from {cone.name}", "deg", _angle(at, which), _four, where)
+    yield Column("", "largest contributors, in sigmas", "", _contributors(study), where="full", kind=TEXT)
+
+
+def _known(key: str, scale: float) -> Callable[[Mapping[str, Any]], float | None]:
+    return lambda row: None if math.isnan(row[key]) else scale * row[key]
+
+
+def _angle(cone: int, which: str) -> Callable[[Mapping[str, Any]], float]:
+    return lambda row: float(row["aspects"][cone][f"{which}_deg"])
+
+
+def _four(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _contributors(study: Study) -> Callable[[Mapping[str, Any]], str]:
+    """The three inputs that count most in a case, by name and size in sigmas."""
+    inputs = study.model.inputs.drawn
+    outputs = [output for output, _ in budgeted_outputs(study)]
+
+    def text(row: Mapping[str, Any]) -> str:
+        effects = np.hypot(*(study.first_order.effects(output) for output in outputs))
+        sigmas = [(row["inputs"][entry.name] - entry.nominal) / (entry.sigma or math.inf) for entry in inputs]
+        order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3].tolist()
+        return ", ".join(f"{in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
+
+    return text
+
+
+def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
+    """One case (from 0): every input, and the ends of it and of the nominal case."""
+    outcome = _cases(study, [case_json(study, -1, {}), case_json(study, case, draws)])
+    empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
+    title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
+    inputs = inputs_table(study.model.inputs.drawn, draws)
+    return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
+
+
+def _bounded(keep: Keep) -> list[str]:
+    """Bounded ones of the angles to the direction of a cone: the least, the largest."""
+    return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
+
+
+def bounded_heads(keep: Sequence[Keep]) -> list[str]:
+    """Heads of the columns of the angles that are `bounded`."""
+    return [f"{which} from\n{cone.name}, deg" for cone in keep for which in _bounded(cone)]
+
+
+def bounded(keep: Sequence[Keep], angles: Iterable[Iterable[float]]) -> list[float]:
+    """Of the least and largest ``angles`` to the direction of each cone those that it bounds, cone after cone."""
+    return [
+        angle
+        for cone, seen in zip(keep, angles, strict=True)
+        for which, angle in zip(("least", "largest"), seen, strict=True)
+        if which in _bounded(cone)
+    ]
+
+
+def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:
+    """Two rows for each cone: the least and the largest angle from its direction in each of ``flights``, (m, 2) rad."""
+    for index, cone in enumerate(keep):
+        for row, which in enumerate(("least", "largest")):
+            cells = (f"{math.degrees(angles[index, row]):.4g}" for angles in flights)
+            table.add_row(Text(f"{which} from {cone.name}, deg", style="dim"), *cells)
+
+
+def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
+    """Least and largest angle to the direction of each cone, of angles (m, 2) rad."""
+    if not spacecraft.keep:
+        return {}
+    named = zip(spacecraft.keep, np.degrees(angles).tolist(), strict=True)
+    return {"aspects": [{"name": keep.name, "least_deg": least, "largest_deg": far} for keep, (least, far) in named]}
+
+
+def _shares(results: Results) -> Iterator[dict[str, Any]]:
+    """Share of each input in each output, by first order and by the cases."""
+    first = results.study.first_order
+    linear = {name: first.shares(name).tolist() for name in OUTPUTS}
+    effects = np.degrees(first.effects("nutation")).tolist()
+    for at, entry in enumerate(first.inputs):
+        sampled = results.shares.get(entry.name, {})
+        both = {name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)} for name in OUTPUTS}
+        about = {"tolerance": entry.tolerance, "sigma": entry.sigma, "effect_deg": effects[at]}
+        yield {"input": entry.name, **both.pop("nutation"), **about, **both}
+
+
+def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
+    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    return {"correlation": [list(pair) for pair in pairs]} if pairs else {}

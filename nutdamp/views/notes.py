@@ -1,0 +1,108 @@
+"""Notes in words: the catalogue of their sentences, ``guide/notes.md``, and notes for screens and JSON files.
+
+A value is shown by the unit in which its name ends, so that the sentences hold no formats.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from rich.text import Text
+
+from nutdamp.common.results import Note, Value
+from nutdamp.views.text import degrees, duration, lasting, quantity, sentence
+
+WARNING, NOTE, REASON = "warning", "note", "reason"
+"""Severities: a warning may change what is fired; a reason says why a plan is recommended."""
+
+
+class Entry(NamedTuple):
+    """One code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
+
+    code: str
+    severity: str
+    sentence: str
+    paragraph: str
+
+
+ENTRY = re.compile(r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL)
+
+NAME = re.compile(r"\{(\w+)\}")
+
+UNITS: dict[str, Callable[[float], str]] = {
+    "_deg": lambda value: degrees(math.radians(value)),
+    "lasting_s": lasting,
+    "_s": duration,
+    "_Nms": lambda value: quantity(value, "N m s"),
+    "_rad_s": lambda value: quantity(value, "rad/s"),
+    "_rpm": lambda value: quantity(value, "rpm", 5),
+    "_percent": lambda value: f"{value:.3g} %",
+    "_share": lambda value: f"{value:.10g} %",
+    "_bar": lambda value: quantity(value, "bar"),
+}
+"""Texts of values by the end of their names."""
+
+
+@cache
+def catalogue() -> dict[str, Entry]:
+    """All codes."""
+    text = (files("nutdamp") / "guide" / "notes.md").read_text(encoding="utf-8")
+    entries = {}
+    for code, severity, quoted, paragraph in ENTRY.findall(text):
+        words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
+        entries[code] = Entry(code, severity, words, paragraph.strip())
+    return entries
+
+
+def severity(note: Note) -> str:
+    """Severity of a note."""
+    return catalogue()[note.code].severity
+
+
+def text(note: Note) -> str:
+    """The sentence of a note with its values, without a full stop."""
+    entry, values = catalogue()[note.code], note.values
+    return NAME.sub(lambda name: _shown(name[1], values[name[1]]), entry.sentence).removesuffix(".")
+
+
+def _shown(name: str, value: Value) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
+    return f"{value:.4g}" if unit is None else unit(value)
+
+
+def note_json(note: Note) -> dict[str, Any]:
+    """A note for JSON files."""
+    return {"code": note.code, "severity": severity(note), "values": note.values, "text": text(note)}
+
+
+def screen_line(note: Note) -> Text:
+    """A note for screens: severity, code, sentence."""
+    level = severity(note)
+    return Text.assemble((f"{level}[{note.code}]: ", "bold red" if level == WARNING else "bold"), text(note))
+
+
+def message(note: Note) -> str:
+    """A note for standard error: severity, code, sentence."""
+    return screen_line(note).plain
+
+
+def ordered(notes: Iterable[Note]) -> list[Note]:
+    """Notes without repetition, warnings first."""
+    return sorted(dict.fromkeys(notes), key=lambda note: severity(note) != WARNING)
+
+
+def joined(notes: Iterable[Note]) -> str:
+    """Sentences of several notes in one line."""
+    return "; ".join(map(text, notes))
+
+
+def sentences(notes: Iterable[Note]) -> tuple[str, ...]:
+    """Each note as a sentence."""
+    return tuple(sentence(text(note)) for note in notes)

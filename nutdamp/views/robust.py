@@ -1,0 +1,188 @@
+"""Results of ``plan --robust``: candidates by the share of cases that comply, the plan to fly and its cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from operator import attrgetter
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from nutdamp.errors import listed
+from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.robust import RobustComparison
+from nutdamp.planning.screening import PlanCandidate
+from nutdamp.spacecraft import requirements
+from nutdamp.views import robust_verdicts, verdicts
+from nutdamp.views.decisions import KEPT, figures, requirement
+from nutdamp.views.plan_json import final_json, plan_json, target_json
+from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.pulses import pulse_table
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.text import in_degrees
+
+MOST_ROWS = 12
+"""Largest number of candidates in the table."""
+
+
+def robust_screen(robust: RobustComparison) -> RenderableType:
+    """All tables of ``plan --robust``."""
+    body, decided = robust.comparison.spacecraft, robust.decision
+    reason = robust_verdicts.robust_reason(robust)
+    infeasible = [plan for plan in robust.comparison.plans if not plan.feasible]
+    reasons = [
+        Text.assemble((f"{plan.scheme}: ", "bold"), "infeasible: " * (plan.failure is None), f"{infeasibility(plan)}")
+        for plan in infeasible
+    ]
+    if decided is None or robust.chosen is None:
+        none = Text(f"No recommendation: {reason}.", style="bold")
+        return Group(Text(body.name, style="bold"), none, *reasons, Text(), derived_table(body))
+    named = f"{decided.plan.scheme}, {robust.chosen.variant}"
+    flown = f"Dispersed cases of each plan: {'up to ' * bool(_fewer(robust))}{robust.samples:,}"
+    parts: list[RenderableType] = [
+        Text(body.name, style="bold"),
+        Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
+        *requirement(decided),
+        *(Text(text) for text in _fresh(robust)),
+        Text(robust_verdicts.robust_cost(robust)),
+        *(Text(text) for text in filter(None, [robust_verdicts.tightened(robust)])),
+        *figures(decided),
+        *(Text(), derived_table(body), Text()),
+        Text(f"{flown}, full simulation, seed {robust.seed}", style="bold"),
+        *(Text(), *_candidates(robust), *reasons),
+    ]
+    if len(decided.plan.pulses):
+        parts += [Text(), pulse_table(decided.plan.flight).screen("full")]
+    return Group(*parts)
+
+
+def robust_json(robust: RobustComparison, reason: str) -> dict[str, Any]:
+    """Part of ``plan --robust --json`` beside the plans: candidates from the best down, the one to fly, and its cost.
+
+    ``reason``: that of the choice, in words.
+    """
+    chosen, fresh, cost = robust.chosen, robust.fresh, robust.cost
+    given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
+    entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
+    return {
+        "probability": robust.probability,
+        "samples": robust.samples,
+        "seed": robust.seed,
+        "target": target_json(robust.comparison.spacecraft),
+        "candidates": [entries[id(candidate)] for candidate in robust.candidates],
+        "recommended": None if chosen is None else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
+        "reason": reason,
+        "meets_requirement": robust.meets_requirement,
+        "fresh": fresh
+        and {
+            "samples": fresh.cases.samples,
+            "seed": fresh.cases.seed,
+            "met_fraction": fresh.met,
+            "interval": list(fresh.interval),
+        },
+        "tightening": _tightening(robust),
+        "against": entries.get(id(robust.usual)),
+        "cost": cost
+        and {
+            "propellant_kg": cost.propellant,
+            "total_impulse_Nms": cost.impulse,
+            "end_s": cost.end,
+            "nutation_deg": math.degrees(cost.nutation),
+        },
+    }
+
+
+def _tightening(robust: RobustComparison) -> dict[str, Any] | None:
+    """Tolerances that enough cases would comply with; None where they are not known."""
+    needed = robust.tightening
+    if needed is None:
+        return None
+    inputs = [entry for entry, _ in needed.inputs]
+    return {
+        "factor": needed.factor,
+        "tolerances": {
+            entry.tolerance: {"sigma": entry.sigma, "needed": needed.factor * entry.sigma} for entry in inputs[::-1]
+        },
+        "inputs": [
+            {"name": entry.name, entry.kind: entry.size, "needed": needed.factor * entry.size, "unit": entry.unit}
+            for entry in inputs
+        ],
+        "checked": {
+            "samples": needed.cases,
+            "seed": needed.seed,
+            "met_fraction": needed.complied,
+            "at_least": needed.least,
+        },
+    }
+
+
+def _table(robust: RobustComparison, candidates: list[PlanCandidate]) -> DataTable:
+    mark = next((index for index, entry in enumerate(candidates) if entry is robust.chosen), None)
+    return DataTable("Candidates", tuple(_columns(robust)), candidates, robust, mark)
+
+
+def _columns(robust: RobustComparison) -> Iterator[Column]:
+    """Columns of the candidates; ``full``: of the screen, with propellant only where all have it."""
+    body, level = robust.comparison.spacecraft, verdicts.exact_percent(robust.probability)
+    fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
+    yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
+    yield Column("variant", "", "", attrgetter("variant"), where="json", kind=TEXT)
+    yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
+    yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json", kind=WHOLE)
+    yield Column("end_s", "ends at", "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
+    yield Column("total_impulse_Nms", "impulse", "N m s", attrgetter("plan.pulses.total_impulse"), _four,
+                 "json" if fuelled else "full json")  # fmt: skip
+    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
+    yield Column("", "propellant", "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
+    yield Column("nominal_nutation_deg", "", "", _nominal, where="json")
+    yield Column("nutation_deg", "", "", lambda row: math.degrees(row.nutation), where="json")
+    yield Column(f"{requirements.aim(body).value}_deg", "", "", lambda row: math.degrees(row.off), where="json")
+    yield Column("", "nominal", "deg", attrgetter("nominal"), in_degrees, "full")
+    yield Column("", level, "deg", attrgetter("left"), in_degrees, "full")
+    yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
+    yield Column("samples", "", "", attrgetter("cases.samples"), where="json", kind=WHOLE)
+    yield Column("met_fraction", "", "", attrgetter("met"), where="json")
+    yield Column("", "cases that comply", "", attrgetter("share"), verdicts.share_text,
+                 "full" * requirements.judged(body))  # fmt: skip
+    yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
+
+
+def _nominal(row: PlanCandidate) -> float | None:
+    return None if row.plan.flown is None else math.degrees(row.plan.flown.nutation)
+
+
+def _four(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _candidates(robust: RobustComparison) -> list[RenderableType]:
+    """The best candidates, with the chosen one and the usual one, and a note on the others."""
+    named = list(robust.candidates[:MOST_ROWS])
+    named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
+    rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
+    level, left = verdicts.exact_percent(robust.probability), robust_verdicts.left_name(robust.comparison.spacecraft)
+    notes = [
+        *[f"Plans that rank below these: {rest}."] * bool(rest),
+        *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),
+        f"nominal, {level}: the {left} left with nominal values, and not exceeded in so many cases.",
+        *["* is recommended without --robust."] * (robust.usual is not None),
+    ]
+    return [_table(robust, named).screen("full"), Text(" ".join(notes), style="dim")]
+
+
+def _fresh(robust: RobustComparison) -> Iterator[str]:
+    """Result of the plan in new cases; nothing where none were flown."""
+    if robust.fresh is not None and robust.chosen is not None:
+        cases = robust.fresh.cases
+        shares = (robust.fresh.met, *robust.fresh.interval)
+        met, low, high = (verdicts.percent(share, robust.probability) for share in shares)
+        few = f", fewer than the {verdicts.exact_percent(robust.probability)} required" * robust.lucky
+        new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
+        yield f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
+
+
+def _fewer(robust: RobustComparison) -> list[int]:
+    """Numbers of cases after which plans were given up."""
+    return sorted({candidate.cases.samples for candidate in robust.candidates} - {robust.samples})

@@ -1,0 +1,366 @@
+"""Fronts of ``trade``: schedules by their ends on screens and in files, and notes beside a recommendation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from operator import attrgetter, itemgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from nutdamp.errors import listed
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import SAME_ANGLE
+from nutdamp.planning.tradeoff import Front, Point, numbered
+from nutdamp.schemes.catalogue import OPTIMAL
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
+from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.views import verdicts
+from nutdamp.views.end_tables import requested
+from nutdamp.views.layout import brief
+from nutdamp.views.plan_json import heading, plan_json
+from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.pulses import pulse_table
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
+from nutdamp.views.verdicts import FARTHER
+
+ROWS = 18
+"""Points on the default screen, at most: evenly some of more."""
+
+TOGETHER = 1e-3
+"""s between ends that count as one."""
+
+SOONER = 0.05
+"""Share of its time by which a plan that costs as much has to end sooner to be worth a remark."""
+
+FAILS = "does not meet the requirement with nominal values"
+"""Name of points that do not meet the requirement of the file, or break a cone."""
+
+BELOW = (
+    "The small-angle bound is for plans that leave no nutation: where a cost is below it, the plan leaves a little, or "
+    "its flight at larger angles needs less."
+)
+"""Note on points that cost less than their small-angle bound."""
+
+OFF = (
+    "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
+)
+"""Note on points whose H ends a little beside its target."""
+
+ALIKE = (
+    "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
+)
+"""Note on a plan that is cheaper than the points by less than counts."""
+
+
+class TradeRow(NamedTuple):
+    """Point ``number`` of all, on its ``front``."""
+
+    number: int
+    front: Front
+    point: Point
+
+    @property
+    def plan(self) -> Plan:
+        """The schedule."""
+        return self.point.plan
+
+    @property
+    def least(self) -> float | None:
+        """Lower bound of the cost for small angles."""
+        return self.front.least(self.point)
+
+    def spent(self, value: float | None) -> str:
+        """A cost with its unit."""
+        return cost(value, self.point.unit)
+
+
+def rows_of(fronts: Sequence[Front]) -> list[TradeRow]:
+    """The points of all fronts."""
+    return [TradeRow(*entry) for entry in numbered(fronts)]
+
+
+def _table(rows: Sequence[TradeRow]) -> DataTable:
+    """One row a point."""
+    return DataTable("Schedules by their ends", tuple(_columns(rows)), rows)
+
+
+def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
+    """``full`` is the table of one front, ``brief`` that of all."""
+    first = rows[0].number if rows else 1
+    others = any(row.plan.scheme != OPTIMAL.name for row in rows)
+    judged = any(row.plan.meets_requirement is not None for row in rows)
+    bounded = any(row.least is not None for row in rows)
+    yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
+    yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
+    yield Column("shift_allowed_deg", "", "", lambda row: math.degrees(row.front.shift), where="csv")
+    yield Column("end_s", "ends at", "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
+    yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
+    yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
+    yield Column("pulses", "pulses", "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
+    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="csv")
+    yield Column("total_impulse_Nms", "", "", attrgetter("plan.pulses.total_impulse"), where="csv")
+    yield Column("first_order_least", "", "", attrgetter("least"), where="csv")
+    yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
+    yield Column("nutation_deg", "", "", _residual("nutation"), where="csv")
+    shift = _residual("momentum_shift")
+    yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
+    yield Column("axis_error_deg", "", "", _residual("axis_error"), where="csv")
+    yield Column("", f"vs point {first}", "%", _saved, where="full")
+    yield Column("", "vs first", "%", _saved, where="" if others else "brief")
+    scheme = "csv full brief" if others else "csv"
+    yield Column("scheme", "scheme", "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
+    met = attrgetter("plan.meets_requirement")
+    yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
+    yield Column("", "verdict", "", met, verdicts.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
+
+
+def _allowed(front: Front) -> str:
+    return "any" if math.isinf(front.shift) else degrees(front.shift).removesuffix(" deg")
+
+
+def _residual(name: str) -> Callable[[TradeRow], float]:
+    return lambda row: math.degrees(getattr(row.point.plan.flight.residual, name))
+
+
+def _saved(row: TradeRow) -> str:
+    """Extra cost over the point that ends first on the front, %."""
+    return fixed(100.0 * (row.point.cost / row.front.points[0].cost - 1.0), 1)
+
+
+def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
+    """The default screen of ``trade``: the cheapest and the earliest schedule, the points of all fronts."""
+    points = rows_of(fronts)
+    steps, notes = "--csv points.csv · --plot trade.png · --schedules FOLDER", missing(spacecraft, fronts)
+    if not points:
+        return brief([*_head(spacecraft, fronts)], None, notes, steps)
+    shown = np.unique(np.linspace(0, len(points) - 1, ROWS).round().astype(int)).tolist()
+    if len(shown) < len(points):
+        notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")
+    rows = [points[index] for index in shown]
+    return brief([*_head(spacecraft, fronts)], _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps)
+
+
+def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
+    """Title, the cheapest and the earliest schedule, and the number that meet the requirement."""
+    points = rows_of(fronts)
+    yield Text.assemble((spacecraft.name, "bold"), f": finish time against cost; schedules: {len(points)}")
+    if not points:
+        yield Text("NO SCHEDULE", "bold red")
+        return
+    good = [row for row in points if not fails(row.point)]
+    for name, order in (("Cheapest", itemgetter(0, 1)), ("Earliest", itemgetter(1, 0))):
+        row = min(good or points, key=lambda row: order((row.point.cost, row.plan.pulses.end)))
+        costs = f"{row.spent(row.point.cost)}, ends at {row.plan.pulses.end:.3f} s (point {row.number})"
+        yield Text.assemble((f"{name}: ", "bold"), costs)
+    if required := requested(spacecraft):
+        met = Text(f"met by {len(good)} of {len(points)} schedules", "green" if good else "bold red")
+        yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, ", with nominal values.")
+
+
+def trade_screen(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableType:
+    """All tables of ``trade``."""
+    parts = front_parts(spacecraft, fronts)
+    return Group(*_head(spacecraft, fronts), Text(), derived_table(spacecraft), *parts)
+
+
+def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[RenderableType]:
+    """The table of each front under its name."""
+    parts: list[RenderableType] = []
+    for front in fronts:
+        parts += [Text(), Text(front_name(front, pointing=spacecraft.goal.axis is not None), style="bold")]
+        if front.why is not None:
+            parts.append(Text(_without_optimal(front)))
+        if front.points:
+            rows = [row for row in rows_of(fronts) if row.front is front]
+            parts.append(_table(rows).screen("full"))
+    below = [BELOW] * any(map(_below, rows_of(fronts)))
+    for note in (*below, *_ends_off(fronts)):
+        parts += [Text(), Text(note, style="dim")]
+    return parts
+
+
+def _ends_off(fronts: Sequence[Front]) -> Iterator[str]:
+    """Note on schedules that end off a target that they were planned for."""
+    off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
+    if max(off, default=0.0) > DAMPED_ANGLE:
+        yield OFF
+
+
+def _below(row: TradeRow) -> bool:
+    """True where it costs less than its small-angle bound, as the table writes both."""
+    spent = row.point.cost
+    return row.least is not None and spent < row.least and row.spent(spent) != row.spent(row.least)
+
+
+def fails(point: Point) -> bool:
+    """True where it does not meet the requirement of the file, or breaks a cone."""
+    return point.plan.meets_requirement is False
+
+
+def _without_optimal(front: Front) -> str:
+    """The reason why a front has no points, or none of the scheme optimal."""
+    return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
+
+
+def missing(spacecraft: Spacecraft, traded: Sequence[Front]) -> list[str]:
+    """Sentences on fronts and points that a picture lacks, with the reasons."""
+    pointing = spacecraft.goal.axis is not None
+    fronts: dict[str, list[str]] = {}
+    for entry in traded:
+        if entry.why is not None:
+            fronts.setdefault(_without_optimal(entry), []).append(front_name(entry, pointing=pointing))
+    return [f"{', '.join(names)} \N{EN DASH} {reason}" for reason, names in fronts.items()]
+
+
+def schemes_of(fronts: Sequence[Front]) -> list[str]:
+    """Schemes of all points, by name; optimal where there are none."""
+    return sorted({point.plan.scheme for _, _, point in numbered(fronts)}) or [OPTIMAL.name]
+
+
+def front_name(front: Front, *, pointing: bool) -> str:
+    """The requirement on H, in words."""
+    if math.isinf(front.shift):
+        return "H may end anywhere"
+    if front.shift == 0.0:
+        return "H ends on its target" if pointing else "H ends where it was"
+    return f"H ends within {degrees(front.shift)} of " + ("its target" if pointing else "where it was")
+
+
+# --- files
+
+
+def trade_csv(fronts: Sequence[Front]) -> str:
+    """One row a point; a shift allowed of any size is empty."""
+    return _table(rows_of(fronts)).csv()
+
+
+def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
+    """All fronts with their plans, in the form of ``plan --json``."""
+    points = [
+        (row.front, {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)})
+        for row in rows_of(fronts)
+    ]
+    entries = []
+    for front in fronts:
+        own = [point for owner, point in points if owner is front]
+        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": own})
+    return {**heading(spacecraft), "fronts": entries}
+
+
+def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
+    """The pulses of every point: (path in ``folder``, contents)."""
+    plans = [row.plan for row in rows_of(fronts)]
+    files = (pulse_table(plan.flight).csv() for plan in plans)
+    return list(zip(schedule_paths(folder, len(plans)), files, strict=True))
+
+
+def schedule_paths(folder: str, count: int) -> list[str]:
+    """Paths of the files of pulses of ``count`` points."""
+    return [str(Path(folder) / f"point-{index}.csv") for index in range(1, count + 1)]
+
+
+# --- beside a recommended plan
+
+
+class _Better(NamedTuple):
+    """A point better than the recommended plan: share of the cost saved, and s by which it ends earlier.
+
+    ``only``: it meets the requirement, and the recommended plan does not.
+    """
+
+    saved: float
+    earlier: float
+    row: TradeRow
+    only: bool
+
+    @property
+    def how(self) -> str:
+        """Words for its advantage."""
+        if self.only:
+            return "meets the requirement with nominal values, which the recommended plan does not"
+        costs = f"costs {100.0 * self.saved:.2g} % less than" if self.saved else "costs as much as"
+        ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
+        return f"{costs} the recommended plan and ends {ends}"
+
+
+def _better(fronts: Sequence[Front], chosen: Plan) -> _Better | None:
+    """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
+
+    Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
+    first.
+    """
+    until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
+    for row in rows_of(fronts):
+        saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
+        cheaper = saved > SAME_COST and end <= until
+        if row.plan.meets_requirement and (misses or cheaper or _sooner(row.plan, chosen, saved)):
+            better.append(_Better(saved if misses or saved > SAME_COST else 0.0, until - end, row, misses))
+    return max(better, key=itemgetter(0, 1), default=None)
+
+
+def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
+    """True where a plan that saves that share of the cost, about none, ends clearly sooner with H about as near."""
+    shifts = [flown.flight.residual.axis_error for flown in (plan, chosen)]
+    ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
+    return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
+
+
+def outdone(fronts: Sequence[Front], chosen: Plan) -> str:
+    """Headline that a schedule of the fronts is better than the ``chosen`` one; or nothing."""
+    better = _better(fronts, chosen)
+    return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
+
+
+def beats(fronts: Sequence[Front], chosen: Plan) -> str:
+    """The schedule of a front that is better than the ``chosen`` one, with its command, in a sentence; or nothing."""
+    better = _better(fronts, chosen)
+    if better is None:
+        return ""
+    number, front, point = better.row
+    pointing, plans = chosen.spacecraft.goal.axis is not None, (point.plan, chosen)
+    off, counts = [plan.flight.residual.axis_error for plan in plans], [len(plan.pulses) for plan in plans]
+    asides = [front_name(front, pointing=pointing)]
+    if abs(off[0] - off[1]) > SAME_ANGLE:
+        name = requirements.aim(chosen.spacecraft).label
+        asides.append(f"{name} {degrees(off[0])} instead of {degrees(off[1])}")
+    if counts[0] != counts[1]:
+        asides.append(f"pulses: {counts[0]} instead of {counts[1]}")
+    options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
+    return (
+        f"point {number} {'meets the requirement with nominal values too, ' * (not better.only)}{better.how} "
+        f"({'; '.join(asides)}): "
+        f'nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}--set "limits.horizon={point.horizon:.6g} s".'
+    )
+
+
+def apart(fronts: Sequence[Front], chosen: Plan) -> str:
+    """The reason why the ``chosen`` plan may cost less than the schedules traded, by another scheme; or nothing."""
+    rows = [row for row in rows_of(fronts) if row.plan.pulses.end <= chosen.pulses.end and not fails(row.point)]
+    if not rows:
+        return ""
+    nearest = min(rows, key=lambda row: row.point.cost)
+    spent, cheapest = chosen.pulses.cost_in(nearest.point.unit), nearest.point.cost
+    if spent >= cheapest * (1.0 - SAME_COST):
+        return ALIKE * (spent < cheapest and nearest.spent(spent) != nearest.spent(cheapest))
+    if chosen.scheme in schemes_of(fronts):
+        return ""
+    reasons = []
+    if any(pulse.channel == STEERABLE for pulse in chosen.pulses):
+        impulses = " with ideal impulses" * chosen.pulses.idealised
+        reasons.append(f"it fires the steerable torquer{impulses}, which the schedules of the trade do not")
+    own, left = chosen.flight.residual.nutation, max(row.plan.flight.residual.nutation for row in rows)
+    if own > left + SAME_ANGLE:
+        reasons.append(f"it leaves {degrees(own)} of nutation, they at most {degrees(left)}")
+    because = f": {listed(reasons)}" if reasons else ""
+    return (
+        f"the recommended plan, by {chosen.scheme}, costs {100.0 * (1.0 - spent / cheapest):.2g} % less than "
+        f"point {nearest.number}, the cheapest of the trade that meets the requirement and ends no later{because}."
+    )

@@ -1,0 +1,101 @@
+"""The catalogue of notes: each code that the code uses has a sentence, whose values are given."""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+from pathlib import Path
+
+import pytest
+from support.process import Run
+
+import nutdamp
+from nutdamp.common.results import Note, Value, note
+from nutdamp.planning.decision import compare, decide
+from nutdamp.planning.notes import GAINS, TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
+from nutdamp.views.notes import NAME, NOTE, REASON, WARNING, catalogue, message, note_json, ordered, text
+
+SOURCE = Path(nutdamp.__file__).parent
+
+
+def calls() -> list[tuple[str, str, set[str]]]:
+    """Module, code and names of values of each call of `note` with the code written out."""
+    result = []
+    for path in sorted(SOURCE.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "note" and node.args:
+                codes = [part.value for part in ast.walk(node.args[0]) if isinstance(part, ast.Constant)]
+                names = {keyword.arg or "" for keyword in node.keywords}
+                result += [(path.name, code, names) for code in codes if isinstance(code, str)]
+    return result
+
+
+CALLS = calls()
+
+
+def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
+    """Notes on a plan get the scheme beside their own values."""
+    assert len(CALLS) > 60
+    for module, code, names in CALLS:
+        wanted = set(NAME.findall(catalogue()[code].sentence))
+        assert wanted <= names | {"scheme"}, (module, code)
+
+
+def test_every_entry_is_used_and_says_what_it_means() -> None:
+    used = {code for _, code, _ in CALLS} | {*GAINS.values(), *TIES.values()}
+    used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
+    assert set(catalogue()) == used
+    for entry in catalogue().values():
+        assert entry.severity in (WARNING, NOTE, REASON)
+        assert entry.paragraph.endswith(".")
+
+
+@pytest.mark.parametrize(("name", "value", "shown"), [
+    ("limit_deg", 0.5, "0.5 deg"), ("at_s", 0.0123, "12.3 ms"), ("at_s", 12.5, "12.5 s"),
+    ("limit_deg", 1e-12, "< 1e-9 deg"),
+])  # fmt: skip
+def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, shown: str) -> None:
+    values: dict[str, Value] = {
+        "angle_deg": 1.0,
+        "direction": "Sun",
+        "at_s": 1.0,
+        "limit_deg": 1.0,
+        "scheme": "x",
+        name: value,
+    }
+    assert shown in text(Note("cone-broken", tuple(values.items())))
+
+
+def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:
+    entry = note("momentum-shift", scheme="optimal", momentum_shift_deg=0.25)
+    assert message(entry).startswith("note[momentum-shift]: optimal ")
+    data = note_json(entry)
+    assert (data["code"], data["severity"]) == ("momentum-shift", "note")
+    assert data["values"] == {"scheme": "optimal", "momentum_shift_deg": 0.25}
+
+
+def test_warnings_come_first_and_nothing_twice() -> None:
+    shift = note("momentum-shift", scheme="x", momentum_shift_deg=1.0)
+    assert [entry.code for entry in ordered([shift, note("try-trade"), shift])] == ["try-trade", "momentum-shift"]
+
+
+def test_the_json_of_a_plan_has_notes_as_data(run: Run) -> None:
+    content = json.loads(run("plan", "--nominal", "--set", "requirement={nutation: 1e-9 deg}", "--json", "-").stdout)
+    for entry in (*content["notes"], *(entry for plan in content["plans"] for entry in plan["notes"])):
+        assert set(entry) == {"code", "severity", "values", "text"}
+        assert entry["code"] in catalogue()
+        numbers = [value for value in entry["values"].values() if isinstance(value, float)]
+        assert all(map(math.isfinite, numbers))
+
+
+def test_notes_of_the_example_are_those_of_its_decision() -> None:
+    compared = compare(nutdamp.example(), samples=0)
+    assert [entry.code for entry in reasons(compared)] == ["least-propellant"]
+    assert not [*comparison_warnings(compared)]
+    assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {"half-turns-apart"}
+    assert {entry.code for entry in alternatives(compared)} <= set(GAINS.values())
+    decision = decide(compared)
+    assert decision is not None
+    codes = [entry.code for entry in decision_notes(decision)]
+    assert "tolerances-not-checked" in codes
