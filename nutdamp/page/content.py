@@ -54,7 +54,7 @@ from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade import apart, beats, front_parts
-from nutdamp.views.verification import BUDGET, budget_table, conservation, methods_table, verdict
+from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results

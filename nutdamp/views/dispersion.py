@@ -25,8 +25,8 @@ from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import bounds_text, end_table, requested
-from nutdamp.views.layout import brief
 from nutdamp.views.plan_json import final_json, heading, target_json
+from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 from nutdamp.views.text import degrees, digits
 from nutdamp.views.tolerances import (
@@ -71,7 +71,7 @@ def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
         case = f" · {_again(results)} (worst)"
     if unused := results.study.model.inputs.unused:
         notes.append(f"Dispersions without effect: {', '.join(in_words(entry.name) for entry in unused)}.")
-    return brief(head, _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
+    return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
 
 def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Flight | None = None) -> Group:

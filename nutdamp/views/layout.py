@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -19,17 +18,6 @@ GAP = 2
 
 WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")
 """Pattern of the words that a column keeps on one line."""
-
-NOTES = 3
-"""Notes of a default screen, at most."""
-
-
-def brief(head: Sequence[RenderableType], table: RenderableType | None, notes: Sequence[str], steps: str) -> Group:
-    """A default screen: headline and requirement, the main table, the first of the ``notes``, the next ``steps``."""
-    shown = [Text.assemble(("note: ", "bold"), note) for note in notes[:NOTES]]
-    hidden = f" ({len(notes) - NOTES} more)" if len(notes) > NOTES else ""
-    middle = [Text(), *([] if table is None else [table, Text()])]
-    return Group(*head, *middle, *shown, Text(f"-v all values{hidden} · {steps}", style="dim"))
 
 
 def facts() -> Table:

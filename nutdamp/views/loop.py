@@ -23,7 +23,7 @@ from nutdamp.views.decisions import cost, statement
 from nutdamp.views.end_tables import end_table
 from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, seconds
-from nutdamp.views.summary import margin_lines, opening, spoken, summary, warnings_of
+from nutdamp.views.summary import Remark, margin_lines, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
@@ -112,24 +112,21 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
     headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
     head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan, decision)]
-    warned, remarks = spoken(decision_notes(decision, looped=True))
-    head += [
-        *warnings_of([*warned, *warnings(plan.spacecraft)]),
-        *margin_lines(decision, "this case" if run.case else "nominal"),
-    ]
+    head += [*warnings_of(warnings(plan.spacecraft)), *margin_lines(decision, "this case" if run.case else "nominal")]
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
-        [*remarks, *_remarks(plan)],
+        _remarks(plan, decision),
         "--plot loop.png · nutdamp disperse --loop",
         more=[margin_table(plan.margins).screen("screen"), end_table(plan.flight, plan.aspects)],
         verbose=verbose,
     )
 
 
-def _remarks(plan: LoopPlan) -> Iterator[str]:
-    """Notes on the run: dead band, margin, law and sensor."""
+def _remarks(plan: LoopPlan, decision: Decision) -> Iterator[Remark]:
+    """Notes on the run: idealisations, dead band, margin, law and sensor."""
     run = plan.flown_run
+    yield from decision_notes(decision, looped=True)
     band = f"dead band at most {degrees(plan.band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet"
     largest, when = plan.largest
     since = f"; largest nutation since first quiet {degrees(largest)} at {moment(when)}"

@@ -23,7 +23,7 @@ from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_te
 from nutdamp.views.layout import facts
 from nutdamp.views.plan_json import aspects_json, final_json, heading, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, shown_rows
-from nutdamp.views.summary import margin_lines, opening, spoken, summary, warnings_of
+from nutdamp.views.summary import Remark, margin_lines, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, Column, DataTable
 from nutdamp.views.text import degrees, longitude, moment, pointing
 
@@ -74,10 +74,9 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
     head = [*opening(body, verbose), headline]
-    warned, remarks = spoken([*model_warnings(simulation.impulses, simulation.flown), *decision_notes(decided)])
-    head += warnings_of([*_cut(simulation), *warned])
+    head += warnings_of([*_cut(simulation), *model_warnings(simulation.impulses, simulation.flown)])
     near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (extremes.nearest, extremes.farthest))
-    remarks.append(f"spin axis from H(0): min {near}, max {far}")
+    remarks: list[Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
     return summary(
         [*head, statement(decided), *margin_lines(decided)],
         lambda **_: end_comparison(simulation).transposed("screen"),

@@ -15,7 +15,7 @@ from nutdamp.common.results import Note
 from nutdamp.planning.decision import Decision
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import decision_table
-from nutdamp.views.notes import WARNING, ordered, screen_line, severity
+from nutdamp.views.notes import NOTE, WARNING, screen_line
 from nutdamp.views.plan_tables import header
 from nutdamp.views.text import RPM, short_angle
 
@@ -40,20 +40,20 @@ def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     yield from [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
 
 
-def warnings_of(remarks: Iterable[str | Note]) -> list[Text]:
+Remark = str | Note
+"""A note of the catalogue, or a sentence of one screen."""
+
+
+def line_of(remark: Remark, level: str = NOTE) -> Text:
+    """A remark as a line of a screen; ``level``: severity of a sentence."""
+    if isinstance(remark, Note):
+        return screen_line(remark)
+    return Text.assemble((f"{level}: ", "bold red" if level == WARNING else "bold"), remark.removesuffix("."))
+
+
+def warnings_of(remarks: Iterable[Remark]) -> list[Text]:
     """Warnings, each once."""
-    return [_line(("warning: ", "bold red"), remark) for remark in dict.fromkeys(remarks)]
-
-
-def _line(lead: tuple[str, str], remark: str | Note) -> Text:
-    """A remark behind its severity; one of the catalogue has a code, too."""
-    return Text.assemble(lead, remark.removesuffix(".")) if isinstance(remark, str) else screen_line(remark)
-
-
-def spoken(notes: Iterable[Note]) -> tuple[list[Note], list[str | Note]]:
-    """Warnings, and other notes."""
-    kept = ordered(notes)
-    return [note for note in kept if severity(note) == WARNING], [note for note in kept if severity(note) != WARNING]
+    return [line_of(remark, WARNING) for remark in dict.fromkeys(remarks)]
 
 
 def margin_lines(decision: Decision, values: str = "nominal") -> list[RenderableType]:
@@ -64,14 +64,14 @@ def margin_lines(decision: Decision, values: str = "nominal") -> list[Renderable
 def summary(
     head: Sequence[RenderableType],
     table: Rows | None,
-    remarks: Iterable[str | Note],
+    remarks: Iterable[Remark],
     steps: str,
     *,
     more: Iterable[RenderableType] = (),
     verbose: bool = False,
 ) -> RenderableType:
     """A default screen, with ``steps`` to take next; ``verbose``: with all rows and remarks, and ``more`` parts."""
-    notes = [_line(("note: ", "bold"), remark) for remark in dict.fromkeys(remarks) if remark]
+    notes = [line_of(remark) for remark in dict.fromkeys(remarks) if remark]
     if verbose:
         body = [Text(), table()] if table is not None else []
         for part in more:

@@ -23,10 +23,10 @@ from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import verdicts
 from nutdamp.views.end_tables import requested
-from nutdamp.views.layout import brief
 from nutdamp.views.plan_json import heading, plan_json
 from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.pulses import pulse_table
+from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 from nutdamp.views.verdicts import FARTHER
@@ -140,12 +140,14 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     points = rows_of(fronts)
     steps, notes = "--csv points.csv · --plot trade.png · --schedules FOLDER", missing(spacecraft, fronts)
     if not points:
-        return brief([*_head(spacecraft, fronts)], None, notes, steps)
+        return summary([*_head(spacecraft, fronts)], None, notes, steps)
     shown = np.unique(np.linspace(0, len(points) - 1, ROWS).round().astype(int)).tolist()
     if len(shown) < len(points):
         notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")
     rows = [points[index] for index in shown]
-    return brief([*_head(spacecraft, fronts)], _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps)
+    return summary(
+        [*_head(spacecraft, fronts)], lambda **_: _table(rows).screen("brief"), [*notes, *_ends_off(fronts)], steps
+    )
 
 
 def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
@@ -311,12 +313,6 @@ def _sooner(plan: Plan, chosen: Plan, saved: float) -> bool:
     shifts = [flown.flight.residual.axis_error for flown in (plan, chosen)]
     ends_sooner = plan.pulses.end < (1.0 - SOONER) * chosen.pulses.end
     return abs(saved) <= SAME_COST and ends_sooner and shifts[0] <= FARTHER * shifts[1] + SAME_ANGLE
-
-
-def outdone(fronts: Sequence[Front], chosen: Plan) -> str:
-    """Headline that a schedule of the fronts is better than the ``chosen`` one; or nothing."""
-    better = _better(fronts, chosen)
-    return "" if better is None else f"“Time against cost” has a schedule that {better.how}."
 
 
 def beats(fronts: Sequence[Front], chosen: Plan) -> str:

@@ -18,9 +18,10 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, size
 from nutdamp.views.end_tables import requested
-from nutdamp.views.layout import FittedColumns, brief
+from nutdamp.views.layout import FittedColumns
 from nutdamp.views.plan_json import final_json, heading, target_json
 from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, Column, DataTable
 from nutdamp.views.text import MISSING, degrees, small_angle
 
@@ -40,7 +41,7 @@ BUDGET_NOTE = (
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
     notes = [conservation(verification), *_largest(verification), *_missing(verification)]
-    return brief([*_head(plan, verification)], methods_table(verification), notes, "--json verified.json")
+    return summary([*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json")
 
 
 def _head(plan: Plan, verification: Verification) -> Iterator[Text]:

@@ -29,7 +29,7 @@ from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Bounds, Schedule
 from nutdamp.views.text import cost
-from nutdamp.views.trade import ALIKE, BELOW, OFF, apart, beats, fails, front_parts, outdone
+from nutdamp.views.trade import ALIKE, BELOW, OFF, apart, beats, fails, front_parts
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -182,7 +182,7 @@ def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None
     cheaper = beats((front_of(EASY, 0.999999, 0.95, 0.9),), chosen)
     assert "pulses instead of" not in cheaper, "both take two"
     assert [beats((front_of(EASY, *shares),), chosen) for shares in ((1.0, 1.1), (1.0,))] == ["", ""]
-    assert outdone((), chosen) == ""
+    assert beats((), chosen) == ""
     late = replace(EASY, limits=replace(EASY.limits, earliest=EASY.nutation_period))
     later = compare(late, ["two-pulse"])["two-pulse"]
     alike = (front_of(EASY, 1.0),)
@@ -190,8 +190,8 @@ def test_a_schedule_that_is_better_is_named_beside_the_recommended_one() -> None
     failing = half_of(whole)
     plan = failing.points[0].plan
     assert plan.meets_requirement is False
-    assert outdone((failing,), plan) == ""
-    said = [cheaper, beats(alike, later), outdone(alike, later), beats((whole,), plan), outdone((whole,), plan)]
+    assert beats((failing,), plan) == ""
+    said = [cheaper, beats(alike, later), beats((whole,), plan)]
     check_text("pictures.trade-better", "\n".join(said))
 
 

@@ -210,7 +210,7 @@ def test_standard_output_holds_the_page_alone(run: Run, tmp_path: Path) -> None:
     ("more", "options", "status", "said"),
     [
         deep("", "--scheme four-pulse", 3, "NO PLAN: no scheme is feasible"),
-        ("requirement: {momentum_shift: 0.01 deg}\n", "--scheme one-pulse", 4, "does not meet the requirement."),
+        ("requirement: {momentum_shift: 0.01 deg}\n", "--scheme one-pulse", 4, "NOT met with nominal values"),
     ],
     ids=["infeasible", "missed"],
 )

@@ -173,10 +173,10 @@ def test_a_target_compares_the_schemes_that_can_point(run: Run) -> None:
     alone = run("plan", "-v", "--quiet", "--nominal", "--target", "10deg,45deg", "--scheme", "rhumb-line").stdout
     assert "β = 10 deg from H" in alone
     compared = run("plan", "-v", "--quiet", "--nominal", "--target", "2deg,45deg").stdout
-    assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal", "× C|ω3|β"))
+    assert all(name in compared for name in ("two-pulse", "half-cone", "rhumb-line", "optimal", "over C|ω3|β"))
     along_h = run("plan", "-v", "-", "--target", "0deg,0deg", stdin=EXACT).stdout
-    (row,) = [line for line in along_h.splitlines() if "× C|ω3|β" in line]
-    assert set(row.split()[2:]) == {"–"}  # not a ratio of rounding
+    (row,) = [line for line in along_h.splitlines() if "over C|ω3|β" in line]
+    assert set(row.split()[3:]) == {"–"}  # not a ratio of rounding
     assert "C|ω3|β = 0 N m s" in along_h
     assert all(len(line) <= 80 and "…" not in line for line in (compared + along_h).splitlines())
 

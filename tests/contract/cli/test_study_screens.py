@@ -16,7 +16,6 @@ from support.process import Run
 from nutdamp.planning import plan as planning
 from nutdamp.planning.tradeoff import Front, Point
 from nutdamp.spacecraft.model import Requirement
-from nutdamp.views.layout import NOTES
 from nutdamp.views.trade import ROWS, trade_brief, trade_screen
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -37,7 +36,7 @@ def check_screen(shown: str) -> None:
     assert len(lines) <= LINES
     assert max(map(len, lines)) <= WIDTH
     assert "…" not in shown
-    assert sum(line.startswith("note: ") for line in lines) <= NOTES
+    assert sum(line.startswith("note: ") for line in lines) <= 3
     _, *tables, _ = shown.split("\n\n")
     assert len(tables) <= 1
     for table in tables:
