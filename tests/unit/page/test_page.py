@@ -211,17 +211,11 @@ def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, rec
 @pytest.mark.deep
 def test_valves_and_tank_are_told_and_commanded_on_times_apart_from_effective_ones() -> None:
     plain, valved = (page(example_text() + more, "two-pulse") for more in ("", VALVE + TANK))
-    told = "Tank: 22 bar full; 11.73 bar"
+    told = "11.73 bar"
     assert (told in plain, told in valved) == (False, True)
     for text, through in ((plain, False), (valved, True)):
-<<<<<<< HEAD
         heads = sheet(section(tree(text), "background"), "Pulses of")[0]
         assert ("on-time s" in heads, "effective on-time s" in heads) == (True, through)
-=======
-        for name, beside in (("schedule", "effective on-time"), ("manoeuvre", "on-time, commanded")):
-            heads = [head.text.split(" s")[0] for head in cells(section(tree(text), name).all("table")[0])[0]]
-            assert (beside in heads) == through
->>>>>>> notes
 
 
 def test_only_assumptions_that_apply_are_told() -> None:
