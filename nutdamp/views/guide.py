@@ -209,7 +209,7 @@ def units_topic() -> Topic:
 PAGES = (
     ("To begin", ("tutorial", "reading", "glossary")),
     ("How to", ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "fit", "report", "library")),
-    ("Reference", ("commands", "file", "csv", "json", "units")),
+    ("Reference", ("commands", "file", "csv", "json", "notes", "units")),
     ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
     ("The project", ("contributing", "speed", "changes")),
 )

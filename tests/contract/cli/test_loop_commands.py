@@ -336,7 +336,7 @@ def test_a_budget_is_shown_and_written(run: Run, tmp_path: Path, monkeypatch: py
         assert held["nutation_low_deg"] < held["stop_deg"] < held["start_deg"] < held["nutation_largest_deg"]
         assert row["meets_requirement"] == "true"
     picture = (tmp_path / "b.svg").read_text()
-    assert all(text in picture for text in ("no firing", "0.5 to 0.1 deg", "1 to 0.1 deg", "propellant, kg a year"))
+    assert all(text in picture for text in ("no firing", "0.500° to 0.100°", "1.00° to 0.100°", "largest allowed"))
 
 
 PARTICULAR = {
