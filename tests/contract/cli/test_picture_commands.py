@@ -277,9 +277,9 @@ def test_an_old_page_stays_where_the_new_one_cannot_be_made(run: Run, tmp_path: 
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ("--disperse 300 spacecraft.yaml", "300 cases, seed 1"),
-        weekly("spacecraft.yaml --disperse 300", "300 cases, seed 1"),
-        weekly("--disperse=3e2 spacecraft.yaml", "300 cases, seed 1"),
+        ("--disperse 300 spacecraft.yaml", "cases: 300, seed 1"),
+        weekly("spacecraft.yaml --disperse 300", "cases: 300, seed 1"),
+        weekly("--disperse=3e2 spacecraft.yaml", "cases: 300, seed 1"),
         deep("--disperse", "20,000 cases, seed 1"),
         weekly("--disperse -o report.html", "20,000 cases, seed 1"),
         weekly("--disperse spacecraft.yaml", "20,000 cases, seed 1"),
