@@ -315,7 +315,7 @@ def test_numbers_of_cases_and_of_points_may_be_left_out(run: Run, tmp_path: Path
 @pytest.mark.usefixtures("plain_pages")
 def test_with_a_target_the_page_says_how_far_off_it_ends(run: Run, tmp_path: Path) -> None:
     assert run("report", "--nominal", "--scheme", "half-cone", "--target", "10deg,45deg").returncode == 0
-    for text in ("H ends attilt 10.0000 deg, azimuth 45.0000 deg", "error of H≤ 0.2 deg", "off the target"):
+    for text in ("H ends attilt 10.0000 deg, azimuth 45.0000 deg", "axis error≤ 0.2 deg", "off the target"):
         assert text in page_of(tmp_path)
 
 

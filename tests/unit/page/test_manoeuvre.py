@@ -91,7 +91,7 @@ def test_after_the_last_pulse_no_more_than_the_requirement_counts(required: floa
         last == required,
     ]
     assert said == [strict] * 4
-    assert "do not judge what is required of the error of H" in shown.text
+    assert "do not judge what is required of the axis error" in shown.text
 
 
 @pytest.mark.deep
