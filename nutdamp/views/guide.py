@@ -326,3 +326,26 @@ SYMBOLS = dict(rows("symbols"))
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))
 """Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""
+
+
+class NoteEntry(NamedTuple):
+    """One code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
+
+    code: str
+    severity: str
+    sentence: str
+    paragraph: str
+
+
+NOTE_ENTRY = re.compile(r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL)
+
+
+@cache
+def note_entries() -> dict[str, NoteEntry]:
+    """All codes."""
+    text = (FOLDER / "notes.md").read_text(encoding="utf-8")
+    entries = {}
+    for code, severity, quoted, paragraph in NOTE_ENTRY.findall(text):
+        words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
+        entries[code] = NoteEntry(code, severity, words, paragraph.strip())
+    return entries

@@ -8,29 +8,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.text import Text
 
 from nutdamp.common.results import Note, Value
+from nutdamp.views.guide import note_entries
 from nutdamp.views.text import degrees, duration, lasting, quantity, sentence
 
 WARNING, NOTE, REASON = "warning", "note", "reason"
 """Severities: a warning may change what is fired; a reason says why a plan is recommended."""
 
-
-class Entry(NamedTuple):
-    """One code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
-
-    code: str
-    severity: str
-    sentence: str
-    paragraph: str
-
-
-ENTRY = re.compile(r"^## (\S+) \((\w+)\)\n\n((?:> [^\n]*\n)+)\n(.*?)(?=\n## |\Z)", re.MULTILINE | re.DOTALL)
 
 NAME = re.compile(r"\{(\w+)\}")
 
@@ -48,25 +36,14 @@ UNITS: dict[str, Callable[[float], str]] = {
 """Texts of values by the end of their names."""
 
 
-@cache
-def catalogue() -> dict[str, Entry]:
-    """All codes."""
-    text = (files("nutdamp") / "guide" / "notes.md").read_text(encoding="utf-8")
-    entries = {}
-    for code, severity, quoted, paragraph in ENTRY.findall(text):
-        words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
-        entries[code] = Entry(code, severity, words, paragraph.strip())
-    return entries
-
-
 def severity(note: Note) -> str:
     """Severity of a note."""
-    return catalogue()[note.code].severity
+    return note_entries()[note.code].severity
 
 
 def text(note: Note) -> str:
     """The sentence of a note with its values, without a full stop."""
-    entry, values = catalogue()[note.code], note.values
+    entry, values = note_entries()[note.code], note.values
     return NAME.sub(lambda name: _shown(name[1], values[name[1]]), entry.sentence).removesuffix(".")
 
 

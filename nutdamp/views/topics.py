@@ -11,14 +11,13 @@ from nutdamp.views import guide
 from nutdamp.views.file_guide import KeyGuide, file_topic
 from nutdamp.views.file_guide import keys as file_keys
 from nutdamp.views.guide import FILE, Topic, TopicPart, TopicRows
-from nutdamp.views.notes import catalogue
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
     ("glossary", partial(guide.rows, "glossary")),
     ("column of CSV", partial(guide.rows, "csv")),
     ("name in JSON", partial(guide.rows, "json")),
     ("symbol", partial(guide.rows, "symbols")),
-    ("note", lambda: ((code, f"{entry.sentence} {entry.paragraph}") for code, entry in catalogue().items())),
+    ("note", lambda: ((code, f"{entry.sentence} {entry.paragraph}") for code, entry in guide.note_entries().items())),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
 

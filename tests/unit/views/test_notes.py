@@ -1,4 +1,4 @@
-"""The catalogue of notes: each code that the code uses has a sentence, whose values are given."""
+"""The note_entries of notes: each code that the code uses has a sentence, whose values are given."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ import nutdamp
 from nutdamp.common.results import Note, Value, note
 from nutdamp.planning.decision import compare, decide
 from nutdamp.planning.notes import GAINS, TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
-from nutdamp.views.notes import NAME, NOTE, REASON, WARNING, catalogue, message, note_json, ordered, text
+from nutdamp.views.guide import note_entries
+from nutdamp.views.notes import NAME, NOTE, REASON, WARNING, message, note_json, ordered, text
 
 SOURCE = Path(nutdamp.__file__).parent
 
@@ -38,15 +39,15 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
     """Notes on a plan get the scheme beside their own values."""
     assert len(CALLS) > 60
     for module, code, names in CALLS:
-        wanted = set(NAME.findall(catalogue()[code].sentence))
+        wanted = set(NAME.findall(note_entries()[code].sentence))
         assert wanted <= names | {"scheme"}, (module, code)
 
 
 def test_every_entry_is_used_and_says_what_it_means() -> None:
     used = {code for _, code, _ in CALLS} | {*GAINS.values(), *TIES.values()}
     used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
-    assert set(catalogue()) == used
-    for entry in catalogue().values():
+    assert set(note_entries()) == used
+    for entry in note_entries().values():
         assert entry.severity in (WARNING, NOTE, REASON)
         assert entry.paragraph.endswith(".")
 
@@ -84,7 +85,7 @@ def test_the_json_of_a_plan_has_notes_as_data(run: Run) -> None:
     content = json.loads(run("plan", "--nominal", "--set", "requirement={nutation: 1e-9 deg}", "--json", "-").stdout)
     for entry in (*content["notes"], *(entry for plan in content["plans"] for entry in plan["notes"])):
         assert set(entry) == {"code", "severity", "values", "text"}
-        assert entry["code"] in catalogue()
+        assert entry["code"] in note_entries()
         numbers = [value for value in entry["values"].values() if isinstance(value, float)]
         assert all(map(math.isfinite, numbers))
 
