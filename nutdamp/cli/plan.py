@@ -180,9 +180,13 @@ def _screen(
     from nutdamp.views.glance import glance
 
     if dispersed is not None:
-        from nutdamp.views.robust import robust_screen
+        from nutdamp.views.robust import robust_notes, robust_screen
 
-        return robust_screen(dispersed) if verbose else glance(dispersed.joined, decided, dispersed.name)
+        return (
+            robust_screen(dispersed)
+            if verbose
+            else glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
+        )
     if verbose:
         from nutdamp.views.plan_tables import comparison_screen
 

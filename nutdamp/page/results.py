@@ -110,10 +110,9 @@ def comparison_reason(compared: Comparison) -> str:
 def robust_data(robust: RobustComparison) -> dict[str, Any]:
     """The object of ``plan --robust --json``."""
     from nutdamp.views.robust import robust_json
-    from nutdamp.views.robust_verdicts import robust_reason
 
     data = _decided(robust.comparison, robust.decision)
-    return {**data, "robust": robust_json(robust, robust_reason(robust))}
+    return {**data, "robust": robust_json(robust)}
 
 
 def simulation_data(simulation: Simulation) -> dict[str, Any]:

@@ -52,17 +52,20 @@ DIGITS = 8
 """Figures of a value beside its limit, at most."""
 
 
-def glance(compared: Comparison, decision: Decision | None, robust: str = "") -> RenderableType:
+def glance(
+    compared: Comparison, decision: Decision | None, robust: str = "", beside: Sequence[Note] = ()
+) -> RenderableType:
     """The screen of a comparison and the plan to fly; or of the reason why there is none.
 
-    ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases.
+    ``robust``: the name of the plan among those compared, where it was chosen by dispersed cases;
+    ``beside``: notes on that choice.
     """
     body = compared.spacecraft
     what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
     name = Text(body.name, style="bold")
     title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
     head = [*title, headline(compared, decision, robust)]
-    remarks = notes(compared, decision, robust)
+    remarks = ordered([*beside, *notes(compared, decision, robust)])
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     if decision is None:
         return _fitted(head, [], [], more, _schemes(compared, ""))

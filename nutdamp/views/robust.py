@@ -10,18 +10,24 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
+from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import robust_cost, robust_reasons
 from nutdamp.planning.robust import RobustComparison
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
-from nutdamp.views import robust_verdicts, verdicts
+from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views import verdicts
 from nutdamp.views.decisions import KEPT, figures, requirement
+from nutdamp.views.notes import joined, note_json, screen_line
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 from nutdamp.views.text import in_degrees
+from nutdamp.views.tolerances import in_words, stated_text
 
 MOST_ROWS = 12
 """Largest number of candidates in the table."""
@@ -30,7 +36,7 @@ MOST_ROWS = 12
 def robust_screen(robust: RobustComparison) -> RenderableType:
     """All tables of ``plan --robust``."""
     body, decided = robust.comparison.spacecraft, robust.decision
-    reason = robust_verdicts.robust_reason(robust)
+    reason = joined(robust_reasons(robust))
     infeasible = [plan for plan in robust.comparison.plans if not plan.feasible]
     reasons = [
         Text.assemble((f"{plan.scheme}: ", "bold"), "infeasible: " * (plan.failure is None), f"{infeasibility(plan)}")
@@ -46,8 +52,7 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
         *requirement(decided),
         *(Text(text) for text in _fresh(robust)),
-        Text(robust_verdicts.robust_cost(robust)),
-        *(Text(text) for text in filter(None, [robust_verdicts.tightened(robust)])),
+        *map(screen_line, robust_notes(robust)),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
         Text(f"{flown}, full simulation, seed {robust.seed}", style="bold"),
@@ -58,11 +63,40 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
     return Group(*parts)
 
 
-def robust_json(robust: RobustComparison, reason: str) -> dict[str, Any]:
-    """Part of ``plan --robust --json`` beside the plans: candidates from the best down, the one to fly, and its cost.
+def robust_notes(robust: RobustComparison) -> list[Note]:
+    """Tolerances that would have to shrink, and the plan against the usual one."""
+    return [*_needed(robust), *robust_cost(robust)]
 
-    ``reason``: that of the choice, in words.
-    """
+
+def _needed(robust: RobustComparison) -> Iterator[Note]:
+    """Tolerances with which enough cases would comply, where they are known."""
+    needed = robust.tightening
+    if needed is None or robust.chosen is None:
+        return
+    sizes, tolerances = [], [entry.tolerance for entry, _ in needed.inputs]
+    for entry, relative in needed.inputs:
+        less = stated_text(entry._replace(size=needed.factor * entry.size), relative, down=True)
+        named = in_words(entry.tolerance if tolerances.count(entry.tolerance) == 1 else entry.name)
+        sizes.append(f"{named} {{{entry.kind}: {less}}} instead of {stated_text(entry, relative)}")
+    yield note(
+        "tolerances-needed",
+        required_share=100.0 * robust.probability,
+        tolerances=", ".join(sizes),
+        complied=verdicts.percent(needed.complied, robust.probability),
+        cases=f"{needed.cases:,}",
+        seed=needed.seed,
+        least=f"{math.floor(1e4 * needed.least) / 100.0:.4g} %",
+        confidence_share=100.0 * CONFIDENCE,
+    )
+
+
+def left_name(spacecraft: Spacecraft) -> str:
+    """Name of the residual that a plan is to minimise."""
+    return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
+
+
+def robust_json(robust: RobustComparison) -> dict[str, Any]:
+    """Part of ``plan --robust --json`` beside the plans: candidates, the best first, the one to fly, and its cost."""
     chosen, fresh, cost = robust.chosen, robust.fresh, robust.cost
     given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
     entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
@@ -73,7 +107,8 @@ def robust_json(robust: RobustComparison, reason: str) -> dict[str, Any]:
         "target": target_json(robust.comparison.spacecraft),
         "candidates": [entries[id(candidate)] for candidate in robust.candidates],
         "recommended": None if chosen is None else {**entries[id(chosen)], "plan": plan_json(chosen.plan)},
-        "reason": reason,
+        "reason": joined(robust_reasons(robust)),
+        "notes": [note_json(note) for note in robust_notes(robust)],
         "meets_requirement": robust.meets_requirement,
         "fresh": fresh
         and {
@@ -162,7 +197,7 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
-    level, left = verdicts.exact_percent(robust.probability), robust_verdicts.left_name(robust.comparison.spacecraft)
+    level, left = verdicts.exact_percent(robust.probability), left_name(robust.comparison.spacecraft)
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
         *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),

@@ -29,6 +29,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning import robust, screening
 from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
+from nutdamp.planning.notes import robust_reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground
 from nutdamp.planning.screening import Cases, PlanCandidate
@@ -39,6 +40,7 @@ from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import Dispersions
+from nutdamp.views.notes import joined
 from nutdamp.views.robust import robust_json
 
 SAMPLES = 2_048
@@ -390,7 +392,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
     of_A = DispersedInput("A", "A", "normal", 0.6, 120.0, "kg m²")
     needed = Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971)
     fresh = robust.Fresh(Cases(1_000, 1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
-    written = robust_json(replace(bare, fresh=fresh, tightening=needed), "because")
+    written = robust_json(replace(bare, fresh=fresh, tightening=needed))
     told = (
         written["probability"],
         written["samples"],
@@ -398,7 +400,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
         written["reason"],
         written["meets_requirement"],
     )
-    assert told == (0.997, 1_000, SEED, "because", False)
+    assert told == (0.997, 1_000, SEED, joined(robust_reasons(bare)), False)
     assert [one["met_fraction"] for one in written["candidates"]] == [0.9, 0.8]
     best_of_all, against = written["recommended"], written["against"]
     expected = {"variant": "as planned", "pulses": 1, "end_s": 3.0, "total_impulse_Nms": 2.0, "samples": 1_000}
@@ -413,7 +415,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
     inputs = [{"name": "A", "normal": 0.6, "needed": 0.3, "unit": "kg m²"}]
     tolerances = {"A": {"sigma": 0.6, "needed": 0.3}}
     assert written["tightening"] == {"factor": 0.5, "tolerances": tolerances, "inputs": inputs, "checked": checked}
-    nothing = robust_json(replace(bare, chosen=None, usual=None), "")
+    nothing = robust_json(replace(bare, chosen=None, usual=None))
     assert [nothing[key] for key in ("recommended", "fresh", "tightening", "against", "cost")] == [None] * 5
 
 
