@@ -21,11 +21,11 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import verdicts
-from nutdamp.views.notes import sentences
+from nutdamp.views.notes import text
 from nutdamp.views.pulses import MILLISECONDS, channel_text
 from nutdamp.views.schemes import limits
 from nutdamp.views.tables import Heading
-from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, short_angle
+from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.checkpoints import Checkpoints
@@ -77,8 +77,10 @@ SIGNED = ("sheet", "name", "signature", "date")
 
 def _uncommandable(plan: Plan) -> Iterator[str]:
     """Reasons why the pulses cannot be commanded."""
-    codes = [*["not-commandable"] * (not plan.commandable), *filter(None, [ideal_code(plan)])]
-    yield from sentences(note(code, scheme=plan.scheme) for code in codes)
+    if not plan.commandable:
+        yield sentence(text(note("not-commandable", scheme=plan.scheme)))
+    if code := ideal_code(plan):
+        yield f"{plan.scheme} cannot be commanded: {text(note(code, scheme=plan.scheme))}."
 
 
 def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:

@@ -258,7 +258,7 @@ def test_memory_does_not_grow_with_the_rows() -> None:
 
 @pytest.mark.deep
 def test_the_command_writes_every_row(run: Run, tmp_path: Path) -> None:
-    ended = run("simulate", "--scheme", "two-pulse", "--samples", "45000", "--csv", "track.csv", "--quiet")
+    ended = run("simulate", "--scheme", "two-pulse", "--samples", "45000", "--csv", "track.csv", "-v", "--quiet")
     assert ended.returncode == 0, ended.stderr
     with (tmp_path / "track.csv").open(newline="") as stream:
         times = [float(row["t_s"]) for row in csv.DictReader(stream)]

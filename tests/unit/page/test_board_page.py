@@ -172,7 +172,7 @@ def test_the_top_of_the_page_has_the_words_of_the_screen(run: Run, tmp_path: Pat
     best = max(rows, key=lambda row: number_in(row["cases that comply %"]) or 0.0)["scheme"]
     (chosen,) = (one.text for one in shown.all("li") if one.attributes.get("class") == "mark")
     assert chosen.startswith(best)
-    assert ("nutdamp plan --robust looks for a plan" in decision(shown).text) is not met
+    assert ("plan --robust searches a plan made for the tolerances" in decision(shown).text) is not met
 
 
 @pytest.mark.weekly

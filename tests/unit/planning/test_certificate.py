@@ -147,7 +147,7 @@ def test_the_curve_is_drawn_with_the_bound(run: Run, tmp_path: Path) -> None:
     figure = ("--plot", "primer.svg", "--figure", "primer")
     assert run("plan", "--quiet", "--certificate", "proof.json", *figure).returncode == 0
     bound = check((tmp_path / "proof.json").read_text())
-    assert f"first-order least (small angles): {1e3 * bound:.4g} g" in (tmp_path / "primer.svg").read_text()
+    assert f"small-angle bound {1e3 * bound:.4g} g" in (tmp_path / "primer.svg").read_text()
 
 
 @pytest.mark.deep
