@@ -1,14 +1,10 @@
-"""Starting values, aliases.
-
-Where a fit begins: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
+"""Start of a fit: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
 
 A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
 spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
 
-Nutation rates that samples at equal intervals cannot tell apart.
-
-Seen every T s, a rate looks like any other that differs by a multiple of 2π/T: C/A is known but for multiples of
-2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
+Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is known but for multiples
+of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
 """
 
 from __future__ import annotations

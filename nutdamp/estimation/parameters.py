@@ -1,8 +1,5 @@
-"""Telemetry record, parameters and priors.
-
-Which parameters telemetry is fitted with: what the file says of each, and how far it may be off.
-
-What was measured in flight, and what was fired meanwhile.
+"""Telemetry record with the pulses fired during it, and the parameters fitted to it with their values and tolerances in
+the file.
 """
 
 from __future__ import annotations

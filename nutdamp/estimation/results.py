@@ -1,8 +1,5 @@
-"""Estimates, covariance, consistency checks.
-
-What a fit says in quantities people know, with their standard deviations; and the spacecraft carried to an epoch.
-
-What makes a fit doubtful though its sigmas are small: in words, or as the reason why there is none.
+"""Estimates of a fit with their standard deviations, the spacecraft carried to an epoch, and checks of consistency: what
+makes a fit doubtful though its sigmas are small.
 """
 
 from __future__ import annotations

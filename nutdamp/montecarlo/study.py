@@ -1,10 +1,7 @@
-"""Dispersion studies: many dispersed cases fly one schedule, in rounds of blocks over threads.
+"""Dispersion studies: many dispersed cases fly one schedule.
 
-Running a study: blocks of cases over threads, in rounds, so that it can be watched and stopped.
-
-Some cases of a study flown by several threads, that take one portion after the other.
-
-Dispersion studies: many dispersed cases fly one schedule.
+Blocks of cases run over threads in rounds, so that a study can be watched and stopped; the threads take one portion
+after the other.
 """
 
 from __future__ import annotations

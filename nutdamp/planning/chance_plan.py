@@ -1,11 +1,8 @@
-"""Chance-constrained plans, tolerance allocation.
-
-The plan that meets a requirement most surely, or surely enough for the least propellant, by optimisation.
+"""Plans that meet a requirement with most cases, or with enough of them for the least propellant; tolerance allocation.
 
 `schemes.optimal.chance` gives burns that keep the requirement with a margin of so many sigmas, to first order. They are
 made pulses, refined on the true motion and flown in dispersed cases; the margin is adapted by what these show.
-
-Which tolerances have to shrink, and to what, so that a schedule meets its requirement in enough cases.
+Allocation: which tolerances have to shrink, and to what, so that a schedule meets its requirement in enough cases.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Equipment: thrusters, channels, steerable torquer, Sun sensor, command blocks, loop; SI, principal axes.
+"""Equipment that a spacecraft fires, is commanded with and senses by; SI and rad, in principal axes.
 
-What a spacecraft can fire: thrusters, channels of them, and Magnus' steerable torquer. SI, in principal axes.
-
-What a spinner is commanded with: a Sun sensor that starts the clock of each spin, and blocks of pulses.
-
-A closed loop as the file describes it: the sensor, the law that fires by it, and faults to fly with. SI, rad.
+Thrusters, channels of them and Magnus' steerable torquer; a Sun sensor that starts the clock of each spin, and the
+steps of command blocks; the sensor, law and faults of a closed loop.
 """
 
 from __future__ import annotations
