@@ -1,5 +1,6 @@
-"""Telemetry record with the pulses fired during it, and the parameters fitted to it with their values and tolerances in
-the file.
+"""Telemetry record with the pulses fired during it, and the parameters fitted to it.
+
+Each parameter has its value in the file and the tolerance there.
 """
 
 from __future__ import annotations

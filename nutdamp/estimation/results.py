@@ -1,5 +1,6 @@
-"""Estimates of a fit with their standard deviations, the spacecraft carried to an epoch, and checks of consistency: what
-makes a fit doubtful though its sigmas are small.
+"""Estimates of a fit with their standard deviations, the spacecraft at an epoch, and checks of consistency.
+
+The checks name what makes a fit doubtful though its sigmas are small.
 """
 
 from __future__ import annotations
