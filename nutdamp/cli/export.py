@@ -41,7 +41,8 @@ def command(ctx: click.Context, job: Job, form: str | None, xml: bool, until: fl
     for its state. Vectors are in the axes of that file, those of opm in attitude.frame.
     """
     from nutdamp.api import export
-    from nutdamp.planning.decision import Decision
+    from nutdamp.planning.decision import compare_plans, decide
+    from nutdamp.views.decisions import verdict
 
     form, output = _format(form, job.given, ctx.args), job.written["output"] or "-"
     notation = xml or (FORMATS[form].message and output.lower().endswith(".xml"))
@@ -54,8 +55,9 @@ def command(ctx: click.Context, job: Job, form: str | None, xml: bool, until: fl
         job.doubt(missing)
     if output != "-":
         job.remark(f"wrote {printable(output)}: {plan.scheme}, {len(plan.pulses)} pulses")
-    if Decision(plan).met is False:
-        job.remark(f"{plan.scheme} does not meet the requirement")
+    decided = decide(compare_plans((plan,)))
+    if decided is not None and decided.met is False:
+        job.remark(f"{plan.scheme} does not meet the requirement: {verdict(decided)}")
         leave(missed=True)
 
 

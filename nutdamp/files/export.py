@@ -151,9 +151,9 @@ def main():
     after = momentum()
     shift = math.atan2(np.linalg.norm(np.cross(before, after)), before @ after)
     nutation, body_cone = largest_cones(left, sense)
-    print("nutation left ", shown(nutation))
-    print("body cone     ", shown(body_cone))
-    print("momentum shift", shown(shift))
+    print("nutation left  ", shown(nutation))
+    print("body cone      ", shown(body_cone))
+    print("momentum shift ", shown(shift))
 
 
 def largest_cones(rates, sense):

@@ -183,8 +183,6 @@ def _broken(plan: Plan) -> list[str]:
 def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
     yield from (text(note) for note in glance.notes(compared, decided) if severity(note) == WARNING)
     yield from _broken(decided.plan)
-    if decided.plan.spacecraft.dispersions is None:
-        yield "tolerances not checked: the file gives no dispersions"
 
 
 def _margin(row: glance.RequirementRow) -> RequirementBar:
@@ -200,6 +198,7 @@ def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Co
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     share = compared.shares.get(plan)
     word = verdicts.share_text(share) if share is not None else verdicts.VERDICT[compared.meets(plan)]
+    word += ", timed" * (not plan.commandable)
     return Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
 
 

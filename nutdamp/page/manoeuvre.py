@@ -86,7 +86,7 @@ def _uncommandable(plan: Plan) -> Iterator[str]:
 def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
     """Spin, nutation and phase at which the first row may be fired."""
     body = decision.plan.spacecraft
-    spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.nutation)
+    spin, nutation = f"{body.spin * RPM:.5g}", short_angle(body.tilt)
     if points is None:
         why = "dispersed cases were not flown" if body.dispersions is not None else "the file gives no dispersions"
         yield "spin", f"{spin} rpm nominal"

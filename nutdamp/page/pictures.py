@@ -12,7 +12,6 @@ from nutdamp.page.document import Picture
 from nutdamp.planning.decision import Comparison
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.tradeoff import Front
-from nutdamp.spacecraft import requirements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,8 +62,6 @@ def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
 
 def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
     """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
-    body = dispersed.study.model.spacecraft
-    bounded = any(bound.part is requirements.aim(body) for bound in requirements.required(body))
     drawn = (
         (
             "cases",
@@ -73,9 +70,8 @@ def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
         ),
         (
             "momentum",
-            "Where H ends in each case, with the ellipse that holds as many cases as must comply"
-            + (", and what is required of it." if bounded else "."),
-            "Scatter of the final angular momentum with ellipse" + " and requirement" * bounded,
+            "Where H ends in each case, with the ellipse that holds as many cases as must comply.",
+            "Scatter of the final angular momentum with ellipse",
         ),
     )
     return tuple(

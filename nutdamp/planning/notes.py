@@ -143,20 +143,22 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
     plan, body, final = decision.plan, decision.plan.spacecraft, decision.flight.residual
     if decision.undispersed and requirements.judged(body):
         yield note("tolerances-not-checked")
+    if body.dispersions is None and requirements.judged(body):
+        yield note("no-tolerances")
     if code := ideal_code(plan):
         yield note(code, scheme=plan.scheme)
     if looped:
         return
     if not plan.commandable:
         yield note("not-commandable", scheme=plan.scheme)
+    yield from _unaided(decision)
+    yield from _growing(decision)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
     change = decision.final.spin - body.spin
     if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
         yield note("spin-change", scheme=plan.scheme, spin_change_rad_s=change)
-    yield from _growing(decision)
-    yield from _unaided(decision)
     if body.loop is not None:
         yield note("loop-not-judged")
 
@@ -187,7 +189,11 @@ def _growing(decision: Decision) -> Iterator[Note]:
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
         limit = _limit_of(body, Part.NUTATION)
-        yield note("grows-again", after_s=after, left_deg=math.degrees(left), limit_deg=limit, lasting_s=again)
+        values = {"after_s": after, "left_deg": math.degrees(left), "limit_deg": limit, "lasting_s": again}
+        if cases is None:
+            yield note("grows-again", **values)
+        else:
+            yield note("grows-again-in-cases", share=f"{100.0 * cases.probability:.10g}", **values)
 
 
 def _unaided(decision: Decision) -> Iterator[Note]:

@@ -51,11 +51,15 @@ class Format(NamedTuple):
 
 def _json(request: Request) -> str:
     from nutdamp.files.tabular import json_text
-    from nutdamp.planning.decision import Comparison
+    from nutdamp.planning.decision import compare_plans, decide
+    from nutdamp.views.decision_json import decision_json
+    from nutdamp.views.decisions import verdict
     from nutdamp.views.plan_json import comparison_json
 
-    compared = Comparison(request.plan.spacecraft, (request.plan,))
-    return json_text(comparison_json(compared, None))
+    compared = compare_plans((request.plan,))
+    decided = decide(compared)
+    data = comparison_json(compared, decided)
+    return json_text({**data, "decision": None if decided is None else decision_json(decided, verdict(decided))})
 
 
 def _basilisk(request: Request) -> str:

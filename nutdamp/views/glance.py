@@ -152,7 +152,9 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         for text, angle, margin in cone_margins(aspect):
             kept = margin >= -SLACK
             words = "", f"nominal {degrees(angle)}", f"limit {text}"
-            used_up = float(aspect.keep.used(aspect.least, aspect.largest))
+            least = margin == aspect.least - aspect.keep.least
+            near = (aspect.keep.least, max(angle, SLACK)) if least else (angle, aspect.keep.most)
+            used_up = near[0] / near[1]
             met = coloured(verdicts.VERDICT[kept], kept)
             rows.append(
                 RequirementRow(
@@ -204,7 +206,7 @@ def _fired(plan: Plan, first: int) -> RenderableType:
         return block_table(plan.flight).screen("screen", first=first)
     least, _ = limits(plan.spacecraft)
     shown = pulse_table(plan.flight, least=least)
-    return shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS - FIRST + first else None)
+    return shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)
 
 
 def _schemes(compared: Comparison, chosen: str) -> FittedColumns:

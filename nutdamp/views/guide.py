@@ -347,5 +347,5 @@ def note_entries() -> dict[str, NoteEntry]:
     entries = {}
     for code, severity, quoted, paragraph in NOTE_ENTRY.findall(text):
         words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
-        entries[code] = NoteEntry(code, severity, words, paragraph.strip())
+        entries[code] = NoteEntry(code, severity, words, " ".join(paragraph.split()))
     return entries

@@ -163,7 +163,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         where, angle = shown.get(name, "full"), _residual(name)
         largest = least[0] if name == "nutation" else least[1]
         if "screen" in where:
-            yield Column("", _words(name), "deg", angle, shortly(largest), "screen")
+            yield Column("", _words(name), "", angle, shortly(largest), "screen")
         yield Column(f"{name}_deg", _words(name), "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
     yield from _directions(body)
     yield Column("spin_rad_s", "", "", _feasible(lambda plan: plan.flight.final.spin), where="csv")

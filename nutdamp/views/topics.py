@@ -12,12 +12,20 @@ from nutdamp.views.file_guide import KeyGuide, file_topic
 from nutdamp.views.file_guide import keys as file_keys
 from nutdamp.views.guide import FILE, Topic, TopicPart, TopicRows
 
+
+def _notes() -> Iterator[tuple[str, str]]:
+    """Codes of notes, with their sentences and paragraphs; values of a case stand in brackets."""
+    for code, entry in guide.note_entries().items():
+        sentence = re.sub(r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", entry.sentence)
+        yield code, f"{sentence} {entry.paragraph}"
+
+
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
     ("glossary", partial(guide.rows, "glossary")),
     ("column of CSV", partial(guide.rows, "csv")),
     ("name in JSON", partial(guide.rows, "json")),
     ("symbol", partial(guide.rows, "symbols")),
-    ("note", lambda: ((code, f"{entry.sentence} {entry.paragraph}") for code, entry in guide.note_entries().items())),
+    ("note", _notes),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
 

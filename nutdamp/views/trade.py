@@ -141,6 +141,10 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
     steps, notes = "--csv points.csv · --plot trade.png · --schedules FOLDER", missing(spacecraft, fronts)
     if not points:
         return summary([*_head(spacecraft, fronts)], None, notes, steps)
+    if spacecraft.commands is not None:
+        notes.append("the pulses are timed one by one: no command block fires these schedules")
+    if spacecraft.dispersions is not None:
+        notes.append("tolerances not checked (nutdamp disperse --schedule FOLDER/point-1.csv)")
     shown = np.unique(np.linspace(0, len(points) - 1, ROWS).round().astype(int)).tolist()
     if len(shown) < len(points):
         notes.append(f"Points on this screen: {len(shown)} of {len(points)}.")

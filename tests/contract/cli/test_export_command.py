@@ -47,15 +47,16 @@ def test_messages_go_to_standard_output_or_a_file(run: Run, tmp_path: Path) -> N
 
 
 def test_the_plan_as_json_is_that_of_plan(run: Run) -> None:
-    """The recommended one by its dispersed cases, which are not exported; of a scheme named none are flown."""
-    for scheme, nominal in (("--scheme four-pulse", "--nominal"), ("", "")):
-        data, planned = (
-            result(run, f"{command} {scheme}") for command in ("export --format json -o -", f"plan {nominal}")
-        )
+    """By its dispersed cases, whether a scheme is named or not."""
+    for scheme in ("--scheme four-pulse", ""):
+        commands, status = ("export --format json -o -", "plan"), 4 if scheme else 0
+        data, planned = (result(run, f"{command} {scheme}", status=status) for command in commands)
         assert data["recommended"] == planned["recommended"]
         (plan,) = (plan for plan in planned["plans"] if plan["scheme"] == data["recommended"])
-        assert (plan.pop("cases", {"met": None})["met"], plan["meets_requirement"]) == (None if nominal else True, True)
-        assert data["plans"] == [plan]
+        (exported,) = data["plans"]
+        assert exported.pop("cases")["met"] == plan.pop("cases")["met"] == plan["meets_requirement"] == (not scheme)
+        assert exported == plan
+        assert data["decision"]["met"] == planned["decision"]["met"]
     assert data["recommended"] == "two-pulse"
 
 

@@ -41,7 +41,7 @@ def check(plan: Plan, folder: Path) -> None:
     assert {name.strip(): value.strip() for name, value in lines} == {
         "nutation left": degrees(left.nutation),
         "body cone": degrees(left.body_cone),
-        "shift of H": degrees(left.momentum_shift),
+        "momentum shift": degrees(left.momentum_shift),
     }
 
 
