@@ -25,7 +25,7 @@ from support.shown import compared_text
 from nutdamp.files.reader import example_text
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Moving, PageSection
+from nutdamp.page.document import Moving
 from nutdamp.page.html import page_html
 from nutdamp.page.moving import moving, moving_of
 from nutdamp.planning.plan import Plan
@@ -77,7 +77,7 @@ def paged(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Moving], Path]:
     folder, bare = tmp_path_factory.mktemp("workbench"), plain_page(compared_text(EXAMPLE))
 
     def page(view: Moving) -> Path:
-        made = replace(bare, sections=(PageSection("motion", "Motion", (view,)),))
+        made = replace(bare, motion=(view,), sections=())
         path = folder / f"{len(list(folder.iterdir()))}.html"
         path.write_text(page_html(made), encoding="utf-8")
         return path
