@@ -174,7 +174,7 @@ def test_captions_name_no_bound_that_is_not_drawn(required: Requirement | None) 
     varied = Dispersions(A=Tolerance("normal", 0.02, relative=True))
     results = studied(replace(BODY, requirement=required, dispersions=varied), 50)
     _, momentum = dispersion_pictures(results, "two-pulse")
-    assert ("required" in momentum.caption) == (required is not None and required.momentum_shift is not None)
+    assert "required" not in momentum.caption  # the circle of a requirement may lie outside the picture
 
 
 # --- loops -----------------------------------------------------------------------------------------------------------
