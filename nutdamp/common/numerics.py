@@ -9,6 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+RPM = 30.0 / math.pi
+"""Turns a minute of one rad/s."""
+
+
 NOISE = 1e-13
 """Part of the largest component below which another component of a vector counts as rounding."""
 

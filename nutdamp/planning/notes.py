@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from nutdamp.common.numerics import down
+from nutdamp.common.numerics import RPM, down
 from nutdamp.common.results import Note, Value, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
@@ -25,9 +25,6 @@ from nutdamp.spacecraft.requirements import Part
 
 if TYPE_CHECKING:
     from nutdamp.planning.robust import RobustComparison
-
-RPM = 30.0 / math.pi
-"""Turns a minute of one rad/s."""
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:

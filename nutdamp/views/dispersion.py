@@ -6,7 +6,7 @@ The files of loops and the screens of other commands use the same parts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -371,21 +371,6 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
 def _bounded(keep: Keep) -> list[str]:
     """Bounded ones of the angles to the direction of a cone: the least, the largest."""
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
-
-
-def bounded_heads(keep: Sequence[Keep]) -> list[str]:
-    """Heads of the columns of the angles that are `bounded`."""
-    return [f"{which} from\n{cone.name}, deg" for cone in keep for which in _bounded(cone)]
-
-
-def bounded(keep: Sequence[Keep], angles: Iterable[Iterable[float]]) -> list[float]:
-    """Of the least and largest ``angles`` to the direction of each cone those that it bounds, cone after cone."""
-    return [
-        angle
-        for cone, seen in zip(keep, angles, strict=True)
-        for which, angle in zip(("least", "largest"), seen, strict=True)
-        if which in _bounded(cone)
-    ]
 
 
 def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:

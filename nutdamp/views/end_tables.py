@@ -16,12 +16,20 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.views import verdicts
-from nutdamp.views.layout import facts
+from nutdamp.views.layout import WIDTH, facts
 from nutdamp.views.pulses import block_table
-from nutdamp.views.text import RPM, degrees, longitude, mass, moment, most, pointing, quantity
+from nutdamp.views.text import RPM, degrees, longitude, mass, moment, most, pointing, quantity, short_angle
 
 FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
 """Frame of the two angles of a direction without an attitude in the file."""
+
+
+def title(body: Spacecraft) -> list[Text]:
+    """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
+    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
+    name = Text(body.name, style="bold")
+    fits = len(body.name) + len(what) + 3 <= WIDTH
+    return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
 
 
 def angle_names(body: Spacecraft) -> tuple[str, str]:
@@ -39,14 +47,6 @@ def direction_text(body: Spacecraft, direction: Vector) -> str:
     """An inertial direction (3,) by name and number of its angles."""
     names, texts = angle_names(body), angle_texts(body, direction)
     return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
-
-
-def target_text(body: Spacecraft, direction: Vector) -> str:
-    """The target axis beside the inertial direction (3,) that was to reach it, and the angle between them."""
-    if body.goal.axis is None:
-        return ""
-    off = float(attitude.angle_between(direction, body.goal.axis))
-    return f"target: {direction_text(body, body.goal.axis)}; {degrees(off)} off"
 
 
 def spin_text(spin: float) -> str:

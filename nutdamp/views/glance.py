@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from io import StringIO
 from typing import NamedTuple
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -24,15 +23,15 @@ from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import verdicts
 from nutdamp.views.decisions import coloured, limit, size, verdict
-from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting
-from nutdamp.views.layout import FittedColumns, facts
+from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting, title
+from nutdamp.views.layout import FittedColumns, facts, lines_of
 from nutdamp.views.notes import WARNING, joined, ordered, screen_line, severity
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
 from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
 
-WIDTH, LINES = 80, 24
-"""Columns and lines of the screen."""
+LINES = 24
+"""Lines of the screen."""
 
 ROWS = 6
 """Pulses or blocks that are shown one by one; of more the first `FIRST` and the last."""
@@ -61,10 +60,7 @@ def glance(
     ``beside``: notes on that choice.
     """
     body = compared.spacecraft
-    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
-    name = Text(body.name, style="bold")
-    title = [Text.assemble(name, f"   {what}")] if len(body.name) + len(what) + 3 <= WIDTH else [name, Text(what)]
-    head = [*title, headline(compared, decision, robust)]
+    head = [*title(body), headline(compared, decision, robust)]
     remarks = ordered([*beside, *notes(compared, decision, robust)])
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]
     if decision is None:
@@ -80,7 +76,7 @@ def glance(
         blocks = bool(plan.pulses.blocks)
         return _fitted(head, required, middle, more, table, blocks=blocks)
 
-    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if _lines(shown) <= LINES), screen(1))
+    return next((shown for shown in map(screen, (FIRST, FIRST // 2)) if lines_of(shown) <= LINES), screen(1))
 
 
 def notes(compared: Comparison, decision: Decision | None, robust: str = "") -> list[Note]:
@@ -225,7 +221,7 @@ def _fitted(
     blocks: bool = False,
 ) -> RenderableType:
     """All parts within the lines there are; notes go first, then requirements that are met with room."""
-    lines = _lines(*head, *middle, schemes) + len(required) + 2
+    lines = lines_of(*head, *middle, schemes) + len(required) + 2
     apart = [Text()] * (lines <= LINES)
     lines -= 1 - len(apart)
     shown = list(required)
@@ -240,7 +236,7 @@ def _fitted(
         table.add_row(*row[:5])
     shown_notes: list[Text] = []
     for note in more:
-        lines += _lines(note)
+        lines += lines_of(note)
         if lines > LINES or len(shown_notes) == NOTES:
             break
         shown_notes.append(note)
@@ -248,9 +244,3 @@ def _fitted(
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
     return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
-
-
-def _lines(*parts: RenderableType) -> int:
-    """Lines that parts take on a screen of `WIDTH` columns."""
-    console = Console(width=WIDTH, file=StringIO(), markup=False, emoji=False, highlight=False)
-    return sum(len(console.render_lines(part)) for part in parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from io import StringIO
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -18,6 +19,16 @@ GAP = 2
 
 WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")
 """Pattern of the words that a column keeps on one line."""
+
+
+WIDTH = 80
+"""Columns of a default screen."""
+
+
+def lines_of(*parts: RenderableType) -> int:
+    """Lines that parts take on a screen of `WIDTH` columns."""
+    console = Console(width=WIDTH, file=StringIO(), markup=False, emoji=False, highlight=False)
+    return sum(len(console.render_lines(part)) for part in parts)
 
 
 def facts() -> Table:

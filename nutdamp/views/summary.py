@@ -6,21 +6,21 @@ What gives way stands on the full screen (``-v``): rows in the middle of the tab
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from io import StringIO
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp.common.results import Note
 from nutdamp.planning.decision import Decision
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import decision_table
+from nutdamp.views.end_tables import title
+from nutdamp.views.layout import lines_of
 from nutdamp.views.notes import NOTE, WARNING, screen_line
 from nutdamp.views.plan_tables import header
-from nutdamp.views.text import RPM, short_angle
 
-LINES, WIDTH = 40, 80
-"""Lines and columns of a default screen."""
+LINES = 40
+"""Lines of a default screen."""
 
 SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))
 """Rows of the table before the last one, and notes: the first pair that fits is shown."""
@@ -34,10 +34,7 @@ def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     if verbose:
         yield from (header(body), Text())
         return
-    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
-    name = Text(body.name, style="bold")
-    fits = len(body.name) + len(what) + 3 <= WIDTH
-    yield from [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
+    yield from title(body)
 
 
 Remark = str | Note
@@ -85,10 +82,4 @@ def summary(
         return Group(*head, *body, *[Text()] * bool(body), *notes[:count], last)
 
     sizes = (screen(*size) for size in SIZES)
-    return next((shown for shown in sizes if _lines(shown) <= LINES), screen(*SIZES[-1]))
-
-
-def _lines(screen: RenderableType) -> int:
-    """Lines that a screen takes at `WIDTH` columns."""
-    console = Console(width=WIDTH, file=StringIO(), markup=False, emoji=False, highlight=False)
-    return len(console.render_lines(screen))
+    return next((shown for shown in sizes if lines_of(shown) <= LINES), screen(*SIZES[-1]))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from nutdamp.common.numerics import RPM as RPM
 from nutdamp.common.numerics import cleaned
 
 MISSING = "–"
 """Shown where a number is not known."""
 
-RPM = 30.0 / math.pi
-"""Turns a minute of one rad/s."""
 
 LONG = (
     ("s", 1.0, 3600.0),
