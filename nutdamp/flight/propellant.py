@@ -14,9 +14,10 @@ from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import lightened
 from nutdamp.physics.thruster import Ramp, Tank
-from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel
+from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, VALVES, Spacecraft
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
+from nutdamp.units import STANDARD_GRAVITY
 
 EVEN = 0.01
 """Share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse."""

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.units import STANDARD_GRAVITY
+
 if TYPE_CHECKING:
     from nutdamp.physics.thruster import Valve
 
@@ -162,10 +164,6 @@ class Loop:
     predict: bool = True
     on_time: float | None = None
     reversed: tuple[str, ...] = ()
-
-
-STANDARD_GRAVITY = 9.80665
-"""m/s², exact by definition (3rd CGPM, 1901); turns a specific impulse in seconds into m/s."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -191,11 +191,11 @@ def units_topic() -> Topic:
                     "A value is a number in SI (the first unit of a line) or a text with a unit, such as 60 rpm, 20 ms "
                     "or 5 deg. On the command line the blank may be left out: --until 90s, --set state.spin=60rpm.",
                     TopicRows(rows),
-                    "Blanks within a unit may be left out or written as * or ·, and ^2 as ²: kgm², N*m. degrees, "
-                    "degree and ° are read as deg, sec as s, hour as hours, rpm in any case. A unit of another kind, "
-                    "or one that is not listed, is an error that names those allowed; Hz is for sampling rates "
-                    "alone, and revolutions are no unit here, since nobody can tell whether they count turns or "
-                    "radians.",
+                    "Blanks within a unit may be left out or written as *, · or -, and ^2 as ²: kgm², N*m, slug-ft². "
+                    "degrees, degree and ° are read as deg, sec as s, hour as hours, rpm in any case. A unit of "
+                    "another kind, or one that is not listed, is an error that names those allowed; Hz is for "
+                    "sampling rates alone, and revolutions are no unit here, since nobody can tell whether they count "
+                    "turns or radians.",
                     "A share is a plain number or has %. Screens show degrees, s, N m s, g or kg of propellant, "
                     "the spin in rpm and rad/s; CSV and JSON name the unit in the column or key, such as t_s, "
                     "nutation_deg.",
