@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from nutdamp import errors
     from nutdamp.api import (
         budget,
+        carry,
         check,
         compare,
         disperse,
@@ -82,6 +83,7 @@ __all__ = [
     "Verified",
     "__version__",
     "budget",
+    "carry",
     "check",
     "compare",
     "disperse",

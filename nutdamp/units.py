@@ -49,23 +49,26 @@ class Kind:
 POUND, FOOT, STANDARD_GRAVITY = 0.45359237, 0.3048, 9.80665
 """International pound, kg, and foot, m (yard and pound agreement of 1959); gravity, m/s² (3rd CGPM, 1901)."""
 
+POUND_FORCE = POUND * STANDARD_GRAVITY
+"""N."""
+
 KINDS: dict[str, Kind] = {
-    "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3, "lbm": POUND, "slug": POUND * STANDARD_GRAVITY / FOOT}),
+    "mass": Kind("a mass", {"kg": 1.0, "g": 1e-3, "lbm": POUND, "slug": POUND_FORCE / FOOT}),
     "length": Kind("a length", {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": FOOT, "in": FOOT / 12.0}),
     "time": Kind("a time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "hours": 3600.0}),
-    "force": Kind("a force", {"N": 1.0, "mN": 1e-3, "lbf": POUND * STANDARD_GRAVITY}),
+    "force": Kind("a force", {"N": 1.0, "mN": 1e-3, "lbf": POUND_FORCE}),
     "torque": Kind(
-        "a torque", {"N m": 1.0, "mN m": 1e-3, "ft lbf": POUND * STANDARD_GRAVITY * FOOT, "in lbf": POUND * STANDARD_GRAVITY * FOOT / 12.0}
+        "a torque", {"N m": 1.0, "mN m": 1e-3, "ft lbf": POUND_FORCE * FOOT, "in lbf": POUND_FORCE * FOOT / 12.0}
     ),
     "inertia": Kind(
-        "a moment of inertia", {"kg m^2": 1.0, "slug ft^2": POUND * STANDARD_GRAVITY * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2}
+        "a moment of inertia", {"kg m^2": 1.0, "slug ft^2": POUND_FORCE * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2}
     ),
     "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
     "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3, "ft/s": FOOT}),
-    "pressure": Kind("a pressure", {"Pa": 1.0, "bar": 1e5, "psi": POUND * STANDARD_GRAVITY / (FOOT / 12.0) ** 2}),
-    "impulse": Kind("an impulse", {"N s": 1.0, "lbf s": POUND * STANDARD_GRAVITY}),
+    "pressure": Kind("a pressure", {"Pa": 1.0, "bar": 1e5, "psi": POUND_FORCE / (FOOT / 12.0) ** 2}),
+    "impulse": Kind("an impulse", {"N s": 1.0, "lbf s": POUND_FORCE}),
     "acceleration": Kind("an acceleration", {"m/s^2": 1.0, "mm/s^2": 1e-3, "ft/s^2": FOOT}),
     "frequency": Kind("a sampling rate", {"Hz": 1.0}),
     "ratio": Kind("a ratio", {"%": 0.01}),

@@ -41,7 +41,7 @@ def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: 
 
     from nutdamp.api import fit
     from nutdamp.estimation.results import carried
-    from nutdamp.files.editing import notes
+    from nutdamp.files.fitted import notes
     from nutdamp.views.fit import fit_screen
 
     with job.working("fitting"):

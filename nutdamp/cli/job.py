@@ -16,9 +16,9 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.options import FILE, Aim, Command, FileName, NameType, OutputName, options_in
+from nutdamp.cli.options import CARRIED_AT, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
 from nutdamp.cli.screen import progress, say, show, working
-from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
+from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import Options
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from nutdamp.errors import CannotWrite
     from nutdamp.files.overrides import Setting
     from nutdamp.files.reader import Source
+    from nutdamp.planning.plan import Plan
     from nutdamp.spacecraft.model import Spacecraft
 
 
@@ -103,6 +104,13 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
     text, name, _ = given.source(lambda _: None)
     place = read_tree(text, name)[0].place_of(wrong.where)
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
+
+
+def carry_options(when: str) -> Callable[[Command], Command]:
+    """``-o FILE --at TIME``: the spacecraft file carried on, by default to ``when``."""
+    which = click.option("--at", type=CARRIED_AT, help=f"Its t = 0; default {when}.")
+    where = click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file carried on.")
+    return lambda command: where(which(command))
 
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
@@ -262,6 +270,26 @@ class Job:
     def working(self, what: str) -> AbstractContextManager[None]:
         """Show that ``what`` is under way."""
         return working(what, quiet=self.quiet)
+
+    def carried(self, plan: Plan | None, at: float | None, usual: float | None = None) -> Files:
+        """The file of ``-o``: that of the spacecraft with the state of the flight of a ``plan`` ``at`` a time, s.
+
+        Default ``usual``, else that of the plan. Raises BadRequest where no file can hold the state.
+        """
+        path = self.written["output"]
+        if path is None:
+            if at is not None:
+                raise click.UsageError("--at is the moment of the file that -o writes: name one with -o")
+            return {}
+        if plan is None or not plan.feasible:
+            say(f"{printable(path)} was not written: no plan is feasible")
+            return {}
+        from nutdamp.files.carried import carried_notes, carried_text
+
+        time = next(value for value in (at, usual, plan.carried_at) if value is not None)
+        text = carried_text(plan.reaching(time), time, self.source)
+        self.note(carried_notes(self.spacecraft, time, self.source))
+        return {"output": lambda: text}
 
     def deliver(
         self,

@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Files, Job, carry_options, quiet_option, spacecraft_argument, verbose_option
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, Angles, Count, Direction, SessionCommand, UnitType
 from nutdamp.cli.screen import say
@@ -26,10 +26,13 @@ from nutdamp.units import LARGEST_SEED, thresholds, tilt
 @click.option("--csv", type=OUTPUT, help="Write the pulses, as `plan --csv` does.")
 @click.option("--track", type=OUTPUT, help="Write the track, as `simulate --csv` does.")
 @click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
+@carry_options("end of the run")
 @click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
 @verbose_option
 @quiet_option
-def command(job: Job, until: float | None, seed: int, case: int | None, samples: int, verbose: bool) -> None:
+def command(
+    job: Job, until: float | None, seed: int, case: int | None, samples: int, at: float | None, verbose: bool
+) -> None:
     """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
 
     A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
@@ -48,7 +51,7 @@ def command(job: Job, until: float | None, seed: int, case: int | None, samples:
         job.warn(warnings(body))
     pieces = partial(run.flight.pieces, samples, run.until)
     track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
-    job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track)
+    job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at))
     if run.stop.fault:
         say(f"nutdamp: the loop was stopped {stopped(run)}")
     leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import compared_with, robust_of
-from nutdamp.cli.job import FIGURES, Files, Job, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.job import FIGURES, Files, Job, carry_options, plot_options, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import OUTPUT, SchemeName, SessionCommand, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
@@ -50,10 +50,13 @@ PRIMER = "primer"
 @click.option("--table", type=OUTPUT, help="Write the comparison of schemes (CSV).")
 @click.option("--json", type=OUTPUT, help="Write all plans and residuals.")
 @click.option("--certificate", type=OUTPUT, help="Write the proof of the least cost (JSON).")
+@carry_options("end of the last pulse")
 @plot_options((*FIGURES, PRIMER))
 @click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
 @quiet_option
-def command(job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, verbose: bool) -> None:
+def command(
+    job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
+) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
 
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
@@ -88,6 +91,7 @@ def command(job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed
     result = dispersed or compared
     more: Files = {"json": result.to_dict, "table": lambda: scheme_table(compared, chosen).csv()}
     more |= _schedule_files(chosen, figure) | _proof_files(proof, figure)
+    more |= job.carried(chosen, at)
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
         job.note(comparison_warnings(compared))

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import flown_options, plan_or_read
-from nutdamp.cli.job import FIGURES, Job, deliver, plot_options, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import (
+    FIGURES,
+    Job,
+    carry_options,
+    deliver,
+    plot_options,
+    quiet_option,
+    spacecraft_argument,
+    verbose_option,
+)
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, SessionCommand, goal_options
 from nutdamp.errors import printable
@@ -78,11 +87,14 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 )
 @click.option("--csv", type=OUTPUT, help="Write the track.")
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
+@carry_options("the end")
 @plot_options(FIGURES)
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @verbose_option
 @quiet_option
-def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool, verbose: bool) -> None:
+def command(
+    job: Job, real: bool, until: float | None, samples: int, at: float | None, drawn: bool, verbose: bool
+) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
@@ -107,5 +119,5 @@ def command(job: Job, real: bool, until: float | None, samples: int, drawn: bool
         from nutdamp.figures.terminal import motion_drawing
 
         screens.append(partial(motion_drawing, simulation.shown, simulation.pictured))
-    job.deliver(simulation, *screens)
+    job.deliver(simulation, *screens, more=job.carried(plan, at, simulation.until))
     leave(missed=simulation.decision.met is False and len(simulation.flown.schedule) == len(plan.pulses))

@@ -14,7 +14,7 @@ import numpy as np
 from nutdamp.common import results
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
-from nutdamp.errors import Infeasible
+from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.dynamics import Dynamics, Path, Push
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
 from nutdamp.flight.propagation import Flight
@@ -151,6 +151,17 @@ class LoopPlan(Plan):
     def flight(self) -> Flight:
         """Motion to the end of the run."""
         return replace(seen_at(self.flown_run.flight, self.flown_run.until), scheme=LOOP)
+
+    @property
+    def carried_at(self) -> float:
+        """End of the run, s."""
+        return self.flown_run.until
+
+    def reaching(self, time: float) -> Flight:
+        """Flight of the run; raises BadRequest where it ends before ``time`` s."""
+        if time > self.flown_run.until:
+            raise BadRequest(f"the loop is flown to {self.flown_run.until:.6g} s: expected a time up to that")
+        return self.flown_run.flight
 
     @cached_property
     def largest(self) -> tuple[float, float]:

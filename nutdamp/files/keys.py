@@ -207,9 +207,31 @@ class StateSection(Section):
 class AttitudeSection(Section):
     """Attitude at t = 0; without it results refer to the frame with z along the angular momentum."""
 
-    quaternion: Quaternion = Field("Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0])
+    schema_extra: ClassVar = {
+        "oneOf": [
+            _needs("quaternion", without=("spin_axis", "phase", "sun_phase", "of")),
+            _needs("spin_axis", without=("quaternion",)),
+        ]
+    }
+
+    quaternion: Quaternion | None = Field("Turn from body to frame, scalar first; normalised when read.", [1, 0, 0, 0])
+    spin_axis: InTheSky | None = Field(
+        "Instead of quaternion: right ascension and declination of the spin axis, rad; see phase.",
+        ["120 deg", "-15 deg"],
+    )
+    phase: Angle | None = Field(
+        "Angle about spin_axis from its ascending node (z of the frame × spin axis; x of the frame at a pole) to body "
+        "axis 1, rad; default 0.",
+        "20 deg",
+    )
+    sun_phase: Angle | None = Field(
+        "Instead of phase: angle about spin_axis from the side of the Sun to body axis 1, rad; needs sun.", "35 deg"
+    )
+    of: Literal["axis", "momentum"] | None = Field(
+        "Vector that spin_axis and phase are of: the spin axis itself (default), or the angular momentum.", "momentum"
+    )
     epoch: Epoch | None = Field("Date and time of t = 0, ISO 8601; without a zone it is UTC.", "2026-03-01T12:00:00Z")
-    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the quaternion.", "EME2000")
+    frame: Literal["EME2000", "J2000", "GCRF"] | None = Field("Inertial frame of the attitude.", "EME2000")
 
 
 class ThrusterSection(Section):

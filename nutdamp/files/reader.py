@@ -178,6 +178,9 @@ Warn = Callable[[Fault], None]
 """Receiver of each number that is hardly meant."""
 
 
+POLE = 1e-9
+"""rad from a pole of the frame, up to which a spin axis has no ascending node."""
+
 GROWS = {"grows": True, "decays": False, None: None}
 """Values of ``dissipation.nutation``."""
 
@@ -197,14 +200,14 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     omega0 = _rates(contents, inertia)
     thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
-    steerable = _part(Steerable, contents.steerable)
+    steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
     spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
         omega0=omega0,
         mass=contents.mass,
-        attitude=_attitude(contents.attitude),
+        attitude=_attitude(contents.attitude, inertia, omega0, sunward),
         channels=tuple(
             Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
         ),
@@ -220,7 +223,6 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         cold=_part(Cold, contents.cold),
         tank=_tank(contents.tank),
     )
-    sunward = _sun(contents)
     return replace(
         spacecraft,
         goal=_goal(contents.goal, spacecraft),
@@ -374,10 +376,28 @@ def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Di
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
-def _attitude(section: AttitudeSection | None) -> Attitude | None:
+def _attitude(
+    section: AttitudeSection | None, inertia: Inertia, omega0: Vector, sunward: Vector | None
+) -> Attitude | None:
+    """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and H in the body."""
     if section is None:
         return None
-    return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
+    if section.quaternion is not None:
+        return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
+    assert section.spin_axis is not None
+    along = np.array([0.0, 0.0, math.copysign(1.0, omega0[2])])
+    if section.of == "momentum":
+        along = np.asarray(inertia.moments) * omega0
+    body_axis = inertia.axes @ (along / np.linalg.norm(along))
+    axis = attitude.on_sphere(*section.spin_axis)
+    side, phase = np.cross([0.0, 0.0, 1.0], axis), section.phase or 0.0
+    if np.linalg.norm(side) < POLE:
+        side = np.array([1.0, 0.0, 0.0])
+    if section.sun_phase is not None:
+        assert sunward is not None
+        side, phase = sunward, section.sun_phase
+    quaternion = attitude.about_axis(body_axis, np.array([1.0, 0.0, 0.0]), axis, side, phase)
+    return Attitude(quaternion, section.epoch, section.frame)
 
 
 def _orbit(section: OrbitSection | None) -> Orbit | None:

@@ -112,11 +112,9 @@ def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[
 
 def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
     """A Sun that gives no pulse: along the spin ``axis`` (3,) in the body at t = 0, or out of the sensor's view."""
-    turned, direction = facts.vector("number", 4, "attitude", "quaternion"), _to_sun(facts)
-    if not facts.has("sun_sensor") or turned is None or direction is None or not np.any(turned):
+    angle = _sun_angle(facts, axis) if facts.has("sun_sensor") else None
+    if angle is None:
         return
-    seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
-    angle = float(attitude.angle_between(seen, axis))
     if min(angle, math.pi - angle) < ALONG:
         yield Finding(("sun",), "lies along the spin axis at t = 0, so that no Sun pulse comes to fire blocks")
         return
@@ -129,6 +127,20 @@ def _sun_in_view(facts: Facts, axis: Vector) -> Iterator[Finding]:
             f"it sees from {max(low, 0.0):.4g} to {min(high, 180.0):.4g} deg"
         )
         yield Finding(("sun_sensor",), problem, True)
+
+
+def _sun_angle(facts: Facts, axis: Vector) -> float | None:
+    """Angle of the Sun from the spin ``axis`` (3,) in the body at t = 0, rad; None where it cannot be read."""
+    direction, turned = _to_sun(facts), facts.vector("number", 4, "attitude", "quaternion")
+    if direction is None:
+        return None
+    if turned is not None and np.any(turned):
+        seen = attitude.rotate(attitude.conjugate(turned / np.linalg.norm(turned)), direction)
+        return float(attitude.angle_between(seen, axis))
+    given = facts.vector("angle", 2, "attitude", "spin_axis")
+    if given is None or facts.text("attitude", "of") == "momentum":
+        return None
+    return float(attitude.angle_between(attitude.on_sphere(*given.tolist()), direction))
 
 
 def _orbit(facts: Facts) -> Iterator[Finding]:
@@ -393,10 +405,43 @@ def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
     return ("omega0",), spin if abs(spin) > CANCELLED * norm(omega0) else 0.0
 
 
+BY_AXIS = ("spin_axis", "phase", "sun_phase", "of")
+"""Keys of an attitude by the direction of its spin axis."""
+
+
 def _attitude(facts: Facts) -> Iterator[Finding]:
+    by_axis = [key for key in BY_AXIS if facts.has("attitude", key)]
+    if facts.has("attitude", "quaternion"):
+        for key in by_axis:
+            yield Finding(("attitude", key), "given together with quaternion; keep one of the two", True)
+    elif isinstance(getattr(facts.root.get("attitude"), "value", None), dict):
+        if "spin_axis" not in by_axis:
+            cure = "or spin_axis: [right ascension, declination]"
+            yield Finding(("attitude", "quaternion"), f"missing; turn from body to frame, scalar first, {cure}")
+        if "sun_phase" in by_axis:
+            yield from _sun_phase(facts)
+    declination = facts.number("angle", "attitude", "spin_axis", 1)
+    if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
+        angle = f"{math.degrees(declination):g} deg"
+        problem = f"{angle} is no declination; expected an angle from -90 deg to 90 deg"
+        yield Finding(("attitude", "spin_axis", 1), problem)
     quaternion = facts.vector("number", 4, "attitude", "quaternion")
     if quaternion is not None and norm(quaternion) < SMALLEST:
         yield Finding(("attitude", "quaternion"), "zero; expected a rotation, such as [1, 0, 0, 0]")
+
+
+def _sun_phase(facts: Facts) -> Iterator[Finding]:
+    """Faults of an attitude whose phase counts from the side of the Sun."""
+    path = ("attitude", "sun_phase")
+    if facts.has("attitude", "phase"):
+        yield Finding(path, "given together with phase; keep one of the two", True)
+    if not facts.has("sun"):
+        yield Finding(path, "needs the key sun: [right ascension, declination], or sun: epoch", True)
+    axis, direction = facts.vector("angle", 2, "attitude", "spin_axis"), _to_sun(facts)
+    if axis is not None and direction is not None:
+        angle = float(attitude.angle_between(attitude.on_sphere(*axis.tolist()), direction))
+        if min(angle, math.pi - angle) < ALONG:
+            yield Finding(path, "the Sun lies along spin_axis, which has no side of the Sun then; give phase", True)
 
 
 def disturbance_kind(kind: str | None, turns: bool) -> str:

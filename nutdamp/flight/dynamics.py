@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from nutdamp.common import work
-from nutdamp.physics import attitude, energy_sink, taylor
+from nutdamp.physics import attitude, energy_sink, taylor, triaxial
 from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Schedule
@@ -70,6 +70,26 @@ class Arc:
 
 
 @dataclass(frozen=True, slots=True)
+class FreeCoast:
+    """Coast of a rigid body with any principal ``moments`` in closed form, from ``state`` at ``start`` s."""
+
+    moments: tuple[float, float, float]
+    start: float
+    state: SpinState
+
+    @property
+    def steps(self) -> int:
+        """A closed form takes none."""
+        return 0
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        since, rates = np.asarray(times) - self.start, self.state.rates
+        turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
+        return triaxial.free_rates(self.moments, rates, since), turned
+
+
+@dataclass(frozen=True, slots=True)
 class Integrated:
     """Motion under a constant torque, or of a body with three different moments, as Taylor pieces."""
 
@@ -91,6 +111,9 @@ class Integrated:
             body[rows], quaternion[rows] = self.pieces[index].at(times[rows])
         return body, quaternion
 
+
+LONG = 20.0
+"""Turn, rad, from which a free coast of a body with three moments is flown in closed form: Taylor pieces cost more."""
 
 LEG, PULSE = 0.03, 0.4
 """Units of `work` of a leg of a flight, and additional ones of an integrated leg."""
@@ -173,6 +196,12 @@ class Dynamics:
             arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
+        long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
+        if long and falling is None and slope is None and not torque.any() and self.forcing == Forcing():
+            coast = FreeCoast(self.moments, start, state)
+            (rates,), (quaternion,) = coast.motion(np.array([end]))
+            work.spend(PULSE)
+            return coast, SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
         pieces = taylor.integrate(
             self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
         )

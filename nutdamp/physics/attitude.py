@@ -142,6 +142,22 @@ def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, 
     return np.array([w * cosine - z * sine, x * cosine + y * sine, y * cosine - x * sine, z * cosine + w * sine])
 
 
+def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, phase: float) -> Array:
+    """Quaternion (4,) body -> inertial that lays a ``body_axis`` (3,) along an inertial ``axis`` (3,), unit vectors.
+
+    ``phase`` rad about it leads from an inertial ``side`` (3,) to a ``body_side`` (3,), both seen along the axis.
+    """
+    frames = []
+    for along, towards in ((body_axis, body_side), (axis, side)):
+        across = np.cross(along, towards)
+        across /= np.linalg.norm(across)
+        frames.append(np.column_stack([np.cross(across, along), across, along]))
+    turn = np.array(
+        [[math.cos(phase), -math.sin(phase), 0.0], [math.sin(phase), math.cos(phase), 0.0], [0.0, 0.0, 1.0]]
+    )
+    return from_matrix(frames[1] @ turn @ frames[0].T)
+
+
 def full_turn(angle: float) -> float:
     """Angle reduced to [0, 2π)."""
     turned = angle % (2.0 * math.pi)

@@ -261,6 +261,15 @@ class Plan(results.Data, results.Tabled):
         fly = propagation.by_impulses if by_impulses else propagation.flown
         return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
 
+    @property
+    def carried_at(self) -> float:
+        """Time, s, from which the spacecraft is carried on by default."""
+        return self.end
+
+    def reaching(self, time: float) -> Flight:
+        """Flight through the real pulse widths as far as ``time`` s at least."""
+        return propagation.flown(self.spacecraft, self.pulses, time)
+
     @cached_property
     def residual(self) -> Residual | None:
         """Residual by the impulse sum (17)."""

@@ -163,11 +163,9 @@ class OptimalOptions(SchemeOptions):
     least: str = _option(
         LEAST[0],
         OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
-        "What to save; impulse if propellant is unknown.",
+        "What to save.",
     )
-    free_axis: bool | None = _option(
-        None, dataclasses.replace(FLAG, none=True), "Let H end anywhere, whatever momentum_shift requires."
-    )
+    free_axis: bool | None = _option(None, dataclasses.replace(FLAG, none=True), "Let H end anywhere.")
     shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
-from nutdamp.files.editing import notes
+from nutdamp.files.fitted import notes
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable

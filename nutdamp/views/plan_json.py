@@ -126,12 +126,15 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
 
 def final_json(flown: Flight) -> dict[str, Any]:
     """Final spin axis and angular momentum, and the motion from then on."""
-    body, final = flown.spacecraft, flown.final
+    body, final, settled = flown.spacecraft, flown.final, flown.settled
+    rates, quaternion = body.inertia.in_file_axes(settled.rates, settled.quaternion)
     return {
         "axis": direction_json(body, final.axis),
         "momentum": direction_json(body, final.momentum),
         "spin_rad_s": final.spin,
         "nutation_deg": math.degrees(final.nutation),
+        "omega_rad_s": rates.tolist(),
+        "quaternion": quaternion.tolist(),
     }
 
 

@@ -20,6 +20,7 @@ from nutdamp.flight import dynamics as motion
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import Dynamics, make_dynamics
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics import taylor
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
@@ -71,10 +72,22 @@ def test_a_trial_costs_what_comes_after_the_pulse_that_has_changed(moved: int) -
 
 def test_a_flight_that_is_remembered_keeps_its_limit_of_steps() -> None:
     remembering = make_dynamics(THREE).remembering()
-    path, _ = remembering.path(THREE.initial, 0.0, 50.0, most=1000)
-    assert remembering.path(THREE.initial, 0.0, 50.0, most=path.steps)[0] is path
+    torque = [np.array([0.0, 0.0, 0.1])]
+    path, _ = remembering.path(THREE.initial, 0.0, 50.0, torque, most=1000)
+    assert remembering.path(THREE.initial, 0.0, 50.0, torque, most=path.steps)[0] is path
     with pytest.raises(Infeasible):
-        remembering.path(THREE.initial, 0.0, 50.0, most=path.steps - 1)
+        remembering.path(THREE.initial, 0.0, 50.0, torque, most=path.steps - 1)
+
+
+@given(triaxial_spinners())
+def test_a_long_coast_in_closed_form_is_that_of_taylor_series(body: Spacecraft) -> None:
+    end = 3.0 * motion.LONG / float(np.linalg.norm(body.omega0))
+    path, after = make_dynamics(body).path(body.initial, 0.0, end, most=1000)
+    pieces = taylor.integrate(body.inertia.moments, np.zeros(3), body.omega0, body.initial.quaternion, 0.0, end)
+    rates, quaternion = pieces[-1].final
+    assert path.steps == 0
+    assert np.allclose(after.rates, rates, rtol=0.0, atol=1e-10 * np.linalg.norm(rates))
+    assert np.allclose(after.quaternion, quaternion, rtol=0.0, atol=1e-10)
 
 
 def test_legs_are_forgotten_before_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:

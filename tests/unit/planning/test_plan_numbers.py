@@ -15,9 +15,10 @@ from support.cases import deep
 
 from nutdamp.planning.plan import Plan, plan
 from nutdamp.schemes.catalogue import CLASSIC
-from nutdamp.spacecraft.equipment import STANDARD_GRAVITY, Channel, Steerable
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.units import STANDARD_GRAVITY
 
 
 def jet(name: str, position: tuple[float, float, float], force: tuple[float, float, float]) -> Channel:

@@ -279,7 +279,7 @@ def test_every_json_and_screen_says_where_it_ends(run: Run, tmp_path: Path, comm
     written = written["plans"][0] if command == "plan" else written
     assert written["target"]["axis"] == pytest.approx({"right_ascension_deg": 350.0, "declination_deg": 20.0})
     final = written["final"]
-    assert set(final) == {"axis", "momentum", "spin_rad_s", "nutation_deg"}
+    assert set(final) == {"axis", "momentum", "spin_rad_s", "nutation_deg", "omega_rad_s", "quaternion"}
     assert final["spin_rad_s"] == pytest.approx(3.0, abs=0.01)
     for end, name in (("axis", "spin axis"), ("momentum", "H")):
         angles = [final[end]["right_ascension_deg"], final[end]["declination_deg"]]
