@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from nutdamp import errors
     from nutdamp.api import (
         budget,
-        carry,
         check,
         compare,
         disperse,
@@ -83,7 +82,6 @@ __all__ = [
     "Verified",
     "__version__",
     "budget",
-    "carry",
     "check",
     "compare",
     "disperse",

@@ -258,29 +258,6 @@ def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, sam
     return Simulation(plan, end, flown, units.rows(samples), drawn_to)
 
 
-def carry(plan: Plan, at: float | None = None) -> Spacecraft:
-    """Carry the spacecraft of a plan on: its file with the state that the flight of the plan has at a later time.
-
-    Parameters
-    ----------
-    plan
-        Of `plan`, `load_schedule` or `loop`, of a spacecraft that was read from a file.
-    at
-        Time, s, that becomes t = 0; default the end of the last pulse, of a loop the end of its run.
-
-    Examples
-    --------
-    >>> damped = nutdamp.plan(nutdamp.example(), "two-pulse")
-    >>> nutdamp.carry(damped, 60.0).nutation < 1e-9
-    True
-    """
-    from nutdamp.files.carried import carried_spacecraft
-    from nutdamp.planning.plan import feasible
-
-    time = feasible(plan).carried_at if at is None else units.end_of_flight(at)
-    return carried_spacecraft(plan.reaching(time), time, plan.spacecraft.source)
-
-
 def trade(
     spacecraft: Spacecraft,
     points: int = 10,

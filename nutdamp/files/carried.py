@@ -19,6 +19,7 @@ from nutdamp.files.overrides import overlay
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
+from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState
 from nutdamp.spacecraft.schedule import touching
 
@@ -70,15 +71,16 @@ def carried_text(flight: Flight, time: float, source: object) -> str:
     Raises BadRequest as `later` does, for values that an alias stands for, and where no file was read.
     """
     if not isinstance(source, Source):
-        raise BadRequest("carry: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+        raise BadRequest("carried: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
     of_file = source.read(lambda _: None)
     moved_on = later(replace(flight, spacecraft=replace(flight.spacecraft, goal=of_file.goal)), time)
     return carry_text(*source, lambda tree: _edits(tree, moved_on))
 
 
-def carried_spacecraft(flight: Flight, time: float, source: object) -> Spacecraft:
-    """Spacecraft of `carried_text`; raises as that does."""
-    text = carried_text(flight, time, source)
+def carried_spacecraft(plan: Plan, time: float) -> Spacecraft:
+    """Spacecraft of `carried_text` for the flight of a plan; raises as that does."""
+    source = plan.spacecraft.source
+    text = carried_text(plan.reaching(time), time, source)
     return Source(text, source.name if isinstance(source, Source) else "carried").read()
 
 

@@ -71,6 +71,7 @@ VIEWS = {
     "Fitted.data": "views.fit:fit_json core",
     "Fitted.figure": "figures.fit:fit_figure core",
     "Fitted.text": "files.fitted:fitted_file core",
+    "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.fitted:fitted_spacecraft",
     "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
     "Verified.screen": "views.verification:verification_screen plan core",

@@ -266,6 +266,15 @@ class Plan(results.Data, results.Tabled):
         """Time, s, from which the spacecraft is carried on by default."""
         return self.end
 
+    def carried(self, at: float | None = None) -> Spacecraft:
+        """Spacecraft of the file with the state that the flight has ``at`` a time, s, as ``plan -o`` writes it.
+
+        Default the end of the last pulse, of a loop that of its run. Raises BadRequest for a spacecraft that was not
+        read from a file, and while a pulse is on.
+        """
+        body: Spacecraft = results.view(feasible(self), "carried", self.carried_at if at is None else at)
+        return body
+
     def reaching(self, time: float) -> Flight:
         """Flight through the real pulse widths as far as ``time`` s at least."""
         return propagation.flown(self.spacecraft, self.pulses, time)

@@ -81,7 +81,7 @@ def test_at_a_pole_the_phase_counts_from_x(dec: float) -> None:
 
 def test_a_file_carried_on_holds_a_quaternion_instead() -> None:
     spacecraft = body("spin_axis: [120 deg, -15 deg], phase: 20 deg, epoch: 2026-03-01T12:00:00Z")
-    carried = nutdamp.carry(nutdamp.plan(spacecraft, "none"), 10.0)
+    carried = nutdamp.plan(spacecraft, "none").carried(10.0)
     flight = nutdamp.plan(spacecraft, "none").fly(10.0).track
     turned = attitude.multiply(attitude.conjugate(quaternion(carried)), flight.quaternion[-1])
     assert np.linalg.norm(turned[1:]) < 1e-10

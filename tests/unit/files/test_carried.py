@@ -55,7 +55,7 @@ def turned(first: np.ndarray, second: np.ndarray) -> float:
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
 def test_the_file_carried_on_flies_as_the_plan_does(text: str) -> None:
     plan = planned(text)
-    carried = nutdamp.carry(plan, 40.0)
+    carried = plan.carried(40.0)
     expected, flight = plan.fly(70.0).track, nutdamp.plan(carried, "none").fly(30.0).track
     assert np.allclose(flight.rates[-1], expected.rates[-1], rtol=0.0, atol=1e-10)
     assert turned(flight.quaternion[-1], expected.quaternion[-1]) < 1e-9
@@ -65,7 +65,7 @@ def test_the_file_carried_on_flies_as_the_plan_does(text: str) -> None:
 
 def test_tank_and_mass_are_those_left() -> None:
     plan = planned(TEXTS["tank"])
-    used, carried = plan.propellant or 0.0, nutdamp.carry(plan)
+    used, carried = plan.propellant or 0.0, plan.carried()
     before, after = plan.spacecraft.tank, carried.tank
     assert before is not None
     assert after is not None
@@ -78,9 +78,9 @@ def test_tank_and_mass_are_those_left() -> None:
 
 def test_a_target_stays_where_it_is_in_space() -> None:
     """Without an attitude a file knows space by the motion at t = 0, which is another one in the file carried on."""
-    plan = planned(BASE + "goal: {tilt: 10 deg, azimuth: 45 deg}\n")
+    plan = nutdamp.plan(nutdamp.read(BASE + "goal: {tilt: 10 deg, azimuth: 45 deg}\n"), "none")
     moved_on = later(plan.reaching(33.0), 33.0)
-    carried = nutdamp.carry(plan, 33.0)
+    carried = plan.carried(33.0)
     seen = [
         attitude.rotate(attitude.conjugate(moved_on.quaternion), plan.spacecraft.target_axis),
         attitude.rotate(attitude.conjugate(carried.initial.quaternion), carried.target_axis),
@@ -89,7 +89,7 @@ def test_a_target_stays_where_it_is_in_space() -> None:
 
 
 def test_comments_and_units_are_kept() -> None:
-    carried = nutdamp.carry(planned(BASE), 40.0)
+    carried = planned(BASE).carried(40.0)
     assert isinstance(carried.source, Source)
     lines = carried.source.text.splitlines()
     assert "name: Sounder  # flown twice" in lines
@@ -100,9 +100,9 @@ def test_comments_and_units_are_kept() -> None:
 
 def test_a_chain_of_files_is_one_flight() -> None:
     body = nutdamp.read(TEXTS["symmetric"])
-    once, many = nutdamp.carry(nutdamp.plan(body, "none"), 60.0), body
+    once, many = nutdamp.plan(body, "none").carried(60.0), body
     for _ in range(6):
-        many = nutdamp.carry(nutdamp.plan(many, "none"), 10.0)
+        many = nutdamp.plan(many, "none").carried(10.0)
     assert many.omega0 == pytest.approx(once.omega0, abs=1e-10)
     assert turned(many.initial.quaternion, once.initial.quaternion) < 1e-9
 
@@ -111,14 +111,14 @@ def test_what_no_file_can_hold_is_refused() -> None:
     plan = planned(BASE)
     first = plan.pulses[0]
     with pytest.raises(BadRequest, match="is on at"):
-        nutdamp.carry(plan, first.t)
+        plan.carried(first.t)
     body = nutdamp.read(BASE + TANK.replace("0.5 kg", "1 g"))
     empty = Plan(body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)])))
     with pytest.raises(BadRequest, match="no propellant"):
-        nutdamp.carry(empty)
+        empty.carried()
     replaced: Spacecraft = plan.spacecraft.replace(mass=3.0)
     with pytest.raises(BadRequest, match="no field replaced"):
-        nutdamp.carry(nutdamp.plan(replaced, "two-pulse"))
+        nutdamp.plan(replaced, "two-pulse").carried()
 
 
 @pytest.mark.parametrize(("command", "lasts"), [
