@@ -11,7 +11,7 @@ from nutdamp.cli.job import FileInput, Job, deliver, expect_outputs, quiet_optio
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, FILE, OUTPUT, NameType, SessionCommand, goal_options
 from nutdamp.cli.screen import say
-from nutdamp.errors import printable
+from nutdamp.errors import BadRequest, printable
 from nutdamp.views.exchange import FORMATS, expect_possible, lacking
 
 
@@ -78,25 +78,45 @@ def _format(form: str | None, spacecraft: FileInput, more: list[str]) -> str:
 @click.command("import", cls=SessionCommand)
 @click.argument("given", nargs=-1, required=True, type=FILE, metavar="[apm] FILE")
 @click.option("-o", "--output", type=OUTPUT, default="-", help="Spacecraft file to write; default standard output.")
+@click.option("--into", type=FILE, help="Spacecraft file into which the message is merged.")
+@click.option("--inertia", is_flag=True, help="Merge the moments of inertia too.")
+@click.option("--at", type=END, help="Record of an AEM, after its first; default the first.")
 @click.option("--schedule", type=OUTPUT, help="Write the manoeuvres as a schedule for `simulate --schedule`.")
 @quiet_option
-def import_command(job: Job, given: tuple[str, ...]) -> None:
-    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, in KVN).
+def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: bool, at: float | None) -> None:
+    """Make a spacecraft file from a CCSDS attitude parameter message (APM, version 2, KVN), or merge one into a file.
 
-    The message needs an inertia block and the motion: angular velocity or spin. It knows no thrusters; where all its
-    manoeuvres are transverse and of one torque, the file gets a steerable torquer of that torque. FILE may be - for
-    standard input.
+    With --into the attitude, epoch and rates of an APM, or of a record of an attitude history (AEM), replace those of a
+    spacecraft file; all else stays. Without it the message needs an inertia block and the motion: angular velocity or
+    spin. It knows no thrusters; where all its manoeuvres are transverse and of one torque, the file gets a steerable
+    torquer of that torque. FILE may be - for standard input.
     """
     *form, file = given
     if form not in ([], ["apm"]):
         raise click.UsageError(f"expected one FILE, an attitude parameter message; got {' '.join(given)}")
     output, schedule = job.written["output"], job.written["schedule"]
-    expect_outputs(file, output=output, schedule=schedule)
+    expect_outputs(file, into, output=output, schedule=schedule)
+    if into is None and (inertia or at is not None):
+        raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
 
+    from nutdamp.files.ccsds.history import is_history, read_history
     from nutdamp.files.ccsds.read import contradictions, imported, read_apm
     from nutdamp.flight.propagation import flown
     from nutdamp.views.pulses import pulse_table
 
+    if into is not None:
+        if schedule is not None:
+            raise click.UsageError("--schedule writes the manoeuvres of a message that makes a spacecraft file")
+        from nutdamp.files.ccsds.merge import merged_text, motion_of
+
+        message = read_history(file) if is_history(file) else read_apm(file)
+        for entry in message.remarks:
+            job.remark(f"{file}: {entry}")
+        merged = merged_text(FileInput(into).source(job.remark), motion_of(message, at or 0.0), inertia=inertia)
+        deliver([(output, lambda: merged)])
+        return
+    if is_history(file):
+        raise BadRequest(f"{file}: an attitude history has no inertia; --into merges it into a spacecraft file")
     contents = read_apm(file)
     text, body, pulses = imported(contents, file)
     deliver([(output, lambda: text), (schedule, lambda: pulse_table(flown(body, pulses)).csv())])

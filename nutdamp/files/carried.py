@@ -59,7 +59,7 @@ def later(flight: Flight, time: float) -> Later:
             replace(each, transverse=each.transverse * cmath.exp(1j * each.rate * time)) for each in before.disturbances
         ),
     )
-    moved_on = Later(before, after, state, time)
+    moved_on = Later(before, after, state)
     if changed is None:
         return moved_on
     return moved_on._replace(after=replace(after, attitude=replace(changed, quaternion=moved_on.quaternion)))

@@ -138,16 +138,14 @@ Edits = Iterator[tuple[KeyPath, str]]
 
 
 class Later(NamedTuple):
-    """The spacecraft of a file ``time`` s after its t = 0, and its motion then.
+    """The spacecraft ``before`` of a file, and ``after``: as it is to be at t = 0 from now on.
 
-    ``after`` has the moments and the motion of that moment at its own t = 0; ``state`` is that motion in principal
-    axes and in the frame of ``before``.
+    ``state`` is the motion of ``after`` in its principal axes and in the frame of ``before``.
     """
 
     before: Spacecraft
     after: Spacecraft
     state: SpinState
-    time: float
 
     @property
     def quaternion(self) -> np.ndarray:
@@ -157,13 +155,14 @@ class Later(NamedTuple):
 
 def motion_edits(tree: Node, later: Later) -> Edits:
     """Moments, motion, attitude, epoch, and the target where it counts from the motion."""
-    yield from _inertia(tree, later)
-    yield from _motion(tree, later)
-    yield from _attitude(tree, later)
+    yield from inertia_edits(tree, later)
+    yield from rate_edits(tree, later)
+    yield from attitude_edits(tree, later)
     yield from _goal(tree, later)
 
 
-def _inertia(tree: Node, later: Later) -> Edits:
+def inertia_edits(tree: Node, later: Later) -> Edits:
+    """Moments of inertia."""
     inertia = later.after.inertia
     if tree.get("inertia", "tensor") is None and inertia.symmetric:
         for key, value in (("A", inertia.A), ("C", inertia.C)):
@@ -177,7 +176,8 @@ def _inertia(tree: Node, later: Later) -> Edits:
         yield ("inertia", "tensor"), f"[{rows}]"
 
 
-def _motion(tree: Node, later: Later) -> Edits:
+def rate_edits(tree: Node, later: Later) -> Edits:
+    """Rates at t = 0, as the file gives them."""
     inertia, state, rates = later.after.inertia, later.state, later.after.rates
     if tree.get("state") is not None and inertia.symmetric and inertia.aligned:
         angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(state.omega), state.spin)
@@ -204,19 +204,21 @@ def epoch_after(epoch: str, time: float) -> str:
     return f"{whole}.{part}".rstrip("0").rstrip(".") + "Z"
 
 
-def _attitude(tree: Node, later: Later) -> Edits:
-    if tree.get("attitude") is None:
+def attitude_edits(tree: Node, later: Later) -> Edits:
+    """Attitude, epoch and frame; nothing for a body without attitude."""
+    given, old = later.after.attitude, later.before.attitude
+    if given is None:
         return
-    quaternion = "[" + ", ".join(number(part) for part in later.quaternion) + "]"
-    given = later.before.attitude
-    if given is not None and tree.get("attitude", "quaternion") is None:  # another form, which holds a direction alone
-        epoch = None if given.epoch is None else epoch_after(given.epoch, later.time)
-        keys = {"quaternion": quaternion, "epoch": epoch, "frame": given.frame}
+    parts = "[" + ", ".join(number(part) for part in later.quaternion) + "]"
+    keys = {"quaternion": parts, "epoch": given.epoch, "frame": given.frame}
+    if tree.get("attitude", "quaternion") is None:  # none, or another form, which holds a direction alone
         yield ("attitude",), "{" + ", ".join(f"{key}: {value}" for key, value in keys.items() if value) + "}"
         return
-    yield ("attitude", "quaternion"), quaternion
-    if given is not None and given.epoch is not None and later.time != 0.0:
-        yield ("attitude", "epoch"), epoch_after(given.epoch, later.time)
+    yield ("attitude", "quaternion"), parts
+    for key in ("epoch", "frame"):
+        value = keys[key]
+        if value is not None and (old is None or value != getattr(old, key)):
+            yield ("attitude", key), value
 
 
 def _goal(tree: Node, later: Later) -> Edits:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.parameters import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, Carried, correlations, replaced
-from nutdamp.files.editing import Edits, Later, as_before, carry_text, motion_edits
+from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits
 from nutdamp.files.overrides import Setting
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node
@@ -86,7 +87,10 @@ def notes(fit: Fit, carried: Carried) -> Iterator[str]:
 
 def _edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     before = fit.model.spacecraft
-    yield from motion_edits(tree, Later(before, replaced(before, carried), carried.state, carried.time))
+    after, given = replaced(before, carried), before.attitude
+    if given is not None and given.epoch is not None and after.attitude is not None and carried.time != 0.0:
+        after = replace(after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time)))
+    yield from motion_edits(tree, Later(before, after, carried.state))
     yield from _dissipation(tree, fit, carried)
     yield from _thrusts(tree, carried)
     for channel, late in _delays(fit):

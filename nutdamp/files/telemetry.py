@@ -2,7 +2,7 @@
 
 Columns: t_s (from t = 0 of the spacecraft file) or utc; omega_1_rad_s to omega_3_rad_s (or _deg_s); axis_ra_deg and
 axis_dec_deg, or axis_x, axis_y, axis_z; acceleration_m_s2; sun_pulse, 1 from the sample on that has seen one. A track
-of ``simulate --csv`` is such a file.
+of ``simulate --csv`` is such a file. An attitude history (AEM) gives the axis, and the rates where it has them.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
 from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, SUN_PULSE, Record
+from nutdamp.files.ccsds.history import is_history, read_history, record_of
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Cells, Table
 from nutdamp.spacecraft.model import Spacecraft
@@ -47,6 +49,11 @@ def read_telemetry(
 
     Raises CannotRead, and FaultyFile with every fault of the first file that has one.
     """
+    if is_history(str(path)):
+        history = read_history(str(path))
+        seen = np.empty(0) if sun_pulses is None else read_sun_pulses(sun_pulses, spacecraft)
+        record = record_of(history, spacecraft, schedule or Schedule())
+        return replace(record, sun_pulses=seen), [f"{path}: {remark}" for remark in history.remarks]
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_columns(table)
     rows = [(line, cells) for line, row in table.rows if (cells := table.cells(line, row)) is not None]

@@ -1,8 +1,6 @@
 """Attitude parameter messages in KVN read, and turned into a spacecraft file and a schedule.
 
-Every keyword is checked against its table: known, once, in order, of the right form; every fault has its line. Other
-readers take what breaks the standard in silence: swapped frames, quaternions of any length, no epoch. Here nothing is
-guessed. Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
+Attitude and rates come from QUAT (or EULER) and ANGVEL, or else from SPIN by annex F5.
 """
 
 from __future__ import annotations
@@ -10,13 +8,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from nutdamp.common.time import DIGITS, UNIFORM, Epoch
-from nutdamp.errors import Fault, FaultyFile, listed, nearest, printable
+from nutdamp.common.time import DIGITS, Epoch
+from nutdamp.errors import Fault, FaultyFile, printable
+from nutdamp.files.ccsds.checked import BODY, SAME_AXES, UNIT, Checked, Frames, expect_version, kvn_text, unit_length
 from nutdamp.files.ccsds.message import (
     APM_BLOCKS,
     APM_METADATA,
@@ -25,131 +23,18 @@ from nutdamp.files.ccsds.message import (
     VERSION,
     Keyword,
     MessageBlock,
-    MessageEntry,
     from_kvn,
 )
-from nutdamp.files.export import FRAMES
 from nutdamp.files.reader import read_spacecraft
-from nutdamp.files.yaml import read_limited, utf8_text
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
-LARGEST = 1e15
-"""Larger magnitudes are nothing physical."""
-
-_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-
-
-class Checked:
-    """A block by keyword; problems go to ``faults``, and an unreadable value is then None."""
-
-    def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
-        self.file, self.block, self.faults = file, block, faults
-        self.entries: dict[str, MessageEntry] = {}
-        self._known = {keyword.name: keyword for keyword in keywords}
-        self._fill()
-        for keyword in keywords:
-            if keyword.required and keyword.name not in self.entries:
-                self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
-
-    def _fill(self) -> None:
-        order = list(self._known)
-        last = ""
-        for entry in self.block.entries:
-            name = entry.keyword
-            if name not in self._known:
-                close = nearest(name, order)
-                cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
-                self.faults.append(Fault(self.file, entry.line, 1, name, f"unknown keyword; {cure}"))
-            elif name in self.entries:
-                first = self.entries[name].line
-                self.faults.append(Fault(self.file, entry.line, 1, name, f"given again, first in line {first}"))
-            else:
-                self.entries[name] = entry
-                if last and order.index(name) < order.index(last):
-                    self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
-                else:
-                    last = name
-                self._form(entry, self._known[name])
-
-    def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
-        """Check that the value is of the kind in the table, and in its unit."""
-        if not entry.value:
-            self.fault(keyword.name, "empty; expected a value")
-        elif not keyword.text and not _NUMBER.fullmatch(entry.value):
-            self.fault(keyword.name, f"{entry.value[:40]!r} is not a number")
-        elif not keyword.text and not abs(float(entry.value)) <= LARGEST:
-            self.fault(keyword.name, f"{entry.value[:40]} is beyond anything physical")
-        if entry.unit and entry.unit != keyword.unit:
-            expected = f"[{keyword.unit}]" if keyword.unit else "no unit"
-            self.fault(keyword.name, f"expected {expected}, got [{entry.unit}]")
-
-    def fault(self, keyword: str, problem: str) -> None:
-        """Something wrong with a keyword, or, where it is missing, with the block."""
-        entry = self.entries.get(keyword)
-        line = self.block.line if entry is None else entry.line
-        self.faults.append(Fault(self.file, line, 1, keyword, problem))
-
-    def text(self, keyword: str) -> str | None:
-        """The value as it is; None where it is missing or empty."""
-        entry = self.entries.get(keyword)
-        return entry.value or None if entry else None
-
-    def number(self, keyword: str) -> float | None:
-        """The value as a number."""
-        text = self.text(keyword)
-        if text is None or not _NUMBER.fullmatch(text) or not abs(float(text)) <= LARGEST:
-            return None
-        return float(text)
-
-    def numbers(self, *keywords: str) -> list[float] | None:
-        """Several numbers; None where one cannot be read."""
-        values = [self.number(keyword) for keyword in keywords]
-        return None if None in values else [value for value in values if value is not None]
-
-    def epoch(self, keyword: str, system: str) -> Epoch | None:
-        """The value as a moment of a time system, see `Epoch.parse`."""
-        text = self.text(keyword)
-        if text is None:
-            return None
-        try:
-            return Epoch.parse(text, system)
-        except ValueError as wrong:
-            self.fault(keyword, str(wrong))
-            return None
-
-    def has(self, keywords: Iterable[str]) -> bool:
-        """True where all of ``keywords`` are here; some without the others is a fault."""
-        expected = list(keywords)
-        there = [keyword for keyword in expected if keyword in self.entries]
-        if there and len(there) < len(expected):
-            absent = next(keyword for keyword in expected if keyword not in there)
-            self.fault(there[0], f"given without {absent}; {', '.join(expected)} go together")
-            return False
-        return bool(there)
-
-
-def unit_length(parts: list[float], tolerance: float) -> bool:
-    """True where the parts are those of a unit vector, but for rounding in the message."""
-    return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
-
-
-UNIT = 1e-4
-"""Deviation from length one up to which a quaternion counts as rounded."""
-
 AGREES = 1e-4
 """Difference up to which SPIN agrees with the other blocks: rad, and relative for rates."""
 
-SAME_AXES = {"ICRF": "GCRF"}
-"""Frames whose axes are those of another that a spacecraft file knows."""
-
 _VERSION = "CCSDS_APM_VERS"
 _OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
-_BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
-_BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
-"""Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
-
 _NUTATION = ("NUTATION", "NUTATION_PER", "NUTATION_PHASE")
 
 
@@ -168,7 +53,7 @@ class Manoeuvre:
 class ApmContents:
     """Contents of a message, in body axes.
 
-    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m².
+    ``quaternion`` (4,) body -> frame, scalar first, or None; ``rates`` (3,) rad/s; ``tensor`` (3, 3) kg m², or None.
     ``nutation`` rad as SPIN states it, or None. ``lines`` are those where blocks begin; ``remarks`` are for
     the reader.
     """
@@ -179,54 +64,31 @@ class ApmContents:
     frame: str | None
     quaternion: Vector | None
     rates: Vector
-    tensor: Vector
+    tensor: Vector | None
     nutation: float | None
     manoeuvres: tuple[Manoeuvre, ...]
     lines: dict[str, int]
     remarks: tuple[str, ...]
 
 
-MOST_BYTES = 16 << 20
-"""Size of a message, many times more than its most manoeuvres take."""
-
-
 def read_apm(path: str) -> ApmContents:
     """The contents of a message; raises CannotRead, or FaultyFile with every fault of the file."""
-    data = read_limited(path, MOST_BYTES)
-    if data.lstrip(_BEFORE).startswith(b"<"):
-        cure = "write the message in keyword = value notation (KVN)"
-        raise FaultyFile([Fault(path, 1, 1, "", f"XML is not read; {cure}")])
-    blocks, faults = from_kvn(utf8_text(data, path), path)
-    _refuse_other_versions(path, blocks[0], faults)
+    blocks, faults = from_kvn(kvn_text(path), path)
+    expect_version(path, blocks[0], _VERSION, VERSION, faults)
     contents = _MessageReader(path, blocks, faults).read()
     if faults or contents is None:
         raise FaultyFile(faults)
     return contents
 
 
-def _refuse_other_versions(path: str, outside: MessageBlock, faults: list[Fault]) -> None:
-    """Another message, or another version of it, makes no sense by these tables."""
-    first = outside.entries[0] if outside.entries else None
-    if first is None or not re.fullmatch("CCSDS_[A-Z]+_VERS", first.keyword):
-        raise FaultyFile([*faults, Fault(path, 1, 1, "", f"not an APM: its first line is {_VERSION} = {VERSION}")])
-    if first.keyword != _VERSION:
-        raise FaultyFile([Fault(path, first.line, 1, first.keyword, f"another message; expected {_VERSION}")])
-    if first.value != VERSION:
-        problem = f"version {first.value!r} is not read, its keywords are others; expected version {VERSION}"
-        raise FaultyFile([Fault(path, first.line, 1, _VERSION, problem)])
-
-
-class _MessageReader:
+class _MessageReader(Frames):
     """One message; problems go to ``faults``."""
 
     def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
+        super().__init__()
         self.path, self.faults = path, faults
         self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
         self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
-        self.remarks: list[str] = []
-        self.body: str | None = None
-        self.frame: str | None = None
-        self.system = "UTC"
         self.nutation: float | None = None
         self._sort(blocks[1:])
 
@@ -253,12 +115,7 @@ class _MessageReader:
     def read(self) -> ApmContents | None:
         """The contents; None where faults leave none."""
         outside = self.outside
-        self.system = outside.text("TIME_SYSTEM") or "UTC"
-        if self.system not in ("UTC", *UNIFORM):
-            outside.fault("TIME_SYSTEM", f"expected UTC, {listed(list(UNIFORM), 'or')}, got {self.system!r}")
-            self.system = "UTC"
-        elif self.system != "UTC":
-            self._remark(f"times are {self.system}; the spacecraft file has them in UTC")
+        self.take_system(outside)
         epoch = outside.epoch("EPOCH", self.system)
         quaternion = self._attitude()
         rates = self._rates(quaternion)
@@ -267,7 +124,7 @@ class _MessageReader:
         manoeuvres = self._manoeuvres(epoch)
         if rates is None and not self.faults:
             self._fault(1, "ANGVEL", "missing; without an ANGVEL or a SPIN block the motion is not known")
-        if self.faults or epoch is None or rates is None or tensor is None:
+        if self.faults or epoch is None or rates is None:
             return None
         if quaternion is None:
             self.remarks.append("the message gives no attitude: frame and epoch are left out")
@@ -286,60 +143,19 @@ class _MessageReader:
             remarks=tuple(self.remarks),
         )
 
-    def _endpoints(self, block: Checked, *, reversible: bool = True) -> bool | None:
-        """True where the block leads from inertial frame to body, False for the reverse; None for other frames."""
-        first, second = block.text("REF_FRAME_A"), block.text("REF_FRAME_B")
-        if first is None or second is None:
-            return None
-        forward = _BODY.fullmatch(second) is not None
-        inertial, body = (first, second) if forward else (second, first)
-        keyword = "REF_FRAME_A" if forward else "REF_FRAME_B"
-        if not _BODY.fullmatch(body):
-            block.fault("REF_FRAME_B", f"{second!r}: one of the two frames must be the body, SC_BODY_1")
-            return None
-        if inertial not in (*FRAMES, *SAME_AXES):
-            block.fault(keyword, f"{inertial!r} is no inertial frame known here; expected one of {', '.join(FRAMES)}")
-            return None
-        if not forward and not reversible:
-            block.fault("REF_FRAME_A", "the body comes first; this block leads from the inertial frame to the body")
-            return None
-        self._body_frame(block, "REF_FRAME_B" if forward else "REF_FRAME_A", body)
-        known = SAME_AXES.get(inertial, inertial)
-        if known != inertial:
-            self._remark(f"{inertial} is taken as {known}, whose axes are the same")
-        if self.frame not in (None, known):
-            block.fault(keyword, f"{inertial!r} here, {self.frame!r} in another block; expected one frame")
-        self.frame = self.frame or known
-        return forward
-
-    def _body_frame(self, block: Checked, keyword: str, frame: str | None) -> None:
-        """Every block must mean the same body axes."""
-        if frame is None:
-            return
-        if not _BODY.fullmatch(frame):
-            block.fault(keyword, f"{frame!r} is no frame fixed in the body; expected SC_BODY_1")
-        elif self.body not in (None, frame):
-            block.fault(keyword, f"{frame!r} here, {self.body!r} in another block; expected one body frame")
-        else:
-            self.body = frame
-
-    def _remark(self, text: str) -> None:
-        if text not in self.remarks:
-            self.remarks.append(text)
-
     def _attitude(self) -> Vector | None:
         """Quaternion body -> frame of QUAT, or of EULER."""
         turn: Vector | None = None
         forward: bool | None = None
         block = self._one("QUAT")
         if block is not None:
-            forward, parts = self._endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
+            forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
             if parts is not None and not unit_length(parts, UNIT):
                 block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; expected 1")
             elif parts is not None and forward is not None:
                 turn = np.array(parts) / math.hypot(*parts)
         elif (block := self._one("EULER")) is not None:
-            forward, parts = self._endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
+            forward, parts = self.endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
             sequence = block.text("EULER_ROT_SEQ") or ""
             if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
                 block.fault("EULER_ROT_SEQ", f"{sequence!r} is no sequence of three turns, such as ZXZ")
@@ -352,14 +168,14 @@ class _MessageReader:
         block = self._one("ANGVEL")
         if block is None:
             return None
-        forward, parts = self._endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+        forward, parts = self.endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
         axes = block.text("ANGVEL_FRAME")
         if parts is None or axes is None or forward is None:
             return None
         # The rate "from A to B" is that of B against A (annex F4).
         rates = np.radians(parts) if forward else -np.radians(parts)
-        if _BODY.fullmatch(axes):
-            self._body_frame(block, "ANGVEL_FRAME", axes)
+        if BODY.fullmatch(axes):
+            self.body_frame(block, "ANGVEL_FRAME", axes)
             return rates
         if SAME_AXES.get(axes, axes) != self.frame:
             block.fault("ANGVEL_FRAME", f"{axes!r} is neither REF_FRAME_A nor REF_FRAME_B")
@@ -372,7 +188,7 @@ class _MessageReader:
     def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
         """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
         block = self._one("SPIN")
-        if block is None or self._endpoints(block, reversible=False) is None:
+        if block is None or self.endpoints(block, reversible=False) is None:
             return quaternion, rates
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
         nutating, with_momentum = block.has(_NUTATION), block.has(MOMENTUM)
@@ -397,17 +213,16 @@ class _MessageReader:
             momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
             rate += about_momentum * (attitude.matrix(turn).T @ momentum)
         if quaternion is not None and not _same_turn(quaternion, turn):
-            self._remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
+            self.remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
         if rates is not None and not np.allclose(rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)):
-            self._remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
+            self.remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
         return turn if quaternion is None else quaternion, rate if rates is None else rates
 
     def _inertia(self) -> Vector | None:
         block = self._one("INERTIA")
         if block is None:
-            self._fault(1, "INERTIA", "missing; a spacecraft file needs moments of inertia")
             return None
-        self._body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
+        self.body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
         parts = block.numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ")
         if parts is None:
             return None
@@ -422,7 +237,7 @@ class _MessageReader:
             begins, duration = block.epoch("MAN_EPOCH_START", self.system), block.number("MAN_DURATION")
             torque, mass = block.numbers("MAN_TOR_X", "MAN_TOR_Y", "MAN_TOR_Z"), block.number("MAN_DELTA_MASS")
             frame = block.text("MAN_REF_FRAME")
-            self._body_frame(block, "MAN_REF_FRAME", frame)
+            self.body_frame(block, "MAN_REF_FRAME", frame)
             if duration is not None and duration <= 0.0:
                 block.fault("MAN_DURATION", f"{duration:g} s is no duration; expected more than 0")
             if mass is not None and mass > 0.0:
@@ -471,6 +286,11 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
 
     Raises FaultyFile, with lines of the message, where its contents cannot be a spacecraft for nutdamp.
     """
+    if contents.tensor is None:
+        problem = (
+            "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has them"
+        )
+        raise FaultyFile([Fault(path, 1, 1, "INERTIA", problem)])
     bare = _read(spacecraft_text(contents, path, None), contents, path)
     torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
     torquer = _torquer(torques)
@@ -512,6 +332,7 @@ def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> 
     ]
     if contents.object_id is not None:
         lines.append(f"object_id: {_text(contents.object_id)}")
+    assert contents.tensor is not None
     lines += [
         *_inertia(contents.tensor),
         f"omega0: [{', '.join(f'{rate!r} deg/s' for rate in _degrees(contents.rates))}]",

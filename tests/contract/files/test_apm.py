@@ -15,7 +15,8 @@ from support.golden import check_text
 from support.places import case
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.ccsds.read import MOST_BYTES, ApmContents, euler, imported, read_apm
+from nutdamp.files.ccsds.checked import MOST_BYTES
+from nutdamp.files.ccsds.read import ApmContents, euler, imported, read_apm
 from nutdamp.physics import attitude
 
 GOOD = """\
@@ -107,6 +108,7 @@ def test_everything_is_read(read: Read) -> None:
     assert apm.epoch.text == "2026-03-01T12:00:00.500000000"
     assert apm.quaternion == pytest.approx([0.8, 0.0, 0.6, 0.0])
     assert apm.rates == pytest.approx(np.radians([8.0, 4.0, 180.0]))
+    assert apm.tensor is not None
     assert apm.tensor.tolist() == [[120.0, -1.0, 2.0], [-1.0, 100.0, 0.0], [2.0, 0.0, 80.0]]
     first, second = apm.manoeuvres
     assert (first.start, first.duration, first.torque.tolist(), first.mass) == (1.5, 0.5, [6.0, 0.0, 0.0], -0.01)
@@ -202,7 +204,6 @@ def test_faults(read: Read) -> None:
     (angvel,) = re.findall("ANGVEL_START.*ANGVEL_STOP\n", GOOD, re.DOTALL)
     several = edited("MAN_DURATION = 1", "MAN_DURATION = -1", edited("IZZ = 80", "IZZ = 80 [g]"))
     blocks = {
-        "no INERTIA": without("INERTIA"),
         "no ANGVEL": without("ANGVEL"),
         "two of ANGVEL": before("INERTIA", angvel),
         "ANGVEL first": before("QUAT", angvel, without("ANGVEL")),
@@ -254,3 +255,8 @@ def test_whatever_is_in_the_file_is_read_or_reported(read: Read, lines: list[str
         reported = [fault.line for fault in wrong.faults]
     assert reported
     assert min(reported) >= 1
+
+
+def test_a_message_without_inertia_makes_no_spacecraft_file_of_its_own() -> None:
+    with pytest.raises(FaultyFile, match="--into"):
+        imported(read(without("INERTIA")), "message.apm")

@@ -1,0 +1,147 @@
+"""Messages merged into a spacecraft file, and attitude histories as telemetry: what `export` writes is read back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.process import Run
+
+import nutdamp
+from nutdamp.errors import BadRequest, FaultyFile
+from nutdamp.files.ccsds.history import read_history
+from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import Spacecraft
+
+SPACECRAFT = """
+name: Sounder  # flown twice
+inertia: {A: 120 kg m^2, C: 80 kg m^2}
+omega0: [0.2 rad/s, 5 deg/s, 30 rpm]   # as released
+attitude: {quaternion: [0.9, 0.1, -0.2, 0.3], epoch: 2026-03-01T12:00:00Z, frame: EME2000}
+thrusters:
+  - {name: P, torque: [8, 0, 0], max_on_time: 1 s}
+"""
+TENSOR = SPACECRAFT.replace("{A: 120 kg m^2, C: 80 kg m^2}", "{tensor: [[120, 2, 1], [2, 110, 0.5], [1, 0.5, 80]]}")
+
+
+def exported(tmp_path: Path, text: str, form: str, until: float = 20.0) -> tuple[Path, nutdamp.Plan]:
+    plan = nutdamp.plan(nutdamp.read(text), "none")
+    path = tmp_path / f"message.{form}"
+    nutdamp.export(plan, form, path, until=until if form == "aem" else None)
+    return path, plan
+
+
+def turned(first: np.ndarray, second: np.ndarray) -> float:
+    return float(2.0 * np.linalg.norm(attitude.multiply(attitude.conjugate(first), second)[1:]))
+
+
+def quaternion(spacecraft: Spacecraft) -> np.ndarray:
+    assert spacecraft.attitude is not None
+    return spacecraft.attitude.quaternion
+
+
+@pytest.mark.parametrize("text", [SPACECRAFT, TENSOR], ids=["symmetric", "tensor"])
+def test_a_history_is_read_as_it_was_written(tmp_path: Path, text: str) -> None:
+    path, plan = exported(tmp_path, text, "aem")
+    history = read_history(str(path))
+    rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(history.times))
+    assert history.rates is not None
+    assert np.allclose(history.rates, rates, rtol=0.0, atol=1e-9)
+    assert max(turned(*pair) for pair in zip(history.quaternions, quaternions, strict=True)) < 1e-9
+    assert history.times[-1] == pytest.approx(20.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("form", "at"), [("apm", None), ("aem", None), ("aem", "7s")])
+@pytest.mark.parametrize("text", [SPACECRAFT, TENSOR], ids=["symmetric", "tensor"])
+def test_a_message_is_merged_into_a_file(run: Run, tmp_path: Path, text: str, form: str, at: str | None) -> None:
+    """Into a file with another motion: then it moves as the one that the message is of."""
+    path, plan = exported(tmp_path, text, form)
+    other = text.replace("[0.2 rad/s, 5 deg/s, 30 rpm]", "[0.1 rad/s, 2 deg/s, 29 rpm]").replace("[0.9, 0.1,", "[1, 0,")
+    (tmp_path / "other.yaml").write_text(other)
+    more = () if at is None else ("--at", at)
+    result = run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *more)
+    assert result.returncode == 0, result.stderr
+    merged = nutdamp.load(tmp_path / "merged.yaml")
+    assert merged.attitude is not None
+    assert merged.attitude.epoch is not None
+    since = float(merged.attitude.epoch.removesuffix("Z")[17:])
+    assert since >= (0.0 if at is None else 7.0)
+    rates, quaternions = plan.spacecraft.inertia.in_file_axes(*plan.reaching(20.0).motion(np.array([since])))
+    assert np.allclose(merged.rates, rates[0], rtol=0.0, atol=1e-9)
+    assert turned(quaternion(merged), quaternions[0]) < 1e-8
+    lines = (tmp_path / "merged.yaml").read_text().splitlines()
+    assert lines[1] == "name: Sounder  # flown twice"
+    assert lines[3].endswith("rpm]   # as released")
+
+
+def test_inertia_is_merged_only_where_it_is_asked_for(run: Run, tmp_path: Path) -> None:
+    path, _ = exported(tmp_path, TENSOR, "apm")
+    (tmp_path / "other.yaml").write_text(SPACECRAFT)
+    for flag, moment in ((), 120.0), (("--inertia",), 110.0):
+        result = run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml", *flag)
+        assert result.returncode == 0, result.stderr
+        assert nutdamp.load(tmp_path / "merged.yaml").inertia.tensor[1, 1] == pytest.approx(moment)
+
+
+def test_a_file_without_attitude_gets_one(run: Run, tmp_path: Path) -> None:
+    path, plan = exported(tmp_path, SPACECRAFT, "apm")
+    lines = [line for line in SPACECRAFT.splitlines() if not line.startswith("attitude")]
+    (tmp_path / "other.yaml").write_text("\n".join(lines))
+    assert run("import", path.name, "--into", "other.yaml", "-o", "merged.yaml").returncode == 0
+    assert turned(quaternion(nutdamp.load(tmp_path / "merged.yaml")), quaternion(plan.spacecraft)) < 1e-8
+
+
+def test_a_history_is_telemetry(tmp_path: Path) -> None:
+    path, plan = exported(tmp_path, SPACECRAFT, "aem")
+    guessed = plan.spacecraft.with_(inertia={"C": 82.0}, omega0=[0.18, 0.09, 3.1])
+    estimate = nutdamp.fit(path, guessed, ignored=print).spacecraft()
+    assert pytest.approx(80.0 / 120.0, rel=1e-4) == estimate.inertia.C / estimate.inertia.A
+    assert estimate.omega0 == pytest.approx(plan.spacecraft.omega0, abs=1e-4)
+
+
+def test_a_history_in_another_frame_is_no_telemetry(tmp_path: Path) -> None:
+    path, _ = exported(tmp_path, SPACECRAFT, "aem")
+    with pytest.raises(BadRequest, match="expected one frame"):
+        nutdamp.fit(path, nutdamp.read(SPACECRAFT.replace("EME2000", "GCRF")), ignored=print)
+
+
+@pytest.mark.parametrize(("old", "new", "problem"), [
+    ("= QUATERNION/ANGVEL", "= SPIN/NUTATION", "is not read"),
+    ("CCSDS_AEM_VERS = 2.0", "CCSDS_AEM_VERS = 1.0", "version"),
+    ("DATA_STOP", "", "DATA_STOP"),
+    ("REF_FRAME_A          = EME2000", "REF_FRAME_A          = MOON_ME", "no inertial frame"),
+])  # fmt: skip
+def test_faults_of_a_history_are_named(tmp_path: Path, old: str, new: str, problem: str) -> None:
+    path, _ = exported(tmp_path, SPACECRAFT, "aem")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(FaultyFile, match=problem):
+        read_history(str(path))
+
+
+def test_records_out_of_order_and_of_wrong_length_are_faults_with_lines(tmp_path: Path) -> None:
+    path, _ = exported(tmp_path, SPACECRAFT, "aem")
+    lines = path.read_text().splitlines()
+    first = lines.index("DATA_START") + 1
+    lines[first], lines[first + 1] = lines[first + 1], lines[first]
+    lines[first + 3] += " 1.0"
+    path.write_text("\n".join(lines))
+    with pytest.raises(FaultyFile) as wrong:
+        read_history(str(path))
+    assert [fault.line for fault in wrong.value.faults] == [first + 2, first + 4]
+
+
+@pytest.mark.parametrize(("arguments", "status"), [
+    (("import", "m.aem"), 2), (("import", "m.aem", "--at", "3s"), 2), (("import", "m.aem", "--inertia"), 2),
+    (("import", "m.aem", "--into", "s.yaml", "--inertia"), 2),
+    (("import", "m.aem", "--into", "s.yaml", "--at", "99s"), 2),
+    (("import", "m.aem", "--into", "s.yaml", "--schedule", "p.csv"), 2),
+])  # fmt: skip
+def test_what_cannot_be_merged_is_refused(run: Run, tmp_path: Path, arguments: tuple[str, ...], status: int) -> None:
+    path, _ = exported(tmp_path, SPACECRAFT, "aem")
+    path.rename(tmp_path / "m.aem")
+    (tmp_path / "s.yaml").write_text(SPACECRAFT)
+    assert run(*arguments, "-o", "out.yaml").returncode == status
+    assert not (tmp_path / "out.yaml").exists()
