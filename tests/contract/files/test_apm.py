@@ -257,6 +257,6 @@ def test_whatever_is_in_the_file_is_read_or_reported(read: Read, lines: list[str
     assert min(reported) >= 1
 
 
-def test_a_message_without_inertia_makes_no_spacecraft_file_of_its_own() -> None:
+def test_a_message_without_inertia_makes_no_spacecraft_file_of_its_own(read: Read) -> None:
     with pytest.raises(FaultyFile, match="--into"):
         imported(read(without("INERTIA")), "message.apm")
