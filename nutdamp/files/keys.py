@@ -283,6 +283,11 @@ class RequirementSection(Section):
     momentum_shift: AcuteAngle | None = Field(
         "Largest turn of the angular momentum, rad, above 0 and below 90 deg.", "0.2 deg"
     )
+    nutation_during: AcuteAngle | None = Field(
+        "Largest nutation angle on the way, rad, above 0 and below 90 deg: a cone of the spin axis about the angular "
+        "momentum, see keep.",
+        "2 deg",
+    )
     probability: Probability | None = Field(
         "How surely dispersed flights must meet it, above 0 and below 1 (or in %).", "99.7 %"
     )

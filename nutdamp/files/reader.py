@@ -227,7 +227,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         spacecraft,
         goal=_goal(contents.goal, spacecraft),
         sun=sunward,
-        keep=tuple(_keep(entry, sunward) for entry in contents.keep),
+        keep=(*(_keep(entry, sunward) for entry in contents.keep), *_on_the_way(contents.requirement)),
         sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
         commands=_commands(contents.commands),
         loop=_loop(contents.loop, inertia.axes),
@@ -439,6 +439,13 @@ def _keep(section: KeepSection, sunward: Vector | None) -> Keep:
     direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
     assert direction is not None
     return Keep(section.name, direction, section.min or 0.0, math.pi if section.max is None else section.max)
+
+
+def _on_the_way(section: RequirementSection | None) -> tuple[Keep, ...]:
+    """The cone about the angular momentum that bounds the nutation on the way."""
+    if section is None or section.nutation_during is None:
+        return ()
+    return (Keep("H", None, 0.0, section.nutation_during),)
 
 
 def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | None:

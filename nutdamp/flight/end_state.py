@@ -191,15 +191,20 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     pieces = list(flown.pieces(max(int(ROWS * end / period), ROWS), end))
     times = np.concatenate([piece.t for piece in pieces])
     axis = np.concatenate([piece.axis for piece in pieces])
+    momentum = np.concatenate([piece.momentum for piece in pieces])
+    momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     observed = []
     for keep in body.watched:
-        nearness = axis @ keep.direction
+        towards = momentum if keep.direction is None else np.broadcast_to(keep.direction, axis.shape)
+        nearness = np.sum(axis * towards, axis=-1)
         tops = [
-            _closer(flown, way * keep.direction, _peaks(times, way * nearness), period / ROWS, end)
+            _closer(flown, keep, way, _peaks(times, way * nearness), period / ROWS, end)
             for way in (1.0, -1.0)  # farthest from a direction is nearest to the opposite one
         ]
-        looked = np.concatenate(tops)
-        angles = attitude.angle_between(flown.axis(looked), keep.direction)
+        rows = [int(np.argmax(nearness)), int(np.argmin(nearness))]  # before a jump, or at a kink of the angle from H
+        looked = np.concatenate([*tops, times[rows]])
+        angles = attitude.angle_between(*_axis_and_direction(flown, keep, looked[: -len(rows)]))
+        angles = np.concatenate([angles, attitude.angle_between(axis[rows], towards[rows])])
         near, far = int(np.argmin(angles)), int(np.argmax(angles))
         observed.append(Aspect(keep, float(angles[near]), float(looked[near]), float(angles[far]), float(looked[far])))
     return tuple(observed)
@@ -214,37 +219,56 @@ def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """First cone violated by an axis on the target; None where there is none, or no target."""
     if spacecraft.goal.axis is None:
         return None
-    angles = (_seen(spacecraft.goal.axis, keep, math.inf) for keep in spacecraft.keep)
+    target = spacecraft.goal.axis
+    angles = (_seen(target, target, keep, math.inf) for keep in spacecraft.keep)
     return next((aspect for aspect in angles if not aspect.kept), None)
 
 
 def at_start(spacecraft: Spacecraft) -> tuple[Aspect, ...]:
     """Angles of the watched directions from the spin axis at t = 0."""
-    return tuple(_seen(spacecraft.axis, keep, 0.0) for keep in spacecraft.watched)
+    return tuple(_seen(spacecraft.axis, spacecraft.momentum, keep, 0.0) for keep in spacecraft.watched)
 
 
-def _seen(axis: Vector, keep: Keep, time: float) -> Aspect:
-    angle = float(attitude.angle_between(axis, keep.direction))
+def _seen(axis: Vector, momentum: Vector, keep: Keep, time: float) -> Aspect:
+    direction = momentum if keep.direction is None else keep.direction
+    angle = float(attitude.angle_between(axis, direction))
     return Aspect(keep, angle, time, angle, time)
 
 
-def _closer(flown: Flight, direction: Vector, times: Vector, width: float, end: float) -> Vector:
-    """Moments up to ``end`` within ``width`` s of the ``times`` (n,) at which the axis is nearest.
+def _axis_and_direction(flown: Flight, keep: Keep, times: Vector) -> tuple[Vector, Vector]:
+    """Spin axis at ``times`` (n,) s, and the direction of a cone: unit vectors (n, 3), the second perhaps (3,)."""
+    if keep.direction is not None:
+        return flown.axis(times), keep.direction
+    rates, quaternion = flown.motion(times)
+    momentum = attitude.rotate(quaternion, rates * flown.moments_at(times))
+    momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
+    return flown.axis(times), momentum
 
-    Each look is among places a quarter as far apart as before, with a parabola in the square of the distance.
+
+def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, end: float) -> Vector:
+    """Moments up to ``end`` within ``width`` s of the ``times`` (n,) at which the axis is nearest to the direction.
+
+    With ``way`` -1 to the opposite of that of ``keep``. Each look is among places a quarter as far apart as before,
+    with a parabola in the square of the distance.
     """
-    rough = attitude.angle_between(flown.axis(times), direction)
+
+    def apart_at(moments: Vector) -> Vector:
+        """Square of the distance between axis and direction, as points of a sphere."""
+        axis, direction = _axis_and_direction(flown, keep, moments)
+        return np.asarray(np.sum((axis - way * direction) ** 2, axis=-1))
+
+    rough = apart_at(times)
     times = times[np.argsort(rough, kind="stable")[:CLOSE]]
     for _ in range(LOOKS):
         places = np.clip(times[:, None] + width * np.linspace(-1.0, 1.0, FINER), 0.0, end)
-        apart = np.sum((flown.axis(places.ravel()) - direction) ** 2, axis=1).reshape(places.shape)
+        apart = apart_at(places.ravel()).reshape(places.shape)
         best = np.argmin(apart, axis=1, keepdims=True)
         middle = np.clip(best, 1, FINER - 2)
         before, here, after = (np.take_along_axis(apart, middle + step, axis=1) for step in (-1, 0, 1))
         bend, inside = before - 2.0 * here + after, best == middle
-        way = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0))
+        shift = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=inside & (bend > 0.0))
         width *= 2.0 / (FINER - 1)
-        times = np.clip(np.take_along_axis(places, best, axis=1) + width * way, 0.0, end)[:, 0]
+        times = np.clip(np.take_along_axis(places, best, axis=1) + width * shift, 0.0, end)[:, 0]
     return times
 
 

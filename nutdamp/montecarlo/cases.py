@@ -533,8 +533,10 @@ def watch_of(model: DispersedModel, cases: DispersedCases) -> AxisWatch:
 
 def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
     """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and 2."""
-    directions = np.array([in_body(body, tilt, count, cone.direction) for cone in body.keep])
-    return AxisWatch.of(directions.reshape(-1, 3, count), math.copysign(1.0, body.spin))
+    inertial = [np.zeros(3) if cone.direction is None else cone.direction for cone in body.keep]
+    directions = np.array([in_body(body, tilt, count, direction) for direction in inertial])
+    momentum = next((number for number, cone in enumerate(body.keep) if cone.direction is None), None)
+    return AxisWatch.of(directions.reshape(-1, 3, count), math.copysign(1.0, body.spin), momentum)
 
 
 def in_body(body: Spacecraft, tilt: Tilt, count: int, direction: Vector) -> NDArray[np.float64]:

@@ -68,6 +68,8 @@ def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
         circles = () if shift is None else (Circle(f"H at most {most(shift)} from target", shift, "target"),)
         directions.append(NamedDirection("target", body.goal.axis, "target", circles))
     for keep in body.watched:
+        if keep.direction is None:
+            continue
         bounds = []
         if keep.least > 0.0:
             bounds.append(Circle(f"axis at least {most(keep.least)} from {keep.name}", keep.least, "keep-out"))

@@ -69,21 +69,22 @@ CIRCLE = 2.0 * math.pi
 class AxisWatch:
     """Extreme angles ``least`` and ``largest`` (m, n) rad so far between the spin axis and ``directions`` (m, 3, n).
 
-    The directions are inertial unit vectors. ``sense`` is the sign of the spin; ``rows``: indices of the observed cases
-    among the n.
+    The directions are inertial unit vectors, but for the one with the number ``momentum``: that of H, wherever it
+    points. ``sense`` is the sign of the spin; ``rows``: indices of the observed cases among the n.
     """
 
     directions: Array
     least: Array
     largest: Array
     sense: float
+    momentum: int | None = None
     rows: Any = ...
 
     @classmethod
-    def of(cls, directions: Array, sense: float) -> AxisWatch:
+    def of(cls, directions: Array, sense: float, momentum: int | None = None) -> AxisWatch:
         """Observer without observations."""
         shape = len(directions), directions.shape[2]
-        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense)
+        return cls(directions, np.full(shape, math.pi), np.zeros(shape), sense, momentum)
 
     @property
     def angles(self) -> Array:
@@ -93,7 +94,7 @@ class AxisWatch:
     def some(self, cases: Any) -> AxisWatch:
         """Observer of a subset of ``cases`` (an index of arrays), which adds to this one."""
         rows = np.arange(self.least.shape[1])[self.rows][cases]
-        return AxisWatch(self.directions, self.least, self.largest, self.sense, rows)
+        return AxisWatch(self.directions, self.least, self.largest, self.sense, self.momentum, rows)
 
     def motion(self, here: MotionStretch, duration: Array) -> None:
         """Record the motion that `batch.advance` makes with these arguments, which stay as they are."""
@@ -121,7 +122,7 @@ class AxisWatch:
         size = np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum, way = momentum / size, size / moments[0] * duration
         theta = _angles(momentum, axis)
-        for number, direction in enumerate(self.directions[:, :, self.rows]):
+        for number, direction in enumerate(self._towards(momentum)):
             begins, beta = _angles(axis, direction), _angles(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
             ahead = np.sum(np.cross(momentum, axis, axis=0) * direction, axis=0)
@@ -139,8 +140,9 @@ class AxisWatch:
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.moments * here.rates)
+        momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
         before, after = (_angles(momentum, self._axis(stretch.quaternion)) for stretch in (here, last))
-        betas = np.array([_angles(momentum, direction) for direction in self.directions[:, :, self.rows]])
+        betas = np.array([_angles(momentum, direction) for direction in self._towards(momentum)])
         passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
         for cases, begins, lasts in ((whole, here, duration), (~whole, here, turn), (~whole, last, turn)):
@@ -178,22 +180,41 @@ class AxisWatch:
         bodies, quaternion = here.bodies, here.quaternion
         axis, (first, second, _) = self._axis(quaternion), here.rates
         moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
+        momentum = _rotated(quaternion, bodies.moments * here.rates)
+        size = np.sqrt(np.sum(momentum * momentum, axis=0))
+        momentum /= size
         if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
-            momentum = _rotated(quaternion, bodies.moments * here.rates)
-            momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
             cosine = np.sum(momentum * axis, axis=0)
             moving = moving + bodies.forcing.growth * cosine * (cosine * axis - momentum)
         nearing = []
-        for number, directions in enumerate(self.directions[:, :, self.rows]):
-            direction = directions[:, cases]
+        for number, direction in enumerate(self._towards(momentum, cases)):
             angles = _angles(axis, direction)
             self._take(number, angles, angles, cases)
-            nearing.append(np.asarray(np.sum(moving * direction, axis=0)))
+            nearer = np.sum(moving * direction, axis=0)
+            if number == self.momentum:  # which turns at the torque across it, over |H|
+                torque = _rotated(quaternion, _torque(here))
+                along = np.sum(torque * momentum, axis=0) * np.sum(axis * momentum, axis=0)
+                nearer = nearer + (np.sum(torque * axis, axis=0) - along) / size
+            nearing.append(np.asarray(nearer))
         return nearing
+
+    def _towards(self, momentum: Array, cases: Any = ...) -> Iterator[Array]:
+        """Directions (3, n) of some of the observed cases, whose H is along the unit vectors ``momentum`` (3, n)."""
+        for number, directions in enumerate(self.directions[:, :, self.rows]):
+            yield momentum if number == self.momentum else directions[:, cases]
 
     def _axis(self, quaternion: Array) -> Array:
         w, x, y, z = quaternion
         return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _torque(here: MotionStretch) -> Array:
+    """Torque (3, n) N m of pulses and disturbances on bodies at the time of ``here``, in body axes."""
+    turning = sum(
+        (size * np.exp(1j * rate * here.since) for size, rate in here.bodies.forcing.turning), 0.0 * here.since
+    )
+    lasting = np.array([turning.real, turning.imag, 0.0 * here.since]) + here.bodies.constant[:, None]
+    return lasting if here.torque is None else lasting + here.torque
 
 
 def _momentum(here: MotionStretch) -> Array:

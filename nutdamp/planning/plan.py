@@ -133,6 +133,8 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
     shares = np.linspace(0.0, 1.0, STEPS)
     points = np.concatenate([_along(*leg, shares) for leg in pairwise(corners)])
     for keep in keeps:
+        if keep.direction is None:
+            continue
         apart = attitude.angle_between(points, keep.direction)
         room = np.minimum(apart - keep.least, keep.most - apart)
         if min(room[0], room[-1]) < 0.0 or room.min() < min(margin, room[0], room[-1]):

@@ -93,10 +93,13 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Keep:
-    """Cone of the spin axis: from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,)."""
+    """Cone of the spin axis: from ``least`` to ``most`` rad away from an inertial unit vector ``direction`` (3,).
+
+    None is the direction of the angular momentum, wherever it points: the angle from it is the nutation on the way.
+    """
 
     name: str
-    direction: Vector
+    direction: Vector | None
     least: float = 0.0
     most: float = math.pi
 
@@ -328,7 +331,9 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def watched(self) -> tuple[Keep, ...]:
         """Cones that the spin axis has to keep, and the Sun where it is known and none of them is about it."""
-        if self.sun is None or any(np.array_equal(cone.direction, self.sun) for cone in self.keep):
+        if self.sun is None or any(
+            cone.direction is not None and np.array_equal(cone.direction, self.sun) for cone in self.keep
+        ):
             return self.keep
         return (*self.keep, Keep("Sun", self.sun))
 

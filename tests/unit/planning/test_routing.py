@@ -42,7 +42,7 @@ def test_routes_lead_to_the_target_clear_of_the_cone_the_shortest_first(monkeypa
         for one, two in pairwise((START, *route)):
             shares = np.linspace(0.0, 1.0, 50)[:, None]
             points = (1.0 - shares) * one + shares * two  # chords of short legs lie next to their great circles
-            assert attitude.angle_between(points, body.keep[0].direction).min() > SUN
+            assert attitude.angle_between(points, np.asarray(body.keep[0].direction)).min() > SUN
     lengths = list(map(length, found))
     assert np.all(np.diff(lengths) > -2e-3)
     clear = math.degrees(SUN + planning.MARGINS[0])
