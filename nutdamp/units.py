@@ -64,6 +64,7 @@ KINDS: dict[str, Kind] = {
         "a moment of inertia", {"kg m^2": 1.0, "slug ft^2": POUND_FORCE * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2}
     ),
     "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
+    "travel": Kind("a length for each kg", {"m/kg": 1.0, "mm/kg": 1e-3}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),
     "rate": Kind("an angular rate", {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0}),
     "speed": Kind("a speed", {"m/s": 1.0, "km/s": 1e3, "ft/s": FOOT}),

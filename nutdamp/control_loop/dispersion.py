@@ -203,6 +203,8 @@ class LoopModel:
         """Channels of a case; undispersed ones are those of the file."""
         body = self.law.spacecraft
         names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
+        if any(name.startswith("center of mass ") for name in draw):
+            names = {thruster.name for channel in body.channels for thruster in channel.thrusters}
         channels = []
         for channel in body.channels:
             if not names & {thruster.name for thruster in channel.thrusters}:

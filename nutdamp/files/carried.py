@@ -14,13 +14,13 @@ import numpy as np
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
-from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits
+from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits, number
 from nutdamp.files.overrides import overlay
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState
+from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import touching
 
 
@@ -30,9 +30,9 @@ def later(flight: Flight, time: float) -> Later:
     Raises BadRequest while a pulse is on, or where no propellant is left in the tank.
     """
     before = flight.spacecraft
-    for number, (begins, ends) in enumerate(flight.spans, start=1):
+    for count, (begins, ends) in enumerate(flight.spans, start=1):
         if begins + touching(time) < time < ends - touching(time):
-            raise BadRequest(f"pulse {number} is on at {time:.6g} s: expected a time before {begins:.6g} s or after")
+            raise BadRequest(f"pulse {count} is on at {time:.6g} s: expected a time before {begins:.6g} s or after")
     rates, quaternions = flight.motion(np.array([time]))
     moments = np.broadcast_to(flight.moments_at(np.array([time])), (1, 3))[0]
     first, second, third = rates[0].tolist()
@@ -53,6 +53,7 @@ def later(flight: Flight, time: float) -> Later:
         inertia=Inertia((float(moments[0]), float(moments[1]), float(moments[2])), inertia.axes),
         omega0=rates[0],
         attitude=changed,
+        center_of_mass=_center(before, used),
         mass=None if before.mass is None else before.mass - used,
         tank=tank,
         disturbances=tuple(
@@ -63,6 +64,15 @@ def later(flight: Flight, time: float) -> Later:
     if changed is None:
         return moved_on
     return moved_on._replace(after=replace(after, attitude=replace(changed, quaternion=moved_on.quaternion)))
+
+
+def _center(body: Spacecraft, used: float) -> Vector | None:
+    """Center of mass with ``used`` kg of propellant gone, (3,) m in the axes of the file; None where none is given."""
+    per_kg = body.center_of_mass_per_kg
+    if per_kg is None or used == 0.0:
+        return body.center_of_mass
+    given = np.zeros(3) if body.center_of_mass is None else body.center_of_mass
+    return np.asarray(given + used * (body.inertia.axes @ per_kg))
 
 
 def carried_text(flight: Flight, time: float, source: object) -> str:
@@ -110,6 +120,12 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
     yield from ((path, text) for path, text in moved if not (same and path[0] == "inertia"))
     if after.mass is not None and after.mass != before.mass:
         yield ("mass",), as_before(tree.get("mass"), after.mass, "mass", "kg")
+    if after.center_of_mass is not None and before.center_of_mass is not None:
+        for axis in np.flatnonzero(after.center_of_mass != before.center_of_mass).tolist():
+            value = float(after.center_of_mass[axis])
+            yield ("center_of_mass", axis), as_before(tree.get("center_of_mass", axis), value, "length", "m")
+    elif after.center_of_mass is not None:
+        yield ("center_of_mass",), "[" + ", ".join(number(part) for part in after.center_of_mass) + "]"
     if after.tank is not None and before.tank is not None and after.tank.propellant != before.tank.propellant:
         for key, kind, unit in (("propellant", "mass", "kg"), ("pressure", "pressure", "Pa")):
             yield ("tank", key), as_before(tree.get("tank", key), float(getattr(after.tank, key)), kind, unit)

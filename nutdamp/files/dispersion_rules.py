@@ -20,7 +20,12 @@ from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.spacecraft.tolerances import KINDS
 from nutdamp.units import bar, shown
 
-PARTS = {"thrust_direction": ("direction", "ab"), "position": ("position", "xyz"), "attitude": ("attitude", "xy")}
+PARTS = {
+    "thrust_direction": ("direction", "ab"),
+    "position": ("position", "xyz"),
+    "attitude": ("attitude", "xy"),
+    "center_of_mass": ("center of mass", "xyz"),
+}
 """Tolerances of which several inputs are drawn: their first word and their last letters."""
 
 EACH_PULSE = ("thrust_per_pulse", "timing")

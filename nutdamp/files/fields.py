@@ -386,6 +386,7 @@ Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMa
 _THREE = Length(3, 3)
 Rates = Annotated[list[Rate], _THREE]
 Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
+Travel = Annotated[list[Annotated[float, Quantity("travel")]], _THREE]
 Velocity = Annotated[list[Annotated[float, Quantity("speed")]], _THREE]
 Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
 Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]

@@ -41,6 +41,7 @@ from nutdamp.files.fields import (
     Time,
     Torque,
     Torques,
+    Travel,
     Velocity,
     Window,
 )
@@ -245,7 +246,9 @@ class ThrusterSection(Section):
     }
 
     name: Name = Field("Name of the thruster, used by channels and in schedules.", "T1")
-    position: Position | None = Field("Where the force acts, from the centre of mass, m.", [0, "0.5 m", "0.8 m"])
+    position: Position | None = Field(
+        "Where the force acts, from the center of mass, or as center_of_mass is given, m.", [0, "0.5 m", "0.8 m"]
+    )
     direction: Direction | None = Field(
         "Direction of the force on the spacecraft (against the plume), any length but zero.", [1, 0, 0]
     )
@@ -377,6 +380,13 @@ class SpacecraftFile(Section):
     mass: Mass | None = Field("Mass, kg; without it no velocity change is worked out.", "250 kg")
     inertia: InertiaSection = Field(
         "Moments of inertia: A and C, or tensor, kg m².", {"A": "120 kg m^2", "C": "80 kg m^2"}
+    )
+    center_of_mass: Position | None = Field(
+        "Center of mass, in the frame of the positions of thrusters and sensor, m; default: they count from it.",
+        [0, "2 mm", "0.4 m"],
+    )
+    center_of_mass_per_kg: Travel | None = Field(
+        "How far each kg of propellant used moves the center of mass, m/kg; default: it stays.", [0, 0, "-1 mm/kg"]
     )
     omega0: Rates | None = Field(
         "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]

@@ -198,7 +198,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     contents = read_contents(text, name, settings, warn)
     inertia = _inertia(contents.inertia)
     omega0 = _rates(contents, inertia)
-    thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve) for entry in contents.thrusters}
+    center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
+    thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve, center) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
@@ -207,6 +208,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         inertia=inertia,
         omega0=omega0,
         mass=contents.mass,
+        center_of_mass=None if contents.center_of_mass is None else center,
+        center_of_mass_per_kg=_travel(contents.center_of_mass_per_kg, inertia.axes),
         attitude=_attitude(contents.attitude, inertia, omega0, sunward),
         channels=tuple(
             Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
@@ -230,7 +233,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         keep=(*(_keep(entry, sunward) for entry in contents.keep), *_on_the_way(contents.requirement)),
         sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
         commands=_commands(contents.commands),
-        loop=_loop(contents.loop, inertia.axes),
+        loop=_loop(contents.loop, inertia.axes, center),
     )
 
 
@@ -301,8 +304,13 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])
 
 
-def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None) -> Thruster:
-    """A thruster in principal axes; ``every`` is the valve of those that have none of their own."""
+def _travel(per_kg: list[float] | None, axes: Vector) -> Vector | None:
+    """Travel of the center of mass per kg in principal axes, (3,) m/kg; None where it stays."""
+    return axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None
+
+
+def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None, center: Vector) -> Thruster:
+    """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without their own."""
     force: Vector | None = None
     position: Vector | None = None
     if entry.torque is not None:
@@ -313,7 +321,7 @@ def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None) 
         assert entry.direction is not None
         assert entry.force is not None
         thrust, force = entry.force, force_vector(entry.direction, entry.force)
-        position = np.array(entry.position)
+        position = np.array(entry.position) - center
         torque = np.cross(position, force)
     valve = _valve(entry, every, thrust)
     least, most = entry.min_on_time, math.inf if entry.max_on_time is None else entry.max_on_time
@@ -471,12 +479,12 @@ def _commands(section: CommandsSection | None) -> Commands | None:
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
 
-def _loop(section: LoopSection | None, axes: Vector) -> Loop | None:
+def _loop(section: LoopSection | None, axes: Vector, center: Vector) -> Loop | None:
     if section is None:
         return None
     given = section.sensor
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
-    position = axes.T @ np.array(given.position or (0.0, 0.0, 0.0))
+    position = axes.T @ (np.array(given.position or center) - center)
     sensor = _part(Sensor, given, position=position, axis=axes.T @ (along / math.hypot(*along)))
     turned = () if section.faults is None else tuple(section.faults.reversed)
     return _part(Loop, section, sensor=sensor, reversed=turned)

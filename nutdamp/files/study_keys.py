@@ -152,6 +152,9 @@ class DispersionsSection(Section):
     position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
         "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
     )
+    center_of_mass: Annotated[ToleranceSection, _Tolerance("length")] | None = Field(
+        "Of the center of mass, each component, m.", {"normal": "2 mm"}
+    )
     timing: _Time | None = Field("Shift of each pulse, s.", {"uniform": "5 ms"})
     timing_offset: _Time | None = Field("One shift of the whole schedule, s.", {"bias": "2 ms"})
     attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
@@ -311,7 +314,9 @@ class LoopSensorSection(Section):
     low_pass: Time = Field(
         "Time constant of a first-order low-pass filter over the samples, s; default 0: none.", "50 ms", default=0.0
     )
-    position: Position | None = Field("Where an accelerometer is, from the centre of mass, m.", ["0.8 m", 0, 0])
+    position: Position | None = Field(
+        "Where an accelerometer is, from the center of mass, or as center_of_mass is given, m.", ["0.8 m", 0, 0]
+    )
     axis: Direction | None = Field(
         "Along which an accelerometer measures, any length but zero; default [0, 0, 1].", [0, 0, 1]
     )

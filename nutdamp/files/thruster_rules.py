@@ -80,7 +80,9 @@ def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
     force = facts.number("force", *path, "force")
     if position is None or direction is None or not force or norm(direction) < SMALLEST:
         return None
-    return np.cross(position, force_vector(direction, force)), norm(position) * abs(force)
+    center = facts.vector("length", 3, "center_of_mass")
+    arm = position if center is None else position - center
+    return np.cross(arm, force_vector(direction, force)), norm(position) * abs(force)
 
 
 def _is_none(torque: tuple[Vector, float] | None) -> bool:

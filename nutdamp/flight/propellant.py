@@ -15,7 +15,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import lightened
 from nutdamp.physics.thruster import Ramp, Tank
 from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, VALVES, Spacecraft
+from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, TRAVEL, VALVES, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
 from nutdamp.units import STANDARD_GRAVITY
 
@@ -42,8 +42,9 @@ class Supply:
         self.spacecraft = spacecraft
         self.fired = Counter(before) if fired is None else fired
         self.used = (0.0 if tank is None else tank.used) if used is None else used
-        self.steady = not {COLD, BLOWDOWN} & set(spacecraft.thrust_laws)
+        self.steady = not {COLD, BLOWDOWN, TRAVEL} & set(spacecraft.thrust_laws)
         """True if every pulse is as strong as the file says."""
+        self._begun = self.used
 
     def behind(self, later: Spacecraft) -> Spacecraft:
         """Spacecraft ``later``, with all firings so far before its t = 0."""
@@ -75,7 +76,7 @@ class Supply:
         commanded = pulse if pulse.command is None else on_command(channel, *pulse.loaded)
         before, flow = self.used, self.full_flow(channel)
         level, propellant = self.take(channel, commanded.on_time)
-        torque, force = channel.torque * level, channel.force
+        torque, force = self.torque(channel, 0.5 * (before + self.used)) * level, channel.force
         if self.spacecraft.tank is not None and flow is not None and propellant:
             cold = 1.0 if self.spacecraft.cold is None else self.spacecraft.cold.factor(self.fired[channel.name] - 1)
             commanded = falling(commanded, self.spacecraft.tank, before, flow * cold)
@@ -86,6 +87,13 @@ class Supply:
             force=None if force is None else force * level,
             propellant=propellant,
         )
+
+    def torque(self, channel: Channel, used: float) -> Vector:
+        """Torque of ``channel`` at the thrust of the file with ``used`` kg gone, (3,) N m: the center of mass moves."""
+        per_kg = self.spacecraft.center_of_mass_per_kg
+        if per_kg is None or channel.force is None:
+            return channel.torque
+        return channel.torque - np.cross((used - self._begun) * per_kg, channel.force)
 
     def on_time_for(self, channel: Channel, effective: float) -> float:
         """On-time (s) of the next pulse of ``channel`` with the impulse of ``effective`` s of the thrust of the file.
@@ -207,6 +215,8 @@ def lacking(spacecraft: Spacecraft, schedule: Schedule, law: str) -> tuple[Space
         body = replace(spacecraft, channels=tuple(channel.of(valve=None) for channel in spacecraft.channels))
     elif law == LIGHTER and spacecraft.tank is not None:
         body = replace(spacecraft, tank=replace(spacecraft.tank, inertia_per_kg=None))
+    elif law == TRAVEL:
+        body = replace(spacecraft, center_of_mass_per_kg=None)
     elif law == BLOWDOWN and spacecraft.tank is not None:  # once it is empty nothing fires, at full pressure too
         body = replace(spacecraft, tank=replace(spacecraft.tank, final_pressure=spacecraft.tank.pressure))
     else:

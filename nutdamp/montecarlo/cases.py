@@ -471,7 +471,13 @@ class DispersedModel:
     def thruster_torque(self, thruster: Thruster, draws: Draws) -> Triple:
         """Torque at nominal thrust, with the force tilted and its point of attack moved, N m."""
         tilts = [draws.get(f"direction {thruster.name} {axis}", 0.0) for axis in "ab"]
-        moves = [draws.get(f"position {thruster.name} {axis}", 0.0) for axis in "xyz"]
+        moves = [
+            plus(
+                draws.get(f"position {thruster.name} {axis}", 0.0),
+                times(-1.0, draws.get(f"center of mass {axis}", 0.0)),
+            )
+            for axis in "xyz"
+        ]
         leans, moved = not all(map(nothing, tilts)), not all(map(nothing, moves))
         torque = parts_of(thruster.torque)
         if thruster.force is None or not (leans or moved):

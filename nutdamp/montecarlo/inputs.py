@@ -166,6 +166,14 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedIn
             else:
                 who = "the steerable torquer" if name == STEERABLE else name
                 yield Unused(f"{key.removeprefix('thrust_')} {name}", f"{SCHEDULE_IDLE} {who}")
+    if requested.center_of_mass is not None:
+        levered = any(thruster is not None and thruster.force is not None for thruster in members.values())
+        for axis in "xyz":
+            name = f"center of mass {axis}"
+            if levered:
+                yield _input(name, "center_of_mass", requested.center_of_mass, 0.0, "m")
+            else:
+                yield Unused(name, KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster")
     yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
     pulses = range(1, len(schedule) + 1)
     if requested.thrust_per_pulse is not None:

@@ -62,6 +62,7 @@ def plain(
         channels=tuple(_plain(spacecraft, channel, weakest, strongest) for channel in spacecraft.channels),
         cold=None,
         tank=None,
+        center_of_mass_per_kg=None,
         inertia=lightened(spacecraft, used),
         limits=Limits(
             horizon=spacecraft.horizon - lag,

@@ -113,6 +113,7 @@ class Keep:
 
 
 VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
+TRAVEL = "moving center of mass"
 """Values of `Spacecraft.thrust_laws`."""
 
 
@@ -258,13 +259,14 @@ class SourceFile(Protocol):
 class Spacecraft(results.Data, results.Shown):
     """Spinning rigid body with its motion at t = 0 and its actuators.
 
-    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None, ``dissipation`` the time constant in s with
-    which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says which, None: by shape;
-    ``dispersions``: how far true values may differ; ``object_id`` names it in messages, which carry ``orbit``; ``sun``
-    (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are cones for the spin axis; ``commands``
-    is what blocks fired from the Sun pulses of ``sun_sensor`` may hold; ``cold`` and ``tank`` make pulses weaker than
-    the thrusters say, None where they are not; ``loop`` damps by what a sensor shows; ``source`` is what it was read
-    from, None once a field is replaced.
+    ``omega0`` (3,) rad/s in principal axes, ``mass`` in kg or None; ``center_of_mass`` (3,) m where the file gives
+    it, in its axes, and its travel with the propellant used, (3,) m/kg in principal axes; ``dissipation`` the time
+    constant in s with which energy dissipation lets the nutation grow or decay, or None; ``nutation_grows`` says
+    which, None: by shape; ``dispersions``: how far true values may differ; ``object_id`` names it in messages,
+    which carry ``orbit``; ``sun`` (3,) is the inertial unit vector to the Sun, where it is known; ``keep`` are
+    cones for the spin axis; ``commands`` is what blocks fired from the Sun pulses of ``sun_sensor`` may hold;
+    ``cold`` and ``tank`` make pulses weaker than the thrusters say, None where they are not; ``loop`` damps by what
+    a sensor shows; ``source`` is what it was read from, None once a field is replaced.
     """
 
     name: str
@@ -290,6 +292,8 @@ class Spacecraft(results.Data, results.Shown):
     cold: Cold | None = None
     tank: Tank | None = None
     loop: Loop | None = None
+    center_of_mass: Vector | None = None
+    center_of_mass_per_kg: Vector | None = None
     source: SourceFile | None = field(default=None, init=False)
 
     def with_(self, **keys: object) -> Spacecraft:
@@ -321,7 +325,8 @@ class Spacecraft(results.Data, results.Shown):
         valves = any(channel.valve is not None for channel in self.channels)
         laws = (VALVES, valves), (COLD, self.cold is not None), (BLOWDOWN, self.tank is not None)
         lighter = self.tank is not None and self.tank.inertia_per_kg is not None
-        return tuple(name for name, holds in (*laws, (LIGHTER, lighter)) if holds)
+        moves = self.center_of_mass_per_kg is not None
+        return tuple(name for name, holds in (*laws, (LIGHTER, lighter), (TRAVEL, moves)) if holds)
 
     @property
     def rates(self) -> Vector:

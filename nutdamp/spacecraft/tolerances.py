@@ -29,17 +29,18 @@ class Tolerance:
 class Dispersions:
     """Tolerances of a spacecraft; None, or no entry, for exactly known values.
 
-    ``A`` (both transverse moments) and ``C`` in kg m²; ``omega0`` the rates at t = 0 about the axes of the file, rad/s.
-    ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses; ``thrust_per_pulse`` is a
-    relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes across the force) and
-    ``position`` (m, each component) are by thruster too. The steerable torquer counts as the thruster
-    `schedule.STEERABLE`. ``timing`` s shifts each pulse, ``timing_offset`` s the whole schedule; ``attitude``
-    rad tilts the spin axis at t = 0 about two axes across it. ``open_delay``, ``close_delay``, ``rise_time`` and
-    ``fall_time`` s and ``impulse_bit``, a relative one, are by thruster and alike in all its pulses; ``cold`` is how
-    far the factor of a first cold pulse is off, ``cold_pulses`` how far their number; ``tank_…`` are those of the tank
-    (kg, Pa, a bare number), ``inertia_per_kg`` a relative one of all its moments alike. ``sensor_bias`` (rad/s or
-    m/s²) and the relative ``sensor_scale`` are of each gyro, or of the accelerometer, of a loop, the relative
-    ``sensor_noise`` and ``sensor_delay`` s of all its samples. ``correlation``: pairs of inputs, by the names of
+    ``A`` (both transverse moments) and ``C`` in kg m²; ``omega0`` the rates at t = 0 about the axes of the file,
+    rad/s. ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses; ``thrust_per_pulse``
+    is a relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes across the force)
+    and ``position`` (m, each component) are by thruster too. The steerable torquer counts as the thruster
+    `schedule.STEERABLE`; ``center_of_mass`` is of each component, m. ``timing`` s shifts each pulse,
+    ``timing_offset`` s the whole schedule; ``attitude`` rad tilts the spin axis at t = 0 about two axes across it.
+    ``open_delay``, ``close_delay``, ``rise_time`` and ``fall_time`` s and ``impulse_bit``, a relative one, are by
+    thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is off,
+    ``cold_pulses`` how far their number; ``tank_…`` are those of the tank (kg, Pa, a bare number),
+    ``inertia_per_kg`` a relative one of all its moments alike. ``sensor_bias`` (rad/s or m/s²) and the relative
+    ``sensor_scale`` are of each gyro, or of the accelerometer, of a loop, the relative ``sensor_noise`` and
+    ``sensor_delay`` s of all its samples. ``correlation``: pairs of inputs, by the names of
     `nutdamp.montecarlo.inputs`, that vary together, see `nutdamp.montecarlo.inputs`.
     """
 
@@ -50,6 +51,7 @@ class Dispersions:
     thrust_per_pulse: Tolerance | None = None
     thrust_direction: Mapping[str, Tolerance] = field(default_factory=dict)
     position: Mapping[str, Tolerance] = field(default_factory=dict)
+    center_of_mass: Tolerance | None = None
     timing: Tolerance | None = None
     timing_offset: Tolerance | None = None
     attitude: Tolerance | None = None

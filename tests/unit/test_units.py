@@ -28,6 +28,7 @@ UNITS = {
         **dict.fromkeys(("10 slug ft^2", "10 slug-ft²"), 13.558179483314),
         "1e6 lbm in^2": 292.6396534292,
     },
+    "travel": {"2 mm/kg": 0.002, "0.1 m/kg": 0.1},
     "shed": {"0.4 kg m^2/kg": 0.4, "0.4 m²": 0.4},
     "angle": {
         "0.5 rad": 0.5,
