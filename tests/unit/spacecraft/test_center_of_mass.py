@@ -55,6 +55,7 @@ def test_it_moves_with_the_propellant_used(inertia: str) -> None:
     used = 3.0 + 0.5 * (channel.mass_flow or 0.0)
     center = np.array([0.1, 0.0, 0.4 - 0.05 * used])
     expected = np.cross(np.array([0.1, 0.5, 1.2]) - center, [0.0, -10.0, 0.0])
+    assert fired.torque is not None
     assert body.inertia.axes @ fired.torque == pytest.approx(expected, abs=1e-12)
 
 
