@@ -17,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import click
 
 from nutdamp.cli.options import FILE, Aim, Command, FileName, NameType, OutputName, options_in
-from nutdamp.cli.screen import progress, say, show, working
+from nutdamp.cli.screen import say, show, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable
 from nutdamp.schemes.catalogue import Options
 
@@ -254,10 +254,6 @@ class Job:
         """Print warnings about the data on standard error, quiet or not."""
         for warning in warnings:
             say(f"warning: {warning}")
-
-    def progress(self, what: str) -> AbstractContextManager[Callable[[int, int], None]]:
-        """Hook of `screen.progress`."""
-        return progress(what, quiet=self.quiet)
 
     def working(self, what: str) -> AbstractContextManager[None]:
         """Show that ``what`` is under way."""
