@@ -20,7 +20,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from nutdamp import units
-from nutdamp.common import results
+from nutdamp.common import results, work
 from nutdamp.errors import Infeasible, warn
 from nutdamp.schemes.catalogue import LEAST, OptimalOptions, Options, expect_names, expect_options
 
@@ -41,8 +41,7 @@ if TYPE_CHECKING:
 
 PathName = str | PathLike[str]
 
-Progress = Callable[[int, int], None]
-"""Hook that is called now and then with the number of steps done and that of all."""
+Progress = Callable[[int, int], None]  # called now and then with the number of steps done, and that of all
 
 results.register("nutdamp.page.results")
 
@@ -209,7 +208,8 @@ def robust(
 
     expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft)
     trials = search.attempts(compared, options)
-    return search.compare(compared, trials, lambda done: progress(done, len(trials)))
+    with work.steps(1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))) as task:  # a third: flights
+        return search.compare(compared, trials, task.reach)
 
 
 def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
@@ -288,9 +288,8 @@ def trade(
     body = _expected(spacecraft)
     count, shifts = units.count("points", points), units.shifts(allow)
     options = OptimalOptions(least=units.one_of("least", least, LEAST[:2]), with_disturbances=with_disturbances)
-    most = count * len({*shifts})
-    fronts = tradeoff.fronts(body, options, count=count, shifts=shifts, progress=lambda done: progress(done, most))
-    return tradeoff.Trade(body, fronts)
+    with work.steps(count * len({*shifts}), hook=progress) as task:
+        return tradeoff.Trade(body, tradeoff.fronts(body, options, count=count, shifts=shifts, progress=task.reach))
 
 
 def disperse(
@@ -335,8 +334,9 @@ def disperse(
         rows.check_room(units.path("csv", csv), study, cases.requested)
 
     def fly(collect: Callable[..., None] | None) -> None:
-        count, watch = threads or dispersion.threads_here(), lambda done: progress(done, cases.requested)
-        dispersion.run(cases, threads=count, watch=watch, stopped=stopped, collect=collect)
+        with work.steps(cases.requested, hook=progress) as task:
+            count = threads or dispersion.threads_here()
+            dispersion.run(cases, threads=count, watch=task.reach, stopped=stopped, collect=collect)
 
     unsaved = rows.streamed(csv, cases, rows.SamplesWriter, fly)
     return dispersion.Dispersion(cases, unsaved, plan.scheme)
@@ -376,7 +376,8 @@ def disperse_loop(
     cases = dispersion.LoopResults(study, count)
 
     def fly(collect: Callable[..., None] | None) -> None:
-        dispersion.run(cases, watch=lambda done: progress(done, count), stopped=stopped, collect=collect)
+        with work.steps(count, hook=progress) as task:
+            dispersion.run(cases, watch=task.reach, stopped=stopped, collect=collect)
 
     return dispersion.LoopDispersion(cases, streamed(csv, cases, LoopCasesWriter, fly))
 
@@ -459,14 +460,13 @@ def budget(
     from nutdamp.control_loop import budget as holding
     from nutdamp.spacecraft.requirements import expect_loop
 
-    body, pairs = _expected(spacecraft), units.thresholds(thresholds)
+    body, rows = _expected(spacecraft), [holding.Thresholds(*pair) for pair in units.thresholds(thresholds)]
     if largest is not None:
         units.tilt(largest)
-    if pairs:
+    if rows:
         expect_loop(body)
-    rows = [holding.Thresholds(*pair) for pair in pairs]
-    step = lambda done: progress(done, max(len(rows), 1))  # noqa: E731
-    return holding.budget(body, rows, largest, seed=units.seed(seed), progress=step)
+    with work.steps(max(len(rows), 1), hook=progress) as task:
+        return holding.budget(body, rows, largest, seed=units.seed(seed), progress=task.reach)
 
 
 def export(

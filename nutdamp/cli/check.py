@@ -139,7 +139,7 @@ def _completed_examples(ctx: click.Context, param: click.Parameter, incomplete: 
     "--from", "name", metavar="NAME", shell_complete=_completed_examples, help="One of the examples of --list instead."
 )
 @click.option("--list", "listed", is_flag=True, help="List the examples that there are, and write nothing.")
-@click.option("--force", is_flag=True, help="Replace a file that is already there.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
 @quiet_option
 def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: bool) -> None:
     """Write a commented spacecraft file (default spacecraft.yaml); a FILE of - is standard output.
@@ -156,7 +156,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
         return
     text = example_text(_known(name) if name else BUILT_IN)
     if file != STDOUT and check_place(file).exists() and not force:
-        raise CannotWrite(file, "it is already there; --force replaces it")
+        raise CannotWrite(file, "already exists; use --force")
     write_whole(file, text)
     if file != STDOUT and not quiet:
         say(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
@@ -165,7 +165,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
 def _list() -> None:
     """Print the examples."""
     from nutdamp.files.reader import example_names, example_subject
-    from nutdamp.views.explain_tables import examples_screen
+    from nutdamp.views.explain import examples_screen
 
     rows = tuple((name, example_subject(name)) for name in example_names())
     show(examples_screen(rows))
@@ -210,15 +210,15 @@ def explain_command(topic: tuple[str, ...]) -> None:
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
     or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain_tables, guide, topics
+    from nutdamp.views import explain, guide
 
     requested = " ".join(topic).strip()
     if not requested:
-        _read(explain_tables.topics_screen())
+        _read(explain.topics_screen())
     elif requested.casefold() == guide.OVERVIEW:
-        _read(explain_tables.equations_screen())
+        _read(explain.equations_screen())
     else:
-        _read(explain_tables.topic_screen(topics.explained(requested)))
+        _read(explain.topic_screen(explain.explained(requested)))
 
 
 def on_keyboard() -> bool:

@@ -85,9 +85,8 @@ def command(
         deliver_case(job, plan, case - 1, seed=seed, until=until)
         return
     brief: list[Callable[[], RenderableType]] = []
-    hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"]}
-    with stoppable() as stopped, job.progress("flying") as step:
-        hooks |= {"progress": step, "stopped": stopped}
+    with stoppable() as stopped, job.working("flying"):
+        hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
         if plan is None:
             flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
         else:

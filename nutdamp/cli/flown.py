@@ -59,20 +59,20 @@ def compared_with(job: Job, names: Sequence[str], samples: int | None = None, *,
 
 
 def robust_of(job: Job, compared: Comparison) -> RobustComparison:
-    """The plans compared and their variants in dispersed cases, with a bar."""
+    """The plans compared and their variants in dispersed cases."""
     from nutdamp.api import robust
 
-    with job.progress("dispersing") as step:
-        return robust(compared, job.options, progress=step)
+    with job.working("dispersing"):
+        return robust(compared, job.options)
 
 
 def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str) -> Trade:
-    """The fronts of time against cost, with a bar."""
+    """The fronts of time against cost."""
     from nutdamp.api import trade
 
     known = job.options.with_disturbances
-    with job.progress("searching") as step:
-        return trade(job.spacecraft, points, shifts, least, with_disturbances=known, progress=step)
+    with job.working("searching"):
+        return trade(job.spacecraft, points, shifts, least, with_disturbances=known)
 
 
 def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Plan:
@@ -126,7 +126,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
     plan = compared.recommended
     show_failures(compared)
     if plan is not None:
-        job.remark(f"using the recommended plan, {plan.scheme}")
+        job.remark(f"using recommended plan: {plan.scheme}")
     job.note(comparison_warnings(compared, cones=not judged))
     if plan is None:
         raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")

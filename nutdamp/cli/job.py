@@ -17,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import click
 
 from nutdamp.cli.options import CARRIED_AT, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
-from nutdamp.cli.screen import progress, say, show, working
+from nutdamp.cli.screen import say, show, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import Options
 
@@ -41,7 +41,7 @@ FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
-quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
 
 
 class FileInput(NamedTuple):
@@ -65,7 +65,7 @@ class FileInput(NamedTuple):
             if self.path is None:
                 remark(f"reading {path}")
             return Source(read_text(Path(path)), path, self.settings)
-        remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
+        remark("no spacecraft file given: using the built-in example (see `nutdamp init`)")
         return Source(example_text(), "example.yaml", self.settings)
 
 
@@ -86,7 +86,7 @@ set_option = click.option(
     multiple=True,
     metavar="KEY=VALUE",
     callback=_settings,
-    help="Change a key: limits.gap=1s; repeatable.",
+    help="Change a key, e.g. limits.gap=1s; repeatable.",
 )
 
 
@@ -262,10 +262,6 @@ class Job:
         """Print warnings about the data on standard error, quiet or not."""
         for warning in warnings:
             say(f"warning: {warning}")
-
-    def progress(self, what: str) -> AbstractContextManager[Callable[[int, int], None]]:
-        """Hook of `screen.progress`."""
-        return progress(what, quiet=self.quiet)
 
     def working(self, what: str) -> AbstractContextManager[None]:
         """Show that ``what`` is under way."""

@@ -91,7 +91,7 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
     from nutdamp.api import budget
     from nutdamp.views.budget import budget_screen
 
-    with job.progress("following cycles") as step:
-        result = budget(body, pairs, largest=largest, seed=seed, progress=step)
+    with job.working("following cycles"):
+        result = budget(body, pairs, largest=largest, seed=seed)
     job.deliver(result, partial(budget_screen, result, verbose=verbose))
     leave(infeasible=not result.feasible, missed=result.meets_requirement is False)

@@ -128,7 +128,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
         if plans:
-            raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
+            raise BadRequest("--blocks: no plan is made of command blocks; run --scheme command-block for the reason")
         return {}
     if source is not chosen:
         job.remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
@@ -172,7 +172,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     if proof is None:
         return {}
     from nutdamp.figures.certificate import certificate_figure
-    from nutdamp.views.certificate_json import certificate_json
+    from nutdamp.views.plan_json import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}
     return {"certificate": partial(certificate_json, proof), **drawn}
@@ -192,7 +192,7 @@ def _screen(
             else glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
         )
     if verbose:
-        from nutdamp.views.plan_tables import comparison_screen
+        from nutdamp.views.glance import comparison_screen
 
         return comparison_screen(compared)
     return glance(compared, decided)

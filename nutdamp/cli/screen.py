@@ -6,11 +6,13 @@ change its title or pass for output of this program.
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from time import monotonic as clock
 from typing import TYPE_CHECKING
 
 import click
@@ -19,10 +21,9 @@ from nutdamp.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-    from rich.progress import Progress, TaskID
     from rich.status import Status
 
-    from nutdamp.common.work import BudgetMonitor
+    from nutdamp.common.work import Monitor
     from nutdamp.planning.decision import Comparison
 
 
@@ -106,32 +107,15 @@ def show_failures(compared: Comparison) -> bool:
 
 
 PATIENCE = 1.0
-"""Seconds that pass before a bar appears."""
+"""Seconds that pass before progress is shown."""
 
-LONG = 10.0
-"""Seconds after which a line gives the progress, where standard error is no terminal."""
-
-
-@contextmanager
-def progress(what: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
-    """A function to be called now and then with the number done, and that of all.
-
-    It shows a bar with rate and time left on standard error: on a terminal, only after a second, and it leaves nothing
-    behind. Elsewhere one line says how far it is, after `LONG`.
-    """
-    shown = _Bar(what) if sys.stderr.isatty() else _ProgressLine(what)
-    try:
-        yield (lambda _done, _all: None) if quiet else shown.update
-    finally:
-        shown.close()
+BELIEVED = 0.1
+"""Share of the steps that have to be done before a time left is named."""
 
 
 @contextmanager
 def working(what: str, *, quiet: bool = False) -> Iterator[None]:
-    """Show ``what`` is under way, with the search that runs and the share spent of its work budget.
-
-    Like `progress` only on a terminal, only after a second, and it leaves nothing behind.
-    """
+    """Show ``what`` is under way: on a terminal only, after `PATIENCE`, and it leaves nothing behind."""
     if quiet or not sys.stderr.isatty():
         yield
         return
@@ -142,10 +126,11 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
     def appear() -> None:
         from rich.console import Console
 
-        shown.append(Console(stderr=True).status(_Doing(what, watch)))
+        shown.append(Console(stderr=True).status(_Progress(what, watch, began, began)))
         shown[0].start()
 
     with watched() as watch:
+        began = clock()
         timer = threading.Timer(PATIENCE, appear)
         timer.daemon = True
         timer.start()
@@ -158,71 +143,35 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
                 status.stop()
 
 
-class _Doing:
-    """Text of ``what`` is under way, with the search that a ``watch`` sees and its progress when shown."""
+@dataclass
+class _Progress:
+    """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and the search that runs.
 
-    def __init__(self, what: str, watch: BudgetMonitor) -> None:
-        self.what, self.watch = what, watch
+    The share is shown where the steps are known, the time where `BELIEVED` of them are done. The time goes by the last
+    step, ``share`` at ``moment``, and counts down; none is shown where a step takes longer than all that was left.
+    """
+
+    what: str
+    watch: Monitor
+    began: float
+    moment: float
+    share: float = 0.0
 
     def __rich__(self) -> str:
-        budget = self.watch.budget
-        if budget is None:
-            return self.what
-        return f"{self.what}: {budget.what}, {100.0 * budget.share:.0f} % of the work that it may take"
+        task, search = self.watch.task, self.watch.budget
+        text = self.what if search is None else f"{self.what}: {search.what}"
+        if task is None:
+            return text
+        now = clock()
+        if task.share != self.share:
+            self.share, self.moment = task.share, now
+        text = f"{text}, {math.floor(100.0 * self.share)} % done"
+        if not BELIEVED <= self.share < 1.0:
+            return text
+        left = (self.moment - self.began) / self.share - (now - self.began)
+        return f"{text}, about {_left(left)} left" if left > 0.0 else text
 
 
-class _ProgressLine:
-    """Progress where there is no terminal: one line, once, that names the share done and the time left."""
-
-    def __init__(self, what: str) -> None:
-        self.what, self.began, self.said = what, time.monotonic(), False
-
-    def update(self, done: int, total: int) -> None:
-        passed = time.monotonic() - self.began
-        if self.said or passed < LONG:
-            return
-        self.said = True
-        left = passed * (total - done) / max(done, 1)
-        rest = f", about {left:.0f} s left" if left > 0.0 else ""
-        say(f"{self.what}: {min(done, total):,} of {total:,} done after {passed:.0f} s{rest}")
-
-    def close(self) -> None:
-        """Do nothing: there is no bar to clear."""
-
-
-class _Bar:
-    def __init__(self, what: str) -> None:
-        self.what, self.began = what, time.monotonic()
-        self.bar: Progress | None = None
-        self.task: TaskID | None = None
-
-    def update(self, done: int, total: int) -> None:
-        passed = time.monotonic() - self.began
-        if passed < PATIENCE:
-            return
-        if self.bar is None:
-            self._open(total)
-        assert self.bar is not None
-        assert self.task is not None
-        rate = done / passed
-        self.bar.update(self.task, completed=done, rate=f"{rate:,.0f}/s" if rate >= 1.0 else "")
-
-    def _open(self, total: int) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-        self.bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=None),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
-        self.task = self.bar.add_task(self.what, total=total, rate="")
-        self.bar.start()
-
-    def close(self) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+def _left(seconds: float) -> str:
+    """A time left, s, in whole minutes where it is long."""
+    return f"{math.ceil(seconds)} s" if seconds < 120.0 else f"{math.ceil(seconds / 60.0)} min"

@@ -63,11 +63,10 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
             f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
     flight = propagation.flown(body, pulses, end)
-    with job.progress("filming") as step:
-        filmed = lambda done: step(done, timed.frames)  # noqa: E731
-        deliver([(output, lambda: lambda stream: animation.film(stream, flight, timed, output, width, filmed))])
+    with job.working("filming"):
+        deliver([(output, lambda: lambda stream: animation.film(stream, flight, timed, output, width))])
     if output != "-":
-        job.remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")
+        job.remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g}× real time")
 
 
 @click.command("simulate", cls=SessionCommand)

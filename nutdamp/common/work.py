@@ -1,17 +1,18 @@
-"""Computation budgets: machine-independent bounds on searches, with progress.
+"""Computation budgets, machine-independent bounds on searches; and progress, in steps done of steps expected.
 
-One unit is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents `spend` units by
-counts that do not depend on the clock; searches test whether the open budget is `exhausted` and end with the best
-solution so far.
+One unit of a budget is somewhat less than a millisecond of a core of 2020. Flights, linear programs and descents
+`spend` units by counts that do not depend on the clock; searches test whether the open budget is `exhausted` and end
+with the best solution so far. A budget is no measure of progress, since a search may end long before it is spent.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from typing import Any
 
 SCHEME = 9_000.0
 """Units for the search of one scheme."""
@@ -43,20 +44,42 @@ class WorkBudget:
         """True if nothing is left."""
         return self.done >= self.most
 
+
+@dataclass(eq=False)
+class StepCount:
+    """Steps ``done`` of those ``expected``, and the ``inner`` task under way; this one is ``size`` steps of its own.
+
+    ``hook`` is called with both numbers.
+    """
+
+    expected: float
+    size: float
+    hook: Callable[[Any, Any], object]
+    done: float = 0.0
+    inner: StepCount | None = None
+
     @property
     def share(self) -> float:
-        """Fraction spent, 0 to 1."""
-        return min(self.done / self.most, 1.0) if self.most > 0.0 else 1.0
+        """Fraction done, 0 to 1, with what is done of the step under way."""
+        begun = 0.0 if self.inner is None else self.inner.size * self.inner.share
+        return min((self.done + begun) / self.expected, 1.0) if self.expected > 0.0 else 1.0
+
+    def reach(self, done: float) -> None:
+        """Set the number done."""
+        self.done = done
+        self.hook(done, self.expected)
 
 
-class BudgetMonitor:
-    """Handle by which another thread sees the budget being spent."""
+class Monitor:
+    """Handle by which another thread sees the innermost budget, and the steps of the whole task."""
 
     budget: WorkBudget | None = None
+    task: StepCount | None = None
 
 
 _budget: ContextVar[WorkBudget | None] = ContextVar("budget", default=None)
-_watch: ContextVar[BudgetMonitor | None] = ContextVar("watch", default=None)
+_steps: ContextVar[StepCount | None] = ContextVar("steps", default=None)
+_watch: ContextVar[Monitor | None] = ContextVar("watch", default=None)
 
 
 @contextmanager
@@ -96,9 +119,36 @@ def exhausted() -> bool:
 
 
 @contextmanager
-def watched() -> Iterator[BudgetMonitor]:
-    """Handle on the budgets opened within."""
-    watch = BudgetMonitor()
+def steps(
+    expected: float, size: float = 1.0, *, hook: Callable[[Any, Any], object] = lambda _done, _all: None
+) -> Iterator[StepCount]:
+    """Count the steps of a task, which is ``size`` steps of the task around it; ``hook``: see `StepCount`."""
+    around, watch = _steps.get(), _watch.get()
+    task = StepCount(expected, size, hook)
+    token = _steps.set(task)
+    if around is not None:
+        around.inner = task
+    elif watch is not None:
+        watch.task = task
+    try:
+        yield task
+    finally:
+        _steps.reset(token)
+        if around is not None:
+            around.inner, around.done = None, around.done + size
+
+
+def reach(done: float) -> None:
+    """Set the number of steps done of the innermost task; without one nothing is counted."""
+    task = _steps.get()
+    if task is not None:
+        task.reach(done)
+
+
+@contextmanager
+def watched() -> Iterator[Monitor]:
+    """Handle on the budgets and the steps within."""
+    watch = Monitor()
     token = _watch.set(watch)
     try:
         yield watch

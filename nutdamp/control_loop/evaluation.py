@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from nutdamp.common import results
+from nutdamp.common import results, work
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
 from nutdamp.errors import BadRequest, Infeasible
@@ -70,6 +70,7 @@ class _Independent(Dynamics):
             return _Solved(self.equations, lambda times: np.outer(first, np.ones(np.size(times))), 0), state
         torque = (np.asarray(sum(push.torques, np.zeros(3))), push.slope)
         solution = self.equations.solved(first, start, end, [torque], dense=True)
+        work.reach(end)
         rates, quaternion = self.equations.motion(solution.y[:, -1:].T)
         first_rate, second_rate, spin = rates[0].tolist()
         return _Solved(self.equations, solution.sol, len(solution.t)), SpinState(
@@ -112,7 +113,8 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     equations, inertia = EulerEquations(spacecraft, EVALUATIONS), spacecraft.inertia
     mover = _Independent(inertia.moments, np.zeros(3), NOTHING, equations=equations)
     try:
-        other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
+        with work.steps(run.until):
+            other = fly(spacecraft, loop, run.until, seed=seed, dynamics=mover)
     except Infeasible as reason:
         return LoopVerification(run, None, str(reason), equations.evaluations)
     pairs = tuple(

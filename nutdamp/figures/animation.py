@@ -6,7 +6,7 @@ import math
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common import work
 from nutdamp.errors import BadRequest, CannotWrite
 from nutdamp.figures import geometry, history, sphere, style
 from nutdamp.figures.style import INK, MOTION
@@ -96,24 +97,18 @@ def timing(spacecraft: Spacecraft, until: float, fps: int, seconds: float | None
 
 
 @style.styled
-def film(
-    stream: IO[bytes],
-    flight: Flight,
-    timed: Timing,
-    path: str,
-    width: int = 800,
-    progress: Callable[[int], object] = lambda _: None,
-) -> None:
-    """Write the film of ``width`` pixels to ``stream``, frame by frame; ``progress`` is called with how many are done.
+def film(stream: IO[bytes], flight: Flight, timed: Timing, path: str, width: int = 800) -> None:
+    """Write the film of ``width`` pixels to ``stream``, frame by frame.
 
     The ending of ``path`` says the format. Raises as `film_format`.
     """
     kind = film_format(path)
     scene = Scene(flight, timed, width)
-    (_gif if kind == "gif" else _mp4)(stream, scene, timed, progress)
+    with work.steps(timed.frames):
+        (_gif if kind == "gif" else _mp4)(stream, scene, timed)
 
 
-def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
+def _gif(stream: IO[bytes], scene: Scene, timed: Timing) -> None:
     """Write a looped GIF with the palette of its first frame: fixed parts keep their colour."""
     from PIL import Image
 
@@ -124,14 +119,14 @@ def _gif(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int
             pixels = Image.fromarray(LEVELS[scene.pixels()])
             palette = palette or pixels.quantize(dither=Image.Dither.NONE)
             yield pixels.quantize(palette=palette, dither=Image.Dither.NONE)
-            progress(number + 1)
+            work.reach(number + 1)
 
     each = frames()
     # Time in milliseconds; GIF counts in hundredths of a second.
     next(each).save(stream, "GIF", save_all=True, append_images=each, duration=10 * round(100 / timed.fps), loop=0)
 
 
-def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int], object]) -> None:
+def _mp4(stream: IO[bytes], scene: Scene, timed: Timing) -> None:
     """Write H.264 as browsers play it."""
     from matplotlib.animation import FFMpegWriter
 
@@ -143,7 +138,7 @@ def _mp4(stream: IO[bytes], scene: Scene, timed: Timing, progress: Callable[[int
                 for number in range(timed.frames):
                     scene.show(number)
                     writer.grab_frame()
-                    progress(number + 1)
+                    work.reach(number + 1)
         except subprocess.CalledProcessError as reason:
             raise CannotWrite("mp4", f"ffmpeg failed with status {reason.returncode}") from reason
         with target.open("rb") as encoded:

@@ -10,10 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
+from nutdamp.common import work
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import basilisk, propagation
 from nutdamp.flight.dynamics import shed
@@ -157,6 +159,7 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
             firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
             burn = np.sum([_flow(*flow) for flow in firing], axis=0) if firing else (0.0, 0.0)
             state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
+        work.reach(end)
     return equations.motion(np.array([rows[time] for time in times.tolist()]))
 
 
@@ -280,13 +283,15 @@ def verify(
     judge = propagation.flown(spacecraft, schedule, end)
     times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
     reference = judge.motion(times)
-    methods = (
+    methods = [
         _closed_form(judge, end, times, reference),
         Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
-        _by_dop853(judge, times, reference),
-        _by_basilisk(judge, end),
-    )
-    return Verification(methods, *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
+    ]
+    with work.steps(2.0 if find_spec("Basilisk") else 1.0):  # all else takes no time beside these two
+        with work.steps(end):
+            methods.append(_by_dop853(judge, times, reference))
+        methods.append(_by_basilisk(judge, end))
+    return Verification(tuple(methods), *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
 
 
 def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vector, Vector]) -> Method:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from rich.console import Group
 
 from nutdamp import __version__
+from nutdamp.common import work
 from nutdamp.errors import printable
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
@@ -47,7 +48,7 @@ from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, glance, verdicts
+from nutdamp.views import decisions, glance
 from nutdamp.views.check import check_screen
 from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
@@ -108,25 +109,29 @@ def report_page(
     lead = headline.spans[0].end
     remarks = glance.notes(compared, decided)
     notes = [*map(text, (note for note in remarks if severity(note) != WARNING))]
-    page = Page(
-        title=control.title or _title(body),
-        control=control,
-        source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
-        state=_state(decided),
-        good=decided is not None and _good(decided),
-        met=None if decided is None else decided.met,
-        headline=(headline.plain[:lead], headline.plain[lead:]),
-        verdict="" if decided is None else decisions.verdict(decided),
-        margins=() if decided is None else tuple(map(_margin, glance.requirement_rows(decided))),
-        facts=None if decided is None else facts_of("Final state", glance.ends(decided)),
-        warnings=() if decided is None else tuple(_warnings(compared, decided)),
-        notes=tuple(notes[: glance.NOTES]),
-        motion=() if decided is None else (moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
-        contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
-        sections=(),
-        made_by=f"nutdamp {__version__}",
-    )
-    return page.with_sections(_sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :]))
+    with work.steps(2.0) as task:  # pictures, and the flights of the verification
+        page = Page(
+            title=control.title or _title(body),
+            control=control,
+            source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
+            state=_state(decided),
+            good=decided is not None and _good(decided),
+            met=None if decided is None else decided.met,
+            headline=(headline.plain[:lead], headline.plain[lead:]),
+            verdict="" if decided is None else decisions.verdict(decided),
+            margins=() if decided is None else tuple(map(_margin, glance.requirement_rows(decided))),
+            facts=None if decided is None else facts_of("Final state, after the last pulse", glance.ends(decided)),
+            warnings=() if decided is None else tuple(_warnings(compared, decided)),
+            notes=tuple(notes[: glance.NOTES]),
+            motion=()
+            if decided is None
+            else (moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
+            contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
+            sections=(),
+            made_by=f"nutdamp {__version__}",
+        )
+        task.reach(1.0)
+        return page.with_sections(_sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :]))
 
 
 def _sections(
@@ -193,11 +198,11 @@ def _margin(row: glance.RequirementRow) -> RequirementBar:
 def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
     """One scheme with its cost, and the share of cases that comply or the verdict."""
     if not plan.feasible:
-        return Contender(plan.scheme, (verdicts.no_plan(plan),), False)
+        return Contender(plan.scheme, (decisions.no_plan(plan),), False)
     pulses = plan.pulses
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     share = compared.shares.get(plan)
-    word = verdicts.share_text(share) if share is not None else verdicts.VERDICT[compared.meets(plan)]
+    word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
     word += ", timed" * (not plan.commandable)
     return Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
 
@@ -248,7 +253,7 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     verified = verify(body, chosen.pulses, unrounded(chosen), expected=chosen.options.with_disturbances)
     yield Prose(f"{verdict(verified)} {conservation(verified)}")
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
-    flights = sheet_of("Differences from the flown motion are the largest on the way", methods_table(verified))
+    flights = sheet_of("Maximum differences from the flown motion", methods_table(verified))
     blocks: list[Block] = [flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified))]
     blocks.append(Prose(BUDGET_NOTE))
     yield Details("Independent flights and error budget", tuple(blocks))

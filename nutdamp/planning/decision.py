@@ -1,7 +1,7 @@
 """Comparison of plans, the decision on one of them line by line, and simulations to a given time.
 
 All is data but the reason for the lack of a schedule. `nutdamp.planning.notes` has the notes on it,
-`nutdamp.views.verdicts` and `nutdamp.views.decisions` have the words for it.
+`nutdamp.views.decisions` the words for it.
 """
 
 from __future__ import annotations
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 BUG = "internal error, please report"
 """Message on a plan whose scheme raised an unexpected exception, which follows by name."""
+
+SEARCH = 100.0
+"""Steps of progress of a scheme that searches, and of the dispersed cases, beside one of each classic scheme."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -189,9 +192,15 @@ def compare(
     unknown = set(names) - set(catalogue.NAMES)
     if unknown:
         raise KeyError(*sorted(unknown))
-    with work.budget("the comparison", work.COMMAND):
-        plans = tuple(attempt(spacecraft, name, options) for name in names or usual(spacecraft))
-    return compare_plans(plans, named=bool(names), samples=samples, timed=timed)
+    sizes = [(name, 1.0 if catalogue.SCHEMES[name].classic else SEARCH) for name in names or usual(spacecraft)]
+    flies = SEARCH if _flies(spacecraft, samples) else 0.0
+    with work.steps(sum(size for _, size in sizes) + flies):
+        plans = []
+        with work.budget("the comparison", work.COMMAND):
+            for name, size in sizes:
+                with work.steps(1.0, size):
+                    plans.append(attempt(spacecraft, name, options))
+        return compare_plans(plans, named=bool(names), samples=samples, timed=timed)
 
 
 def compare_plans(
@@ -200,10 +209,13 @@ def compare_plans(
     """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
     spacecraft = plans[0].spacecraft
     nominal = Comparison(spacecraft, tuple(plans), named=named, timed=timed)
+    return replace(nominal, flown=_dispersed(nominal, samples)) if _flies(spacecraft, samples) else nominal
+
+
+def _flies(spacecraft: Spacecraft, samples: int | None) -> bool:
+    """True if plans fly dispersed cases."""
     wanted = requirements.judged(spacecraft) if samples is None else samples > 0
-    if spacecraft.dispersions is None or not wanted:
-        return nominal
-    return replace(nominal, flown=_dispersed(nominal, samples))
+    return spacecraft.dispersions is not None and wanted
 
 
 def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, PlanCandidate]:
@@ -213,7 +225,8 @@ def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, PlanCand
 
     feasible = [plan for plan in compared.plans if plan.feasible]
     count = SAMPLES if samples is None else samples
-    with work.budget("the dispersed cases", work.CASES * max(1.0, count / SAMPLES)):
+    most = work.CASES * max(1.0, count / SAMPLES)
+    with work.budget("the dispersed cases", most), work.steps(len(feasible) + 1.0, SEARCH):
         return fly_compared(feasible, count, lambda shares: recommend(compared.eligible, shares).plan)
 
 

@@ -167,7 +167,7 @@ def fly_compared(
     for plan in plans:
         study = study_of(plan.spacecraft, plan.pulses)
         if affordable(study, min(STAGES[0], samples)):
-            with suppress(Infeasible):
+            with suppress(Infeasible), work.steps(1.0):
                 flown[plan] = entered(plan, "", study, samples)
     while not work.exhausted():
         first = _undecided(plans, flown, samples, choose)

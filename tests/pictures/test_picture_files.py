@@ -27,6 +27,7 @@ from support.cases import deep
 from support.golden import check_text
 from support.shown import BODY, WIDE, drawn, flight_picture, flown, kicks
 
+from nutdamp.common import work
 from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
 from nutdamp.figures import animation, geometry, image, overview, style
 from nutdamp.figures.animation import Scene, Timing, film_format, timing
@@ -179,13 +180,16 @@ def damped(plans_shared: None) -> tuple[Flight, float]:
 
 
 @pytest.mark.deep
-def test_a_gif_has_its_frames_its_size_and_its_pace(damped: tuple[Flight, float]) -> None:
+def test_a_gif_has_its_frames_its_size_and_its_pace(
+    damped: tuple[Flight, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And the frames are the scene to the pixel."""
     made, end = damped
     timed = timing(WIDE, end, 20, 0.4)
-    stream, progress = io.BytesIO(), list[int]()
-    animation.film(stream, made, timed, "a.gif", 401, progress.append)
-    assert progress == list(range(1, 9))
+    stream, done = io.BytesIO(), list[int]()
+    monkeypatch.setattr(work, "reach", done.append)
+    animation.film(stream, made, timed, "a.gif", 401)
+    assert done == list(range(1, 9))
     picture = Image.open(stream)
     assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
     assert (picture.info["duration"], picture.info["loop"]) == (50, 0)
@@ -205,7 +209,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(damped: tuple[Flight, float]
 @pytest.mark.deep
 def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
     made, stream = propagation.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
-    animation.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320, lambda _: None)
+    animation.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320)
     assert getattr(Image.open(stream), "n_frames", 1) == 4
 
 
@@ -295,12 +299,12 @@ def test_an_ffmpeg_that_fails_is_no_traceback(
     (tmp_path / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     with pytest.raises(CannotWrite, match="failed with status 3"):
-        animation.film(io.BytesIO(), damped[0], Timing(damped[1], 2, 10, 1.0), "a.mp4", 320, lambda _: None)
+        animation.film(io.BytesIO(), damped[0], Timing(damped[1], 2, 10, 1.0), "a.mp4", 320)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
 def test_an_mp4_is_one(damped: tuple[Flight, float]) -> None:
     stream = io.BytesIO()
-    animation.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400, lambda _: None)
+    animation.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400)
     assert stream.getvalue()[4:8] == b"ftyp"
     assert film_format("a.mp4") == "mp4"

@@ -1,4 +1,4 @@
-"""Narrow screens, where each row of a table is a block and no digit is lost; the bar of long runs, how they stop."""
+"""Narrow screens, where each row of a table is a block and no digit is lost; progress of long runs, how they stop."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import os
 import re
 import signal
 import sys
-import time
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import pytest
 from rich.console import Console
@@ -20,8 +23,9 @@ from support.process import Run
 
 from nutdamp.cli import screen
 from nutdamp.cli.main import stoppable
-from nutdamp.cli.screen import progress, working
-from nutdamp.views.layout import NARROW, columns
+from nutdamp.cli.screen import working
+from nutdamp.common import work
+from nutdamp.views.tables import NARROW, columns
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -137,7 +141,7 @@ def test_a_scheme_without_thrusters_says_so_and_a_bound_keeps_its_sign_on_its_li
     assert not re.search("<$", shown, re.MULTILINE)
 
 
-# --- the bar of long runs ---------------------------------------------------------------------------------------------
+# --- progress of long runs --------------------------------------------------------------------------------------------
 
 
 class Terminal(io.StringIO):
@@ -145,49 +149,100 @@ class Terminal(io.StringIO):
         return True
 
 
-def shown(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, patience: float, *, quiet: bool = False) -> str:
+class Clock:
+    """A clock that is set by hand; its timers, in place of those of `threading`, ring as it is set."""
+
+    def __init__(self) -> None:
+        self.now, self.timers = 100.0, list[tuple[float, Callable[[], None]]]()
+
+    def __call__(self) -> float:
+        return self.now
+
+    def set(self, now: float) -> None:
+        self.now = 100.0 + now
+        due = [timer for timer in self.timers if timer[0] <= self.now]
+        for timer in due:
+            self.timers.remove(timer)
+            timer[1]()
+
+    def Timer(self, seconds: float, ring: Callable[[], None]) -> SimpleNamespace:
+        begin = partial(self.timers.append, (self.now + seconds, ring))
+        return SimpleNamespace(start=begin, cancel=self.timers.clear, join=lambda: None)
+
+
+class Status(NamedTuple):
+    """The line of a screen, made anew whenever it is looked at."""
+
+    text: Any
+    lines: list[Any]
+
+    def start(self) -> None:
+        self.lines.append(self.text)
+
+    def stop(self) -> None:
+        self.lines.clear()
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(screen, "clock", clock)
+    monkeypatch.setattr(screen, "threading", clock)
+    return clock
+
+
+@pytest.fixture
+def lines(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    lines: list[Any] = []
+    monkeypatch.setattr(Console, "status", lambda _, text: Status(text, lines))
+    return lines
+
+
+def test_progress_is_shown_after_a_second_and_a_time_after_a_tenth_of_the_steps(
+    monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any]
+) -> None:
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    seen: list[str] = []
+    with working("verifying"):
+        clock.set(0.9)
+        assert not lines
+        clock.set(1.0)
+        seen.append(lines[0].__rich__())
+        with work.steps(1000.0) as task:
+            for done, now in ((0, 2.0), (99, 9.9), (100, 10.0), (500, 600.0), (996, 900.0), (1000, 910.0)):
+                task.reach(done)
+                clock.set(now)
+                seen.append(lines[0].__rich__())
+        with work.steps(2.0) as task, work.budget("optimal", 1.0):
+            task.reach(1.0)
+            for now in (1000.0, 1600.0, 1899.0, 1901.0):
+                clock.set(now)
+                seen.append(lines[0].__rich__())
+    assert not lines
+    assert seen == [
+        "verifying",
+        "verifying, 0 % done",
+        "verifying, 9 % done",
+        "verifying, 10 % done, about 90 s left",
+        "verifying, 50 % done, about 10 min left",
+        "verifying, 99 % done, about 4 s left",
+        "verifying, 100 % done",
+        "verifying: optimal, 50 % done, about 17 min left",
+        "verifying: optimal, 50 % done, about 7 min left",
+        "verifying: optimal, 50 % done, about 101 s left",
+        "verifying: optimal, 50 % done, about 99 s left",
+    ]
+
+
+@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
+def test_no_progress_is_shown_in_a_pipe_or_where_it_is_not_wanted(
+    monkeypatch: pytest.MonkeyPatch, clock: Clock, lines: list[Any], stream: io.StringIO, quiet: bool
+) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(screen, "PATIENCE", patience)
-    monkeypatch.setenv("TERM", "xterm")
-    with progress("flying", quiet=quiet) as tell:
-        for count in (200, 500, 900):
-            tell(count, 1_000)
-    return stream.getvalue()
-
-
-def test_a_terminal_is_shown_share_rate_and_time_left_of_a_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where it is wanted."""
-    text = shown(monkeypatch, Terminal(), 0.0)
-    assert all(part in text for part in ("flying", "90%", "/s", "0:00:"))
-    assert shown(monkeypatch, Terminal(), 60.0) == shown(monkeypatch, Terminal(), 0.0, quiet=True) == ""
-
-
-@pytest.mark.parametrize(("long", "quiet", "lines"), [(0.0, False, 1), (60.0, False, 0), (0.0, True, 0)])
-def test_elsewhere_one_line_says_how_far_long_work_is(
-    monkeypatch: pytest.MonkeyPatch, long: float, quiet: bool, lines: int
-) -> None:
-    monkeypatch.setattr(screen, "LONG", long)
-    text = shown(monkeypatch, io.StringIO(), 0.0, quiet=quiet)
-    assert text.count("\n") == lines
-    assert not lines or text.startswith("flying: 200 of 1,000 done after 0 s, about 0 s left")
-
-
-@pytest.mark.parametrize(
-    ("stream", "patience", "quiet", "seen"),
-    [(Terminal, 0.0, False, True), (Terminal, 60.0, False, False), (Terminal, 0.0, True, False),
-     (io.StringIO, 0.0, False, False)],
-)  # fmt: skip
-def test_work_of_unknown_length_says_what_is_done_once_it_takes_long(
-    monkeypatch: pytest.MonkeyPatch, stream: type[io.StringIO], patience: float, quiet: bool, seen: bool
-) -> None:
-    err = stream()
-    monkeypatch.setattr(sys, "stderr", err)
-    monkeypatch.setattr(screen, "PATIENCE", patience)
-    monkeypatch.setenv("TERM", "xterm")
-    with working("planning", quiet=quiet):
-        while seen and "planning" not in err.getvalue():  # until the timer has had its turn
-            time.sleep(0.01)
-    assert ("planning" in err.getvalue()) is seen
+    with working("planning", quiet=quiet), work.steps(2.0) as task:
+        task.reach(1.0)
+        clock.set(60.0)
+        assert (lines, clock.timers, stream.getvalue()) == ([], [], "")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

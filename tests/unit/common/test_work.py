@@ -17,8 +17,29 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import CUT, compare, infeasibility
 from nutdamp.planning.notes import plan_notes
 from nutdamp.schemes.optimal import highs
-from nutdamp.spacecraft.model import Limits
+from nutdamp.spacecraft.model import Disturbance, Limits
 from nutdamp.spacecraft.schedule import Schedule
+
+
+def test_steps_of_a_task_are_part_of_a_step_of_the_task_around_it() -> None:
+    heard: list[tuple[float, float]] = []
+    with work.watched() as watch:
+        seen = [watch.task]
+        work.reach(5.0)  # nobody counts
+        with work.steps(10.0, hook=lambda done, of: heard.append((done, of))) as whole:
+            assert whole.share == 0.0
+            with work.steps(4.0, 5.0):
+                work.reach(2.0)
+                assert whole.share == 0.25
+                work.reach(9.0)  # more than was expected
+                assert whole.share == 0.5
+            assert whole.share == 0.5
+            whole.reach(7.0)
+            with work.steps(0.0):
+                assert whole.share == 0.8
+            seen.append(watch.task)
+    assert seen == [None, whole]
+    assert heard == [(7.0, 10.0)]
 
 
 def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermost() -> None:
@@ -35,7 +56,7 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
             with work.budget("second", 7.0) as second:
                 assert second.most == 2.0
             assert not work.exhausted()
-            assert outer.share == 0.8
+            assert outer.done == 8.0
         seen.append(watch.budget)
     assert seen == [None, first, outer, None]
     assert work.left() == math.inf
@@ -44,7 +65,8 @@ def test_work_counts_for_all_budgets_around_it_and_who_watches_sees_the_innermos
 
 
 def test_flights_count_by_legs_and_steps() -> None:
-    for body, until in ((spinner(channels=cross(8.0)), 10.0), (spinner(moments=(100.0, 120.0, 80.0)), 100.0)):
+    driven = replace(spinner(moments=(100.0, 120.0, 80.0)), disturbances=(Disturbance(1e-3 + 0.0j),))
+    for body, until in ((spinner(channels=cross(8.0)), 10.0), (driven, 100.0)):
         with work.budget("flight", 1e9) as spent:
             flown = propagation.flown(body, Schedule(), until)
         if body.inertia.symmetric:
