@@ -165,7 +165,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
 def _list() -> None:
     """Print the examples."""
     from nutdamp.files.reader import example_names, example_subject
-    from nutdamp.views.explain_tables import examples_screen
+    from nutdamp.views.explain import examples_screen
 
     rows = tuple((name, example_subject(name)) for name in example_names())
     show(examples_screen(rows))
@@ -210,15 +210,15 @@ def explain_command(topic: tuple[str, ...]) -> None:
     TOPIC is a page or a scheme; a number such as 17, K7 or 24.4, or `equations` for all; a word such as `tilt`, `H`
     or `on_time_s`; `file.thrusters`. Without it the pages are listed. On a terminal long pages go through a pager.
     """
-    from nutdamp.views import explain_tables, guide, topics
+    from nutdamp.views import explain, guide
 
     requested = " ".join(topic).strip()
     if not requested:
-        _read(explain_tables.topics_screen())
+        _read(explain.topics_screen())
     elif requested.casefold() == guide.OVERVIEW:
-        _read(explain_tables.equations_screen())
+        _read(explain.equations_screen())
     else:
-        _read(explain_tables.topic_screen(topics.explained(requested)))
+        _read(explain.topic_screen(explain.explained(requested)))
 
 
 def on_keyboard() -> bool:

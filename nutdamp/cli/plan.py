@@ -168,7 +168,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     if proof is None:
         return {}
     from nutdamp.figures.certificate import certificate_figure
-    from nutdamp.views.certificate_json import certificate_json
+    from nutdamp.views.plan_json import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}
     return {"certificate": partial(certificate_json, proof), **drawn}
@@ -188,7 +188,7 @@ def _screen(
             else glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
         )
     if verbose:
-        from nutdamp.views.plan_tables import comparison_screen
+        from nutdamp.views.glance import comparison_screen
 
         return comparison_screen(compared)
     return glance(compared, decided)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from time import monotonic as clock
 from typing import TYPE_CHECKING
 
 import click
@@ -130,7 +130,7 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
         shown[0].start()
 
     with watched() as watch:
-        began = time.monotonic()
+        began = clock()
         timer = threading.Timer(PATIENCE, appear)
         timer.daemon = True
         timer.start()
@@ -162,7 +162,7 @@ class _Progress:
         text = self.what if search is None else f"{self.what}: {search.what}"
         if task is None:
             return text
-        now = time.monotonic()
+        now = clock()
         if task.share != self.share:
             self.share, self.moment = task.share, now
         text = f"{text}, {math.floor(100.0 * self.share)} % done"

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 RPM = 30.0 / math.pi
 """Turns a minute of one rad/s."""
 
+MISSING = "–"
+"""Text of a number that is not known."""
 
 NOISE = 1e-13
 """Part of the largest component below which another component of a vector counts as rounding."""

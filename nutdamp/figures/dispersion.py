@@ -17,7 +17,7 @@ from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.verdicts import cases_verdict, exact_percent
+from nutdamp.views.decisions import cases_verdict, exact_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

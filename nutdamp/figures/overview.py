@@ -11,7 +11,7 @@ from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, model_name
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft import requirements
-from nutdamp.views.end_tables import angle_names, angle_texts
+from nutdamp.views.spacecraft import angle_names, angle_texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import guide
 from nutdamp.views.guide import Formula, Topic, TopicRows
-from nutdamp.views.schemes import beyond_floors
+from nutdamp.views.spacecraft import beyond_floors
 from nutdamp.views.text import quantity
 
 EQUATIONS = ("1", "17", "18", "19")

@@ -48,7 +48,7 @@ from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, glance, verdicts
+from nutdamp.views import decisions, glance
 from nutdamp.views.check import check_screen
 from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
@@ -198,11 +198,11 @@ def _margin(row: glance.RequirementRow) -> RequirementBar:
 def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
     """One scheme with its cost, and the share of cases that comply or the verdict."""
     if not plan.feasible:
-        return Contender(plan.scheme, (verdicts.no_plan(plan),), False)
+        return Contender(plan.scheme, (decisions.no_plan(plan),), False)
     pulses = plan.pulses
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     share = compared.shares.get(plan)
-    word = verdicts.share_text(share) if share is not None else verdicts.VERDICT[compared.meets(plan)]
+    word = decisions.share_text(share) if share is not None else decisions.VERDICT[compared.meets(plan)]
     word += ", timed" * (not plan.commandable)
     return Contender(plan.scheme, (spent, word), decided is not None and plan is decided.plan)
 

@@ -20,7 +20,7 @@ from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 from nutdamp.views.notes import text
 from nutdamp.views.pulses import MILLISECONDS, channel_text
 from nutdamp.views.schemes import limits
@@ -105,7 +105,7 @@ def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tupl
 def _window(body: Spacecraft, points: Checkpoints) -> str:
     """Shift of all pulses in phase and in time with which enough cases comply; rounded towards none."""
     probability = required_share(body.requirement)
-    share = verdicts.exact_percent(probability)
+    share = decisions.exact_percent(probability)
     if not requirements.judged(body):
         return "not known: nothing is required"
     window = points.window(probability)

@@ -23,8 +23,8 @@ from nutdamp.page.workbench import Room, absence, workbench_data, workbench_of
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.views.end_tables import angle_names, angle_texts
 from nutdamp.views.pulses import channel_text
+from nutdamp.views.spacecraft import angle_names, angle_texts
 from nutdamp.views.text import MISSING, most
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400

@@ -17,9 +17,8 @@ from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions
-from nutdamp.views.decision_json import decision_json
 from nutdamp.views.notes import joined, sentences
-from nutdamp.views.plan_json import comparison_json
+from nutdamp.views.plan_json import comparison_json, decision_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees
@@ -249,7 +248,7 @@ def comparison_line(compared: Comparison) -> str:
 def spacecraft_html(spacecraft: Spacecraft) -> str | None:
     """HTML table of a spacecraft for notebooks; None without the extra plot."""
     from nutdamp.page.document import facts_of
-    from nutdamp.views.plan_tables import derived_table
+    from nutdamp.views.spacecraft import derived_table
 
     return _block(facts_of(spacecraft.name, derived_table(spacecraft)))
 

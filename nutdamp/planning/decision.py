@@ -1,7 +1,7 @@
 """Comparison of plans, the decision on one of them line by line, and simulations to a given time.
 
 All is data but the reason for the lack of a schedule. `nutdamp.planning.notes` has the notes on it,
-`nutdamp.views.verdicts` and `nutdamp.views.decisions` have the words for it.
+`nutdamp.views.decisions` the words for it.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Recommendation among plans, by flown residuals and cost, and factors that limit a schedule.
 
-It gives data; `nutdamp.planning.decision` and `nutdamp.views.verdicts` have the words.
+It gives data; `nutdamp.planning.decision` and `nutdamp.views.decisions` have the words.
 """
 
 from __future__ import annotations

@@ -13,12 +13,12 @@ from rich.text import Text
 
 from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
 from nutdamp.control_loop.limit_cycle import Cycle
+from nutdamp.views.decisions import VERDICT
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, lasting, most, quantity
-from nutdamp.views.verdicts import VERDICT
 
 SLOW = 0.1
 """Share of its spin by which a year may change it before figures of the present spin mislead."""

@@ -28,7 +28,7 @@ from nutdamp.units import bar
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.plan_json import aspects_json, spacecraft_json
-from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector

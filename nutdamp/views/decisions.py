@@ -2,21 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from nutdamp.flight.end_state import Aspect
+from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import Comparison, Decision, Line, strays
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, reasons
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.recommendation import Share
+from nutdamp.schemes import catalogue
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import verdicts
-from nutdamp.views.end_tables import cone_margins, end_table
-from nutdamp.views.layout import columns
 from nutdamp.views.notes import joined, ordered, screen_line
-from nutdamp.views.text import MISSING, degrees, mass, moment, most, quantity
+from nutdamp.views.spacecraft import FRAME_N, add_aspects, cone_margins, direction_text, required, spin_text
+from nutdamp.views.tables import columns, facts
+from nutdamp.views.text import (
+    MISSING,
+    degrees,
+    duration,
+    mass,
+    moment,
+    most,
+    quantity,
+)
+
+VERDICT = {True: "met", False: "NOT met", None: MISSING}
+"""Words for the values of `Plan.meets_requirement`."""
+
+
+def no_plan(plan: Plan) -> str:
+    """Text in the column of a scheme that has no plan."""
+    if plan.failure is None:
+        without = catalogue.SCHEMES[plan.scheme].body_fixed and not plan.spacecraft.channels
+        return "no thrusters" if without else "infeasible"
+    return f"internal error,\nplease report:\n{type(plan.failure).__name__}"
+
+
+def needless(compared: Comparison) -> str | None:
+    """Clause that nothing has to be done, where that is so."""
+    body = compared.spacecraft
+    if not compared.needless:
+        return None
+    there = f"nutation {degrees(body.nutation)} at t = 0"
+    if body.goal.axis is not None:
+        there += f", H {degrees(body.to_turn)} from the target"
+    if requirements.required(body):
+        nominal = ", with nominal values" * (body.dispersions is not None and compared.flown is None)
+        verdict = f"requirement met ({required(body)}){nominal}"
+    else:
+        verdict = "damped"
+    lasting = f", up to the horizon of {duration(body.horizon)}" if body.growth > 0.0 else ""
+    return f"{there}: {verdict}{lasting}"
+
+
+UNDECIDED = "the share of cases that comply is undecided"
+"""Verdict on dispersed cases that do not decide."""
+
+ROUNDING = 1e-9
+"""Share by which costs that are equal may differ."""
+
+FARTHER = 1.1
+"""Factor of distance or of time by which H ends farther off, or later, for a plan to be called worse in it."""
+
+
+def cases_verdict(share: float, probability: float) -> str:
+    """Verdict on the share of cases: "met: 99.9 % of cases comply (99.7 % required)"."""
+    return f"{VERDICT[share >= probability]}: {cases_share(share, probability)}"
+
+
+def cases_share(share: float, probability: float) -> str:
+    """Share of cases that comply, and the share required."""
+    return f"{percent(share, probability)} of cases comply ({exact_percent(probability)} required)"
+
+
+def share_text(share: Share | None) -> str:
+    """The share of cases that comply with a plan; where not all have flown, the side of the required one it is on."""
+    if share is None or (share.exact is None and share.met is None):
+        return MISSING
+    if share.exact is not None:
+        return percent(share.exact, share.probability)
+    return f"{'≥' if share.met else '<'} {exact_percent(share.probability)}"
+
+
+def percent(share: float, *others: float) -> str:
+    """A share in percent to one decimal; to more where it would be taken for one of the ``others``, or for all."""
+    distinct = [other for other in (*others, 0.0, 1.0) if other != share]
+    for digits in range(1, 12):
+        text = f"{100.0 * share:.{digits}f}"
+        if all(float(text) != float(f"{100.0 * other:.10g}") for other in distinct):
+            return f"{text} %"
+    return f"{100.0 * share:.12g} %"
+
+
+def exact_percent(share: float) -> str:
+    """A share that a file gives, in percent as it was written."""
+    return f"{100.0 * share:.10g} %"
+
 
 KEPT = {True: "kept", False: "NOT kept"}
 """Words for a cone about a direction that the spin axis has to keep."""
@@ -32,7 +118,7 @@ def verdict(decision: Decision) -> str:
         return _at_end(decision)
     # Cases that break a cone do not comply, so that a verdict on cases covers more than the end.
     if cases is not None and cases.complying is not None:
-        return f"NOT met: {broken}; {verdicts.cases_share(cases.complying, cases.probability)}"
+        return f"NOT met: {broken}; {cases_share(cases.complying, cases.probability)}"
     return f"NOT met: {broken}; otherwise {_at_end(decision)}"
 
 
@@ -50,11 +136,11 @@ def _at_end(decision: Decision) -> str:
         what = what if decision.damped else what.replace(" is ", " is NOT ")
         return f"nothing is required at the end; with nominal values the {what}"
     if decision.unknown:
-        return f"NOT met{' with nominal values' * (not nominal)}: {verdicts.UNDECIDED}"
+        return f"NOT met{' with nominal values' * (not nominal)}: {UNDECIDED}"
     if cases is not None and cases.complying is not None:
         if nominal:
-            return verdicts.cases_verdict(cases.complying, cases.probability)
-        return f"NOT met with nominal values; {verdicts.cases_share(cases.complying, cases.probability)}"
+            return cases_verdict(cases.complying, cases.probability)
+        return f"NOT met with nominal values; {cases_share(cases.complying, cases.probability)}"
     return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
@@ -63,7 +149,7 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
     cases = decision.cases
     heads = ["requirement", "limit", values]
     if cases is not None:
-        heads.append(f"dispersed\n({verdicts.exact_percent(cases.probability)})")
+        heads.append(f"dispersed\n({exact_percent(cases.probability)})")
     table = columns(*heads, "margin", "verdict", text=("verdict",))
     for line in decision.lines:
         dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
@@ -75,9 +161,9 @@ def decision_table(decision: Decision, values: str = "nominal") -> Table:
             words = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
             table.add_row(f"axis from {aspect.keep.name}", bound, degrees(angle), *none, degrees(left), words)
     if cases is not None and cases.complying is not None:
-        least, share = verdicts.exact_percent(cases.probability), verdicts.percent(cases.complying, cases.probability)
+        least, share = exact_percent(cases.probability), percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        words = coloured(verdicts.VERDICT[cases.met], cases.met)
+        words = coloured(VERDICT[cases.met], cases.met)
         table.add_row(COUNT, f"≥ {least}", "", share, margin, words)
     return table
 
@@ -100,7 +186,7 @@ def size(bound: Bound, value: float | None) -> str:
 def _met(line: Line) -> str:
     """Verdict on a part: met or not; for one that is not required, whether that counts as damped or reached."""
     if line.bound.required:
-        return verdicts.VERDICT[line.met]
+        return VERDICT[line.met]
     done = "reached" if line.bound.part is Part.DISTANCE else "damped"
     return MISSING if line.met is None else f"{done} (not required)" if line.met else f"NOT {done} (not required)"
 
@@ -144,3 +230,40 @@ def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
 def figures(decision: Decision) -> list[RenderableType]:
     """The numbers of a decision on a screen: margins, then the final motion."""
     return [Text(), decision_table(decision), Text(), end_facts(decision)]
+
+
+def margin_lines(decision: Decision, values: str = "nominal") -> list[RenderableType]:
+    """The margins of a flight, where there are any; ``values`` heads the residuals."""
+    return [decision_table(decision, values)] if decision.lines or decision.aspects else []
+
+
+def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
+    """Spin axis and angular momentum after the last pulse, beside the target, and the motion from then on.
+
+    ``watched``: least distances of the axis from directions in space.
+    """
+    body, final = flown.spacecraft, flown.final
+    table = facts()
+    table.add_row("spin axis ends at", direction_text(body, final.axis))
+    table.add_row("H ends at", direction_text(body, final.momentum))
+    if body.goal.axis is not None:
+        off = degrees(flown.residual.axis_error)
+        table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
+    table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
+    if lasting(flown):
+        table.add_row("", lasting(flown))
+    add_aspects(table, watched)
+    if body.attitude is None:
+        table.add_row("", FRAME_N)
+    elif body.attitude.frame is not None:
+        table.add_row("frame", body.attitude.frame)
+    return table
+
+
+def lasting(flown: Flight) -> str:
+    """Time of the end shown where the motion does not last, and the cause of its change; empty where it lasts."""
+    body = flown.spacecraft
+    causes = [*["dissipation"] * (body.growth != 0.0), *["disturbances"] * bool(body.disturbances)]
+    end = "as the last pulse ends, at " + moment(flown.schedule.end)
+    end = end if flown.until is None else f"at {moment(flown.until)}"
+    return f"{end}; changed further by {' and '.join(causes)}" if causes else ""

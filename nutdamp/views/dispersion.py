@@ -23,9 +23,10 @@ from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to
 from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views import verdicts
-from nutdamp.views.end_tables import bounds_text, end_table, requested
+from nutdamp.views import decisions
+from nutdamp.views.decisions import end_table
 from nutdamp.views.plan_json import final_json, heading, target_json
+from nutdamp.views.spacecraft import bounds_text, requested
 from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 from nutdamp.views.text import degrees, digits
@@ -235,13 +236,13 @@ def requirement_lines(results: Results | LoopResults) -> list[RenderableType]:
         return [Text("The file has no requirement to meet.")]
     low, high = results.interval
     required = requested(results.study.model.spacecraft)
-    verdict = Text(verdicts.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
-    interval = " to ".join(verdicts.percent(bound, probability) for bound in (low, high))
+    verdict = Text(decisions.cases_verdict(share, probability), "green" if results.meets_requirement else "red")
+    interval = " to ".join(decisions.percent(bound, probability) for bound in (low, high))
     text = Text.assemble(("Requirement ", "bold"), f"({required}) ", verdict, f"; 95 % interval {interval}.")
     if results.meets_requirement and low < probability:
         few = cases_to_show(probability)
         hint = f" It takes at least {few:,}." if results.done < few else ""
-        level = verdicts.exact_percent(probability)
+        level = decisions.exact_percent(probability)
         text.append(f" The interval reaches below {level}: more --samples would show it.{hint}")
     return [text]
 
@@ -264,7 +265,7 @@ def requirement_of(results: Results | LoopResults) -> dict[str, Any] | None:
 def cone_lines(results: Results | LoopResults) -> Iterator[Text]:
     """Number of cases that break each cone, and range of the angles from the spin axis to its direction."""
     for keep, entry in _cones(results):
-        share = verdicts.percent(entry["broken_fraction"], 1.0 - results.probability)
+        share = decisions.percent(entry["broken_fraction"], 1.0 - results.probability)
         bounds = ("least_deg", "largest_deg", "nominal_least_deg", "nominal_largest_deg")
         least, most, *alone = (degrees(math.radians(entry[key])) for key in bounds)
         yield Text.assemble(
@@ -295,7 +296,7 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
 def _emptied(results: Results) -> Iterator[Text]:
     """Number of cases in which the tank runs empty, where any does."""
     if results.emptied:
-        share = verdicts.percent(results.emptied / results.done, 1.0 - results.probability)
+        share = decisions.percent(results.emptied / results.done, 1.0 - results.probability)
         yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
 
 

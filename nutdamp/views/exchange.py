@@ -52,9 +52,8 @@ class Format(NamedTuple):
 def _json(request: Request) -> str:
     from nutdamp.files.tabular import json_text
     from nutdamp.planning.decision import compare_plans, decide
-    from nutdamp.views.decision_json import decision_json
     from nutdamp.views.decisions import verdict
-    from nutdamp.views.plan_json import comparison_json
+    from nutdamp.views.plan_json import comparison_json, decision_json
 
     compared = compare_plans((request.plan,))
     decided = decide(compared)

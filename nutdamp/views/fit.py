@@ -14,11 +14,11 @@ from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.files.editing import notes
+from nutdamp.views.decisions import exact_percent, percent
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, mass
-from nutdamp.views.verdicts import exact_percent, percent
 
 FAR = 4.0
 """Sigmas of the file from which on a change is remarked upon."""

@@ -1,4 +1,4 @@
-"""The default screen of ``plan``: what to fire on top, in at most `LINES` lines of `WIDTH` columns.
+"""The screens of ``plan``: what to fire on top, by default in at most `LINES` lines of `WIDTH` columns.
 
 The headline, requirements that are not met, warnings and the end of the flight are never dropped; the rest gives way in
 the order of its worth and stands on the full screen (``-v``).
@@ -15,19 +15,20 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.results import Note
-from nutdamp.planning.decision import Comparison, Decision
+from nutdamp.planning.decision import Comparison, Decision, decide
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import verdicts
-from nutdamp.views.decisions import coloured, limit, size, verdict
-from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins, lasting, title
-from nutdamp.views.layout import FittedColumns, facts, lines_of
+from nutdamp.views import decisions
+from nutdamp.views.decisions import coloured, decision_screen, lasting, limit, size, verdict
 from nutdamp.views.notes import WARNING, joined, ordered, screen_line, severity
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.schemes import SHORT_NAMES, limits, scheme_table
+from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, derived_table, title
+from nutdamp.views.summary import blocks_screen
+from nutdamp.views.tables import FittedColumns, facts, lines_of
 from nutdamp.views.text import RPM, degrees, mass, quantity, short_angle
 
 LINES = 24
@@ -37,6 +38,7 @@ ROWS = 6
 """Pulses or blocks that are shown one by one; of more the first `FIRST` and the last."""
 
 FIRST = 4
+
 
 TIGHTEST = 2
 """Requirements that are shown where there is no room for all that are met."""
@@ -96,7 +98,7 @@ def headline(compared: Comparison, decision: Decision | None, robust: str = "") 
     plan = decision.plan
     pulses = plan.pulses
     if not len(pulses):
-        return Text.assemble(("NO PULSE needed", "bold"), f": {verdicts.needless(compared) or 'nothing is fired'}")
+        return Text.assemble(("NO PULSE needed", "bold"), f": {decisions.needless(compared) or 'nothing is fired'}")
     spent = quantity(pulses.total_impulse, "N m s") if pulses.propellant is None else mass(pulses.propellant)
     blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
     count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
@@ -121,7 +123,7 @@ class RequirementRow(NamedTuple):
     @property
     def met(self) -> bool:
         """True unless it is missed."""
-        return self.verdict.plain != verdicts.VERDICT[False]
+        return self.verdict.plain != decisions.VERDICT[False]
 
     @property
     def worth(self) -> tuple[float, bool]:
@@ -134,7 +136,7 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
     """Rows of what is required."""
     rows = []
     cases = decision.cases
-    level = "" if cases is None else f"{verdicts.exact_percent(cases.probability)}: "
+    level = "" if cases is None else f"{decisions.exact_percent(cases.probability)}: "
     for line in decision.lines:
         if not line.bound.required:
             continue
@@ -142,7 +144,7 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         dispersed = "" if values[1] is None else level + _left(bound, values[1])
         words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
         used = [math.nan if value is None else value / bound.most for value in values]
-        met = coloured(verdicts.VERDICT[line.met], line.met)
+        met = coloured(decisions.VERDICT[line.met], line.met)
         rows.append(RequirementRow(bound.part.label, *words, met, _margin(bound, line.margin), (used[0], used[1])))
     for aspect in decision.aspects:
         for text, angle, margin in cone_margins(aspect):
@@ -151,7 +153,7 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
             least = margin == aspect.least - aspect.keep.least
             near = (aspect.keep.least, max(angle, SLACK)) if least else (angle, aspect.keep.most)
             used_up = near[0] / near[1]
-            met = coloured(verdicts.VERDICT[kept], kept)
+            met = coloured(decisions.VERDICT[kept], kept)
             rows.append(
                 RequirementRow(
                     f"axis from {aspect.keep.name}", *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)
@@ -244,3 +246,27 @@ def _fitted(
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
     return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
+
+
+def comparison_screen(compared: Comparison) -> RenderableType:
+    """All tables of ``plan``, the decision on top."""
+    decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
+    results: list[RenderableType] = [
+        Text(),
+        derived_table(compared.spacecraft),
+        Text(),
+        scheme_table(compared, compared.recommended).transposed("full"),
+    ]
+    needless = decisions.needless(compared)
+    parts: list[RenderableType] = [name]
+    if needless is not None:
+        parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
+    remarks = [note for plan in compared.plans for note in plan_notes(plan)]
+    results += [Text(), *map(screen_line, ordered(remarks))] if remarks else []
+    if decided is None:
+        return Group(*parts, Text(f"No recommendation: {joined(reasons(compared))}.", style="bold"), *results)
+    if decided.plan.pulses.blocks:
+        results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
+    elif len(decided.plan.pulses):
+        results += [Text(), pulse_table(decided.plan.flight).screen("full")]
+    return Group(*parts, *decision_screen(compared, decided), *results)

@@ -1,4 +1,4 @@
-"""The guide that ``nutdamp explain`` shows, read from its Markdown pages; `explain_tables` lays them out.
+"""The guide that ``nutdamp explain`` shows, read from its Markdown pages; `nutdamp.views.explain` lays them out.
 
 A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the pages of `ENTRIES` each
 ``## name`` begins a topic of its own, again with a line of summary, and ``### title`` a part of it; on the others
@@ -216,7 +216,7 @@ PAGES = (
 """The pages in groups."""
 
 FILE = "file"
-"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.file_guide`)."""
+"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.explain`)."""
 
 SCHEMES, MOTION = entries("schemes"), entries("motion")
 

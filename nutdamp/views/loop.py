@@ -19,11 +19,10 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import cost, statement
-from nutdamp.views.end_tables import end_table
+from nutdamp.views.decisions import cost, end_table, margin_lines, statement
 from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, seconds
-from nutdamp.views.summary import Remark, margin_lines, opening, summary, warnings_of
+from nutdamp.views.summary import Remark, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 

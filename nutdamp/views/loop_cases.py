@@ -21,7 +21,7 @@ from nutdamp.files.samples import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 from nutdamp.views.dispersion import (
     PERCENTS,
     add_angles,
@@ -36,10 +36,9 @@ from nutdamp.views.dispersion import (
     requirement_of,
     shown,
 )
-from nutdamp.views.layout import columns
 from nutdamp.views.loop import described
 from nutdamp.views.plan_json import heading
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, columns
 from nutdamp.views.text import MISSING, degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
@@ -200,7 +199,7 @@ def _share(results: LoopResults, count: int, of: int) -> str:
     if not of:
         return "no case"
     low, high = results.interval_about(count, of)
-    share, least, most = (verdicts.percent(fraction, 0.99) for fraction in (count / of, low, high))
+    share, least, most = (decisions.percent(fraction, 0.99) for fraction in (count / of, low, high))
     return f"{share} of cases (95 % interval {least} to {most})"
 
 

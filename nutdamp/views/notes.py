@@ -19,7 +19,6 @@ from nutdamp.views.text import degrees, duration, lasting, quantity, sentence
 WARNING, NOTE, REASON = "warning", "note", "reason"
 """Severities: a warning may change what is fired; a reason says why a plan is recommended."""
 
-
 NAME = re.compile(r"\{(\w+)\}")
 
 UNITS: dict[str, Callable[[float], str]] = {

@@ -19,12 +19,12 @@ from nutdamp.planning.robust import RobustComparison
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, requirement
 from nutdamp.views.notes import joined, note_json, screen_line
 from nutdamp.views.plan_json import final_json, plan_json, target_json
-from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.pulses import pulse_table
+from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 from nutdamp.views.text import in_degrees
 from nutdamp.views.tolerances import in_words, stated_text
@@ -82,7 +82,7 @@ def _needed(robust: RobustComparison) -> Iterator[Note]:
         "tolerances-needed",
         required_share=100.0 * robust.probability,
         tolerances=", ".join(sizes),
-        complied=verdicts.percent(needed.complied, robust.probability),
+        complied=decisions.percent(needed.complied, robust.probability),
         cases=f"{needed.cases:,}",
         seed=needed.seed,
         least=f"{math.floor(1e4 * needed.least) / 100.0:.4g} %",
@@ -160,7 +160,7 @@ def _table(robust: RobustComparison, candidates: list[PlanCandidate]) -> DataTab
 
 def _columns(robust: RobustComparison) -> Iterator[Column]:
     """Columns of the candidates; ``full``: of the screen, with propellant only where all have it."""
-    body, level = robust.comparison.spacecraft, verdicts.exact_percent(robust.probability)
+    body, level = robust.comparison.spacecraft, decisions.exact_percent(robust.probability)
     fuelled = all(candidate.plan.pulses.propellant is not None for candidate in robust.candidates)
     yield Column("scheme", "plan", "", attrgetter("plan.scheme"), where="full json", kind=TEXT)
     yield Column("variant", "", "", attrgetter("variant"), where="json", kind=TEXT)
@@ -179,7 +179,7 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
     yield Column("samples", "", "", attrgetter("cases.samples"), where="json", kind=WHOLE)
     yield Column("met_fraction", "", "", attrgetter("met"), where="json")
-    yield Column("", "cases that comply", "", attrgetter("share"), verdicts.share_text,
+    yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
                  "full" * requirements.judged(body))  # fmt: skip
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
 
@@ -197,7 +197,7 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
-    level, left = verdicts.exact_percent(robust.probability), left_name(robust.comparison.spacecraft)
+    level, left = decisions.exact_percent(robust.probability), left_name(robust.comparison.spacecraft)
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
         *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),
@@ -212,8 +212,8 @@ def _fresh(robust: RobustComparison) -> Iterator[str]:
     if robust.fresh is not None and robust.chosen is not None:
         cases = robust.fresh.cases
         shares = (robust.fresh.met, *robust.fresh.interval)
-        met, low, high = (verdicts.percent(share, robust.probability) for share in shares)
-        few = f", fewer than the {verdicts.exact_percent(robust.probability)} required" * robust.lucky
+        met, low, high = (decisions.percent(share, robust.probability) for share in shares)
+        few = f", fewer than the {decisions.exact_percent(robust.probability)} required" * robust.lucky
         new = f"{cases.samples:,} new cases (seed {cases.seed}), not used for the choice"
         yield f"Of {new}, {met} comply{few}; 95 % interval {low} to {high}."
 

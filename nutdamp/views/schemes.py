@@ -10,13 +10,13 @@ from nutdamp.errors import listed
 from nutdamp.flight.end_state import at_start
 from nutdamp.flight.propagation import REAL_WIDTHS, model_name
 from nutdamp.planning.decision import Comparison, infeasibility
-from nutdamp.planning.plan import NO_NUTATION, Plan
+from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decisions import COUNT, limit, size
-from nutdamp.views.end_tables import angle_names, angle_texts, cone_margins
+from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, turning
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import degrees, digits, short_angle, small_angle
 
@@ -25,6 +25,7 @@ NOT = "✗"
 
 SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
+
 
 Getter = Callable[[Plan], Any]
 
@@ -62,21 +63,6 @@ def limits(body: Spacecraft) -> tuple[float, float]:
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
-def beyond_floors(spacecraft: Spacecraft) -> str:
-    """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
-    causes = [
-        *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
-        *["dissipation"] * (spacecraft.growth != 0.0),
-        *["disturbances"] * bool(spacecraft.disturbances),
-    ]
-    return " and ".join(causes)
-
-
-def turning(spacecraft: Spacecraft) -> float:
-    """C |ω3| β in N m s; 0 where H points at the target already, but for rounding."""
-    return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
-
-
 def _feasible(get: Getter) -> Callable[[SchemeRow], Any]:
     """A value of plans that have a schedule."""
     return lambda row: get(row.plan) if row.plan.feasible else None
@@ -97,12 +83,12 @@ def _met(row: SchemeRow) -> bool | None:
 def verdict(row: SchemeRow) -> str:
     """Verdict on a plan, or the reason in a word why there is none."""
     if not row.plan.feasible:
-        return verdicts.no_plan(row.plan)
-    return verdicts.VERDICT[_met(row)] + ", timed" * (not row.plan.commandable)
+        return decisions.no_plan(row.plan)
+    return decisions.VERDICT[_met(row)] + ", timed" * (not row.plan.commandable)
 
 
 def _share(row: SchemeRow) -> str:
-    return verdicts.share_text(row.compared.shares.get(row.plan)).removesuffix(" %")
+    return decisions.share_text(row.compared.shares.get(row.plan)).removesuffix(" %")
 
 
 def _exact_share(row: SchemeRow) -> float | None:

@@ -17,14 +17,12 @@ from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
 from nutdamp.planning.notes import decision_notes, model_warnings
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decision_json import decision_json
-from nutdamp.views.decisions import cost, statement
-from nutdamp.views.end_tables import FRAME_N, add_aspects, angle_names, angle_texts, blocks_screen
-from nutdamp.views.layout import facts
-from nutdamp.views.plan_json import aspects_json, final_json, heading, residual_json, target_json
+from nutdamp.views.decisions import cost, margin_lines, statement
+from nutdamp.views.plan_json import aspects_json, decision_json, final_json, heading, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, shown_rows
-from nutdamp.views.summary import Remark, margin_lines, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, Column, DataTable
+from nutdamp.views.spacecraft import FRAME_N, add_aspects, angle_names, angle_texts
+from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warnings_of
+from nutdamp.views.tables import TEXT, Column, DataTable, facts
 from nutdamp.views.text import degrees, longitude, moment, pointing
 
 IMPULSES, WIDTHS = "impulse approximation (17)", "full simulation"

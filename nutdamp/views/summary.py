@@ -7,23 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+import numpy as np
 from rich.console import Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.results import Note
-from nutdamp.planning.decision import Decision
-from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import decision_table
-from nutdamp.views.end_tables import title
-from nutdamp.views.layout import lines_of
+from nutdamp.flight.propagation import Flight
+from nutdamp.physics import attitude
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.views.notes import NOTE, WARNING, screen_line
-from nutdamp.views.plan_tables import header
+from nutdamp.views.pulses import block_table
+from nutdamp.views.spacecraft import angle_names, angle_texts, header, spin_text, title
+from nutdamp.views.tables import facts, lines_of
+from nutdamp.views.text import degrees, mass, moment, quantity
 
 LINES = 40
 """Lines of a default screen."""
 
 SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))
 """Rows of the table before the last one, and notes: the first pair that fits is shown."""
+
 
 Rows = Callable[..., RenderableType]
 """A table; with ``first`` only of so many rows, and the last one."""
@@ -53,11 +57,6 @@ def warnings_of(remarks: Iterable[Remark]) -> list[Text]:
     return [line_of(remark, WARNING) for remark in dict.fromkeys(remarks)]
 
 
-def margin_lines(decision: Decision, values: str = "nominal") -> list[RenderableType]:
-    """The margins of a flight, where there are any; ``values`` heads the residuals."""
-    return [decision_table(decision, values)] if decision.lines or decision.aspects else []
-
-
 def summary(
     head: Sequence[RenderableType],
     table: Rows | None,
@@ -83,3 +82,40 @@ def summary(
 
     sizes = (screen(*size) for size in SIZES)
     return next((shown for shown in sizes if lines_of(shown) <= LINES), screen(*SIZES[-1]))
+
+
+def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
+    """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
+    table = block_table(flown)
+    return Group(Text(table.title, style="bold"), table.screen("screen"), Text(), _effects(flown, velocity))
+
+
+def _effects(flown: Flight, velocity: Vector | None) -> Table:
+    body, schedule, final = flown.spacecraft, flown.schedule, flown.final
+    before, after = flown.around_pulses()
+    table = facts()
+    for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
+        start = pulse.loaded[0]
+        dated = body.utc(start, 3)
+        table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
+    for name, before_, after_ in zip(
+        angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
+    ):
+        table.add_row(f"H: {name}", f"{before_} to {after_}")
+    table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
+    table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
+    largest = float(max(before.nutation.max(), after.nutation.max()))
+    table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
+    used = schedule.propellant
+    tank = body.tank
+    left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
+    weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
+    table.add_row("propellant", f"{mass(used)}{left}{weighs}")
+    if velocity is not None:
+        table.add_row("|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s"))
+    return table
+
+
+def _sun_angle(body: Spacecraft, direction: Vector) -> str:
+    assert body.sun is not None
+    return degrees(float(attitude.angle_between(direction, body.sun)))

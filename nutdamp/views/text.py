@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
+from nutdamp.common.numerics import MISSING as MISSING
 from nutdamp.common.numerics import RPM as RPM
 from nutdamp.common.numerics import cleaned
-
-MISSING = "–"
-"""Shown where a number is not known."""
-
 
 LONG = (
     ("s", 1.0, 3600.0),

@@ -16,7 +16,7 @@ from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.layout import columns, facts
+from nutdamp.views.tables import columns, facts
 from nutdamp.views.text import quantity
 
 SHOWN = {

@@ -21,15 +21,14 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views import verdicts
-from nutdamp.views.end_tables import requested
+from nutdamp.views import decisions
+from nutdamp.views.decisions import FARTHER
 from nutdamp.views.plan_json import heading, plan_json
-from nutdamp.views.plan_tables import derived_table
 from nutdamp.views.pulses import pulse_table
+from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
-from nutdamp.views.verdicts import FARTHER
 
 ROWS = 18
 """Points on the default screen, at most: evenly some of more."""
@@ -119,7 +118,7 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("scheme", "scheme", "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
     met = attrgetter("plan.meets_requirement")
     yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("", "verdict", "", met, verdicts.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
+    yield Column("", "verdict", "", met, decisions.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
 
 
 def _allowed(front: Front) -> str:

@@ -15,14 +15,12 @@ from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conserv
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 from nutdamp.views.decisions import coloured, size
-from nutdamp.views.end_tables import requested
-from nutdamp.views.layout import FittedColumns
 from nutdamp.views.plan_json import final_json, heading, target_json
-from nutdamp.views.plan_tables import derived_table
+from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, Column, DataTable
+from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns
 from nutdamp.views.text import MISSING, degrees, small_angle
 
 SHOWN = 1e-9 * math.pi / 180.0
@@ -51,7 +49,7 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
     yield coloured(verdict(verification), verification.agree)
     if required := requested(body):
         left = "; ".join(f"{line.bound.part.label} {size(line.bound, line.left)}" for line in plan.held)
-        met = coloured(verdicts.VERDICT[plan.meets_requirement], plan.meets_requirement)
+        met = coloured(decisions.VERDICT[plan.meets_requirement], plan.meets_requirement)
         yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, f" with nominal values: {left}.")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nutdamp.views.file_guide import file_topic
+from nutdamp.views.explain import file_topic
 from nutdamp.views.guide import FOLDER, Topic, TopicRows, units_topic
 
 

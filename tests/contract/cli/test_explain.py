@@ -29,9 +29,8 @@ from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
-from nutdamp.views import guide, loop_cases, spin_table, topics
-from nutdamp.views.explain_tables import WIDEST
-from nutdamp.views.file_guide import flow, keys
+from nutdamp.views import explain, guide, loop_cases, spin_table
+from nutdamp.views.explain import WIDEST, flow, keys
 from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
@@ -221,7 +220,7 @@ def test_every_heading_of_a_table_is_explained() -> None:
 
 def is_known(name: str) -> bool:
     try:
-        return bool(topics.explained(name))
+        return bool(explain.explained(name))
     except BadRequest:
         return False
 
@@ -246,17 +245,17 @@ def test_words_are_explained_however_they_are_written() -> None:
         "nutation after, deg",
     ):
         assert is_known(word), word
-    assert topics.explained("on-time s").summary == topics.explained("On-Time").summary
-    assert topics.explained("a").parts != topics.explained("A").parts  # symbols differ by case
+    assert explain.explained("on-time s").summary == explain.explained("On-Time").summary
+    assert explain.explained("a").parts != explain.explained("A").parts  # symbols differ by case
     assert "file.thrusters.max_on_time" in explained("max_on_time")
-    assert topics.explained("lever_arm").parts[-1].title == "In the spacecraft file"
+    assert explain.explained("lever_arm").parts[-1].title == "In the spacecraft file"
     with pytest.raises(BadRequest, match=r"momentum.shift"):
-        topics.explained("momentun shift")
+        explain.explained("momentun shift")
 
 
 def test_a_further_source_of_words_is_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     notes = ("note", lambda: [("fewer-pulses", "Another plan takes fewer pulses.")])
-    monkeypatch.setattr(topics, "WORDS", (*topics.WORDS, notes))
+    monkeypatch.setattr(explain, "WORDS", (*explain.WORDS, notes))
     assert "Another plan takes fewer pulses." in explained("fewer-pulses")
 
 

@@ -25,7 +25,7 @@ from nutdamp.cli import screen
 from nutdamp.cli.main import stoppable
 from nutdamp.cli.screen import working
 from nutdamp.common import work
-from nutdamp.views.layout import NARROW, columns
+from nutdamp.views.tables import NARROW, columns
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -150,12 +150,12 @@ class Terminal(io.StringIO):
 
 
 class Clock:
-    """A clock that is set by hand, in place of those of `time` and `threading`; its timers ring as it is set."""
+    """A clock that is set by hand; its timers, in place of those of `threading`, ring as it is set."""
 
     def __init__(self) -> None:
         self.now, self.timers = 100.0, list[tuple[float, Callable[[], None]]]()
 
-    def monotonic(self) -> float:
+    def __call__(self) -> float:
         return self.now
 
     def set(self, now: float) -> None:
@@ -186,7 +186,7 @@ class Status(NamedTuple):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(screen, "time", clock)
+    monkeypatch.setattr(screen, "clock", clock)
     monkeypatch.setattr(screen, "threading", clock)
     return clock
 

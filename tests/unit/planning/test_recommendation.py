@@ -36,7 +36,7 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Goal, Requirement, Vector
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
 
 SPIN = Goal(spin=3.0)
 PERIOD = spinner().inertial_period
@@ -220,7 +220,7 @@ def test_plans_with_which_too_few_dispersed_cases_comply_miss_the_requirement() 
         unknown = compared.shares[compared[best]].met is None  # the budget of work ended before that was known
         assert (decision.unknown, decision.met) == (unknown, compared.meets(compared[best]) and not unknown), what
         lines.append(recommended(what, compared))
-        lines.append("; ".join(verdicts.share_text(compared.shares[one]) for one in compared))
+        lines.append("; ".join(decisions.share_text(compared.shares[one]) for one in compared))
     check_text("plan.reasons-by-cases", "\n".join(lines))
     # Nothing is required: no cases decide.
     free = with_shares(plans_of("", "a 0 0.1; b 0 0.2"), "0.1; 0.2")
@@ -348,7 +348,7 @@ def test_none_is_compared_and_recommended_where_no_pulse_is_needed() -> None:
         ):
             compared = Comparison(body, those, named=named)
             assert compared.needless is idle
-            assert (verdicts.needless(compared) is not None) is idle
+            assert (decisions.needless(compared) is not None) is idle
         chosen = Comparison(body, plans).recommended
         assert chosen is not None
         assert ((chosen.scheme == "none"), len(chosen.pulses) == 0) == (needless, needless)

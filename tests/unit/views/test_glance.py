@@ -17,7 +17,7 @@ import nutdamp
 from nutdamp.planning.decision import Comparison, decide
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.views.glance import LINES, ROWS, glance
-from nutdamp.views.layout import WIDTH
+from nutdamp.views.tables import WIDTH
 from nutdamp.views.text import short_angle
 
 CONFIGS = sorted(path.stem for path in places.CONFIGS.glob("*.yaml"))

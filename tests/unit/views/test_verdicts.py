@@ -27,7 +27,8 @@ from nutdamp.planning.recommendation import Standing
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views import verdicts
+from nutdamp.views import decisions
+from nutdamp.views.spacecraft import required
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
@@ -42,14 +43,14 @@ def test_no_limit_is_named_that_the_file_does_not_set() -> None:
 
 
 def test_the_requirement_is_on_one_line() -> None:
-    assert verdicts.required(spinner()) == ""
-    check_text("verdicts.required", verdicts.required(replace(spinner(requirement=BOTH), goal=WIDE)))
+    assert required(spinner()) == ""
+    check_text("verdicts.required", required(replace(spinner(requirement=BOTH), goal=WIDE)))
 
 
 def test_a_share_is_never_rounded_to_what_it_is_not() -> None:
     shares = (0.9991, 0.8562, 0.99696, 0.99704, 0.997, 1.0, 0.00004)
     pairs = [*((share, 0.997) for share in shares), (0.99999, 1e-9), (0.99996, 0.9973), (0.9999999, 0.999999)]
-    check_text("verdicts.shares", "\n".join(f"{share}: {verdicts.cases_verdict(share, of)}" for share, of in pairs))
+    check_text("verdicts.shares", "\n".join(f"{share}: {decisions.cases_verdict(share, of)}" for share, of in pairs))
 
 
 TILTING = (Disturbance(0.5 + 0j),)
@@ -98,10 +99,10 @@ def test_where_no_pulse_is_needed_it_says_so() -> None:
         (0.3, HALF_A_DEGREE, WIDE, True),
     ]
     texts = []
-    for degrees, required, goal, needless in rows:
-        body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=required), goal=goal)
+    for degrees, limit, goal, needless in rows:
+        body = replace(spinner(degrees=degrees, channels=cross(8.0), requirement=limit), goal=goal)
         compared = compare(body, ("four-pulse",))
-        text = verdicts.needless(compared)
+        text = decisions.needless(compared)
         assert (text is not None) is needless is compared.needless
         assert (planning.plan(body, "none").standing is Standing.COMPLIES) is needless
         texts += [text] if text else []
@@ -119,7 +120,7 @@ def test_with_unequal_moments_the_largest_nutation_counts() -> None:
     for share, kept in ((1.001, True), (0.999, False)):
         needed = replace(body, requirement=Requirement(nutation=share * largest))
         assert requirements.unaided(needed) is kept
-        text = verdicts.needless(compare(needed, ("four-pulse",)))
+        text = decisions.needless(compare(needed, ("four-pulse",)))
         assert (text is not None) is kept
         assert text is None or f"{math.degrees(largest):.4g} deg" in text
     easy = replace(body, requirement=Requirement(nutation=1.0))
@@ -135,7 +136,7 @@ def test_what_dissipation_makes_of_it_counts() -> None:
     assert requirements.unaided(growing)
     assert not requirements.unaided(replace(growing, limits=Limits(horizon=21.0)))
     assert not requirements.unaided(replace(calm, dissipation=0.01))  # e-fold 2,000 times: beyond any float
-    check_text("verdicts.needless-growing", verdicts.needless(compare(growing, ("four-pulse",))) or "")
+    check_text("verdicts.needless-growing", decisions.needless(compare(growing, ("four-pulse",))) or "")
     assert not requirements.unaided(replace(calm, disturbances=TILTING))
 
 

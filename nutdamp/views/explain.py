@@ -1,0 +1,438 @@
+"""Topics of ``explain``: pages, sections, words with a paragraph each, keys of the file; and their screens."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, Literal, NamedTuple, get_args, get_origin
+
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.constrain import Constrain
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.errors import BadRequest, nearest
+from nutdamp.files import fields
+from nutdamp.files.fields import Quantity, Section, section_of
+from nutdamp.files.keys import SpacecraftFile
+from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
+from nutdamp.units import KINDS
+from nutdamp.views import guide
+from nutdamp.views.guide import (
+    FILE,
+    MOTION,
+    PAGES,
+    SCHEMES,
+    SOURCES,
+    Block,
+    CommandHelp,
+    Formula,
+    Topic,
+    TopicPart,
+    TopicRows,
+    meant,
+    page,
+)
+
+
+def _notes() -> Iterator[tuple[str, str]]:
+    """Codes of notes, with their sentences and paragraphs; values of a case stand in brackets."""
+    for code, entry in guide.note_entries().items():
+        sentence = re.sub(r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", entry.sentence)
+        yield code, f"{sentence} {entry.paragraph}"
+
+
+WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
+    ("glossary", partial(guide.rows, "glossary")),
+    ("column of CSV", partial(guide.rows, "csv")),
+    ("name in JSON", partial(guide.rows, "json")),
+    ("symbol", partial(guide.rows, "symbols")),
+    ("note", _notes),
+)
+"""Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
+
+ALIKE = ("glossary", "symbol")
+"""Kinds whose names of one paragraph mean the same."""
+
+_UNIT = re.compile(
+    r"([-,]+(N-m(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
+)
+"""End of a heading with hyphens for blanks: its unit."""
+
+
+def explained(requested: str) -> Topic:
+    """Everything that is known by that name, as one topic: words first, then the page, then the keys of the file.
+
+    Raises BadRequest, which names a near one, where there is nothing.
+    """
+    name, _, below = requested.partition(".")
+    if name.casefold() == FILE:
+        return file_topic(below)
+    texts, topic, keys = list(_texts(requested)), _known(requested), _keys(requested)
+    if topic is None and not texts:
+        if not keys:
+            return next(_sections(requested), None) or _missing(requested)
+        if len(keys) == 1:
+            return file_topic(keys[0].path)
+    summary = "keys of the spacecraft file"
+    if topic is not None:
+        summary = topic.summary
+    elif texts:
+        (_, summary), *texts = texts
+    parts = [TopicPart("", (TopicRows(tuple(texts)),))] if texts else []
+    parts += [] if topic is None else topic.parts
+    if keys:
+        rows = tuple((f"{FILE}.{key.path}", key.field.description) for key in keys)
+        parts.append(TopicPart("In the spacecraft file", (TopicRows(rows),)))
+    return Topic(requested if topic is None else topic.name, summary, tuple(parts))
+
+
+def names() -> Iterator[str]:
+    """Every name that `explained` finds, but for sections of pages."""
+    yield from guide.NAMES
+    for _, source in WORDS:
+        for listed, _ in source():
+            yield from listed.split(", ")
+    yield from (key.path for key in _plain_keys())
+
+
+def _folded(name: str) -> str:
+    """A name in small letters with hyphens; a single letter, which is a symbol, as it is."""
+    return re.sub(r"[\s_]+", "-", name.strip() if len(name.strip()) == 1 else name.strip().casefold())
+
+
+def _bare(name: str) -> str:
+    """A heading without its unit."""
+    hyphened = re.sub(r"[\s_]+", "-", name.strip())
+    while (bare := _UNIT.sub("", hyphened)) not in ("", hyphened):
+        hyphened = bare
+    return _folded(hyphened)
+
+
+def _texts(requested: str) -> Iterator[tuple[str, str]]:
+    """Kinds and paragraphs of the words of that name: as written, else folded, else without unit; no text twice.
+
+    Where the glossary has it, only names as written are looked for besides.
+    """
+    seen: set[str] = set()
+    for kind, source in WORDS:
+        words = [(_spelt(listed), listed, text) for listed, text in source()]
+        forms = (str,) if seen else (str, _folded, _bare)
+        tiers = ([word for word in words if form(requested) in map(form, word[0])] for form in forms)
+        for _, listed, text in next(filter(None, tiers), []):
+            if text not in seen:
+                seen.add(text)
+                yield kind, text if kind in ALIKE or ", " not in listed else f"{listed}: {text}"
+
+
+def _spelt(listed: str) -> list[str]:
+    """The names of a list; some have a comma of their own."""
+    names = listed.split(", ")
+    spans = ((first, last) for first in range(len(names)) for last in range(first + 1, len(names) + 1))
+    return [", ".join(names[first:last]) for first, last in spans]
+
+
+def _plain_keys() -> Iterator[KeyGuide]:
+    """Keys of the file, but for those within a tolerance, which are all alike."""
+    return (key for key in keys() if not key.parent.startswith("dispersions."))
+
+
+def _keys(requested: str) -> list[KeyGuide]:
+    """Keys of the file of that name, or of that path."""
+    wanted = _folded(requested)
+    return [key for key in _plain_keys() if wanted in (_folded(key.name), _folded(key.path))]
+
+
+def _known(requested: str) -> Topic | None:
+    """The page, topic or equation of that name."""
+    try:
+        return guide.found(requested)
+    except BadRequest:
+        return None
+
+
+def _sections(requested: str) -> Iterator[Topic]:
+    """Sections of pages of that title, or whose title begins so."""
+    wanted = _folded(requested)
+    for begins in (False, True):
+        for name in guide.NAMES:
+            for part in guide.found(name).parts if name not in (FILE, guide.OVERVIEW) else ():
+                title = _folded(part.title)
+                if title == wanted or (begins and len(wanted) > 3 and title.startswith(wanted)):
+                    yield Topic(part.title, f"in explain {name}", (TopicPart("", part.blocks),))
+
+
+def _missing(requested: str) -> Topic:
+    """Raise BadRequest: there is no topic of that name."""
+    if re.fullmatch(r"[mk(]*[0-9]+\)?", requested.casefold()):
+        return guide.found(requested)  # raises, and says which equations there are
+    close = nearest(_folded(requested), guide.NAMES)
+    raise BadRequest(f"there is no topic {requested!r}; {guide.meant(close or _folded(requested), tuple(names()))}")
+
+
+class KeyGuide(NamedTuple):
+    """A key of the file: its ``path`` as `explain` takes it, such as ``thrusters.force``, and its declaration.
+
+    ``section`` is the model of its value, where that is a mapping or a list of mappings.
+    """
+
+    path: str
+    field: fields.Key
+    section: type[Section] | None
+
+    @property
+    def parent(self) -> str:
+        """Path of the mapping it is in; empty at the root."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def name(self) -> str:
+        """Last step of the path."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def row(self) -> tuple[str, str]:
+        """The key, and its description, unit, default and example."""
+        example = next(iter(self.field.examples), None)
+        facts = [self._unit(), self._default(), "" if example is None else f"example: {flow(example)}"]
+        return self.name, "\n".join([self.field.description, "; ".join(fact for fact in facts if fact)])
+
+    def _unit(self) -> str:
+        if self.section is ToleranceSection:
+            names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
+            return f"unit {_either(dict.fromkeys(names))}"
+        return "" if self.section is not None else _what(self.field)
+
+    def _default(self) -> str:
+        if self.field.default is fields.REQUIRED:
+            return "required"
+        if "default" in self.field.description.casefold():
+            return ""
+        value = self.field.default
+        return "default none" if value is None or value == [] else f"default {value:g}"
+
+
+def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
+    """All keys of the file, each before those below it."""
+    for name, field in model.fields().items():
+        section = section_of(field.type)
+        yield KeyGuide(f"{prefix}{name}", field, section)
+        if section is not None:
+            yield from keys(section, f"{prefix}{name}.")
+
+
+def file_topic(below: str = "") -> Topic:
+    """The keys of the file, or the one called ``below``, such as ``thrusters.force``, and those in it.
+
+    Raises BadRequest, which names a near one, where there is none.
+    """
+    every = list(keys())
+    if not below:
+        roots = [key for key in every if not key.parent]
+        parts = [TopicPart("", (INTRODUCTION, TopicRows(tuple(key.row for key in roots))))]
+        for key in roots:
+            parts += _key_sections(key, every)
+        return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
+    requested = next((key for key in every if key.path == below), None)
+    if requested is None:
+        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below, every)}")
+    return Topic(
+        f"{FILE}.{below}",
+        "a key of the spacecraft file",
+        (TopicPart("", (TopicRows((requested.row,)),)), *_key_sections(requested, every), _SEE),
+    )
+
+
+INTRODUCTION = (
+    "A value is a number in SI or a text with a unit. Any key can also be given as --set KEY=VALUE, entries of a list "
+    "by name or position: --set thrusters.T1.force=12N, --set omega0[2]=3."
+)
+
+
+_SEE = TopicPart("See also", ("explain units, nutdamp init, nutdamp schema",))
+
+
+def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
+    """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
+    if key.section is None:
+        return
+    listed = get_origin(_plain(key.field.type)) is list
+    title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
+    children = [entry for entry in every if entry.parent == key.path]
+    about = " ".join((key.section.__doc__ or "").split())
+    yield TopicPart(title, (about, TopicRows(tuple(child.row for child in children))))
+    below = [child for child in children if child.section is not None]
+    if below and all(child.section is ToleranceSection for child in below):
+        alike = [entry for entry in every if entry.parent == below[0].path]
+        names = ", ".join(child.name for child in below)
+        yield TopicPart(f"{key.path}: each of {names}", (TopicRows(tuple(entry.row for entry in alike)),))
+        return
+    for child in below:
+        yield from _key_sections(child, every)
+
+
+def _near(below: str, every: list[KeyGuide]) -> str:
+    """A key of the same name elsewhere, or one that is spelt alike."""
+    paths = tuple(
+        key.path for key in every if key.parent.partition(".")[0] != "dispersions" or not key.parent.count(".")
+    )
+    last = below.rpartition(".")[2]
+    same = next((path for path in paths if path.rpartition(".")[2] == last), None)
+    return (
+        f"did you mean '{FILE}.{same}'?"
+        if same
+        else meant(f"{FILE}.{below}", tuple(f"{FILE}.{path}" for path in paths), "nutdamp explain file")
+    )
+
+
+def _what(field: fields.Key) -> str:
+    """The units of a quantity, the words of a choice, or the form of another value."""
+    quantity = _first(Quantity, (field.type,))
+    if quantity is not None:
+        factors = KINDS[quantity.kind].factors
+        return f"unit {_either(factors)}" if factors else "plain numbers, without unit"
+    choices = _choices(field.type)
+    if choices:
+        return _either(choices)
+    plain = _plain(field.type)
+    return {int: "a whole number", str: "a text"}.get(plain, "")
+
+
+def _first(kind: type[Quantity], parts: tuple[Any, ...]) -> Quantity | None:
+    """The first ``kind`` within types and their annotations."""
+    for part in parts:
+        match = part if isinstance(part, kind) else _first(kind, get_args(part))
+        if match is not None:
+            return match
+    return None
+
+
+def _choices(annotation: Any) -> tuple[str, ...]:
+    if get_origin(annotation) is Literal:
+        return tuple(str(choice) for choice in get_args(annotation))
+    return next(filter(None, map(_choices, get_args(annotation))), ())
+
+
+def _plain(annotation: Any) -> Any:
+    """A type without None and without annotations."""
+    if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
+        return annotation
+    return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
+
+
+def _either(names: Any) -> str:
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else str(last)
+
+
+def flow(value: object) -> str:
+    """A value as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {flow(held)}" for key, held in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(flow, value)) + "]"
+    return str(value)
+
+
+WIDEST = 100
+"""Largest width of a text in columns: longer lines are hard to read."""
+
+
+NARROW = 60
+"""Columns below which names are above their texts, and not beside them."""
+
+
+def topics_screen() -> RenderableType:
+    """All pages with a line about each, and what else can be asked for."""
+    parts: list[RenderableType] = [Text("The guide: nutdamp explain TOPIC")]
+    for group, names in PAGES:
+        rows = tuple((name, page(name).summary) for name in names)
+        parts += [Text(group, style="bold"), Padding(_Pairs(rows), (0, 0, 0, 2))]
+    others = (
+        ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
+        ("Motion", ", ".join(topic.name for topic in MOTION)),
+        ("Equations", "17, K7, 24.4"),
+        ("Words", "any heading of a table, column, name in JSON, symbol, or key of the file, as in: explain tilt"),
+    )
+    return Constrain(Group(*parts, _Pairs(others)), WIDEST)
+
+
+def examples_screen(rows: tuple[tuple[str, str], ...]) -> RenderableType:
+    """The spacecraft to start from, each with its subject."""
+    title = Text("Spacecraft to start from: nutdamp init --from NAME [FILE]")
+    return Constrain(Group(title, Text(), _Pairs(rows)), WIDEST)
+
+
+def topic_screen(topic: Topic) -> RenderableType:
+    """One topic."""
+    parts: list[RenderableType] = [Text.assemble((topic.name, "bold"), f" – {topic.summary}")]
+    for part in topic.parts:
+        parts.append(Text())
+        if part.title:
+            parts.append(Text(part.title, style="bold"))
+        for number, block in enumerate(part.blocks):
+            parts += [Text()] * (number > 0) + [_block(block)]
+    return Constrain(Group(*parts), WIDEST)
+
+
+def equations_screen() -> RenderableType:
+    """Every numbered equation: its subject, its place in the code, its differences from the print."""
+    rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in guide.EQUATIONS]
+    hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
+    return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
+
+
+def _block(block: Block) -> RenderableType:
+    if isinstance(block, Formula):
+        return Padding(Group(*(Text(line) for line in block.lines)), (0, 0, 0, 2))
+    if isinstance(block, TopicRows):
+        return _Pairs(block.rows)
+    if isinstance(block, CommandHelp):
+        return _Typed(block)
+    return Text(block)
+
+
+class _Pairs:
+    """Names to the left and their texts to the right, or above and below each other where there is little room."""
+
+    def __init__(self, rows: tuple[tuple[str, str], ...]) -> None:
+        self.rows = rows
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        longest = max(len(name) for name, _ in self.rows)
+        if options.max_width < NARROW or longest > 0.45 * options.max_width:
+            for name, text in self.rows:
+                yield Text(name, style="dim", overflow="fold")
+                yield Padding(Text(text, overflow="fold"), (0, 0, 0, 2))
+            return
+        table = Table.grid(padding=(0, 2))
+        table.add_column(style="dim", overflow="fold")
+        for name, text in self.rows:
+            table.add_row(name, Text(text, overflow="fold"))
+        yield table
+
+
+class _Typed:
+    """Command lines, broken as a shell allows where they are longer than the screen is wide."""
+
+    def __init__(self, commands: CommandHelp) -> None:
+        self.commands = commands
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for parts in self.commands.lines:
+            for line in _broken(parts, options.max_width - 2):
+                yield Padding(Text(line, overflow="fold"), (0, 0, 0, 2))
+
+
+def _broken(parts: tuple[str, ...], width: int) -> Iterator[str]:
+    """The ``parts`` of a command in lines of up to ``width`` characters; longer parts have a line each."""
+    line = ""
+    for part in parts:
+        if line and len(line) + len(part) + 3 > width:
+            yield f"{line} \\"
+            line = f"  {part}"
+        else:
+            line = f"{line} {part}" if line else part
+    yield line

@@ -1,0 +1,201 @@
+"""The spacecraft in words: name, derived quantities at t = 0, requirement, and directions as angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from nutdamp.errors import listed
+from nutdamp.flight.end_state import Aspect, at_start
+from nutdamp.planning.plan import NO_NUTATION
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.views.tables import WIDTH, facts
+from nutdamp.views.text import (
+    RPM,
+    degrees,
+    duration,
+    longitude,
+    moment,
+    most,
+    pointing,
+    quantity,
+    short_angle,
+)
+
+FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
+"""Frame of the two angles of a direction without an attitude in the file."""
+
+
+def title(body: Spacecraft) -> list[Text]:
+    """Name of a spacecraft and its motion at t = 0, on one line where they fit."""
+    what = f"{body.inertia.shape}, {body.spin * RPM:.4g} rpm, nutation {short_angle(body.widest.nutation)} deg"
+    name = Text(body.name, style="bold")
+    fits = len(body.name) + len(what) + 3 <= WIDTH
+    return [Text.assemble(name, f"   {what}")] if fits else [name, Text(what)]
+
+
+def angle_names(body: Spacecraft) -> tuple[str, str]:
+    """Names of the two angles of a direction: along and above the equator, or from H(0) and about it."""
+    return ("tilt", "azimuth") if body.attitude is None else ("right ascension", "declination")
+
+
+def angle_texts(body: Spacecraft, direction: Vector) -> tuple[str, str]:
+    """The two angles of an inertial direction (3,), in the order of `angle_names`."""
+    around, other = body.angles_of(direction)
+    return (pointing(other), longitude(around)) if body.attitude is None else (longitude(around), pointing(other))
+
+
+def direction_text(body: Spacecraft, direction: Vector) -> str:
+    """An inertial direction (3,) by name and number of its angles."""
+    names, texts = angle_names(body), angle_texts(body, direction)
+    return ", ".join(f"{name} {text}" for name, text in zip(names, texts, strict=True))
+
+
+def spin_text(spin: float) -> str:
+    """A spin rate given in rad/s, in rpm too."""
+    return f"{spin * RPM:.6g} rpm ({quantity(spin, 'rad/s')})"
+
+
+def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
+    """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it is broken."""
+    for aspect in aspects:
+        keep = aspect.keep
+        mark, bounds = "" if aspect.kept else "✗ ", bounds_text(keep)
+        near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
+        moves = aspect.largest_at > 0.0 or aspect.least_at > 0.0
+        seen = f"{near} to {far}" if moves else f"{degrees(aspect.least)} at t = 0"
+        table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
+
+
+def bounds_text(keep: Keep) -> str:
+    """Limits of the spin axis to a direction; empty where it is only watched."""
+    least = f"at least {most(keep.least)}" if keep.least > 0.0 else ""
+    largest = f"at most {most(keep.most)}" if keep.most < math.pi else ""
+    return " and ".join(filter(None, (least, largest)))
+
+
+def requested(body: Spacecraft) -> str:
+    """The requirement and the cones to keep, on one line; empty where there are none."""
+    cones = [f"axis {bounds_text(keep)} from {keep.name}" for keep in body.keep]
+    return listed([*filter(None, [required(body)]), *cones])
+
+
+def cone_margins(aspect: Aspect) -> Iterator[tuple[str, float, float]]:
+    """Each bound of a cone, the angle that comes nearest to it, and its margin, rad."""
+    keep = aspect.keep
+    if keep.least > 0.0:
+        yield f"≥ {most(keep.least)}", aspect.least, aspect.least - keep.least
+    if keep.most < math.pi:
+        yield f"≤ {most(keep.most)}", aspect.largest, keep.most - aspect.largest
+
+
+def required(spacecraft: Spacecraft) -> str:
+    """The requirement, on one line; empty where there is none."""
+    texts = []
+    for bound in requirements.required(spacecraft):
+        if bound.part is Part.SPIN:
+            tolerance = 100.0 * requirements.SPIN_TOLERANCE
+            texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
+        else:
+            texts.append(f"{bound.part.label} within {most(bound.most)}")
+    return listed(texts)
+
+
+def _rpm(spin: float) -> str:
+    return f"{spin * RPM:.5g} rpm"
+
+
+def beyond_floors(spacecraft: Spacecraft) -> str:
+    """Actions that break the floors A|ω0| and C|ω3|β, in words; empty where they hold."""
+    causes = [
+        *["I1 ≠ I2"] * (not spacecraft.inertia.symmetric),
+        *["dissipation"] * (spacecraft.growth != 0.0),
+        *["disturbances"] * bool(spacecraft.disturbances),
+    ]
+    return " and ".join(causes)
+
+
+def turning(spacecraft: Spacecraft) -> float:
+    """C |ω3| β in N m s; 0 where H points at the target already, but for rounding."""
+    return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
+
+
+def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
+    """Name and derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    return Group(Text(spacecraft.name, style="bold"), derived_table(spacecraft, more))
+
+
+def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
+    """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    inertia = spacecraft.inertia
+    motion = spacecraft.widest
+    table = facts()
+    moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
+    table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
+    if not inertia.symmetric:
+        first, second, _ = inertia.moments
+        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
+    table.add_row("spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0))
+    now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
+    cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
+    table.add_row("nutation", f"{now}{degrees(motion.nutation)} = {cones}")
+    still = math.isinf(spacecraft.body_period)
+    in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
+    table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
+    if spacecraft.dissipation is not None:
+        table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
+    beyond = beyond_floors(spacecraft)
+    floor = f"no least impulse with {beyond}" if beyond else "removing all nutation takes no less"
+    name = "impulse" if beyond else "least impulse"
+    table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
+    if spacecraft.goal.axis is not None:
+        turn = quantity(turning(spacecraft), "N m s")
+        least = "" if beyond else ", the least to turn H"
+        table.add_row("target", direction_text(spacecraft, spacecraft.goal.axis))
+        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turn}{least}")
+    if spacecraft.goal.spin is not None:
+        table.add_row("final spin", spin_text(spacecraft.goal.spin))
+    table.add_row("actuators", _actuators(spacecraft))
+    for line, text in enumerate(_requirement(spacecraft)):
+        table.add_row("" if line else "requirement", text)
+    add_aspects(table, at_start(spacecraft))
+    for name, value in more:
+        table.add_row(name, value)
+    return table
+
+
+def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
+    """The requirement, and the differences from the key of the file."""
+    bounds = requirements.required(spacecraft)
+    if bounds:
+        yield required(spacecraft)
+    if any(bound.part is Part.DISTANCE for bound in bounds):
+        yield "momentum_shift bounds the axis error: the angle of H from the target"
+
+
+def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
+    """Effect of energy dissipation on the nutation, and a note where it is too fast for its model."""
+    if spacecraft.growth == 0.0:
+        return "none: a sphere has no energy to lose"
+    what = "grows" if spacecraft.growth > 0.0 else "decays"
+    slow = time_constant >= spacecraft.inertial_period
+    rough = "" if slow else "; less than one inertial period: results are rough"
+    return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
+
+
+def _actuators(spacecraft: Spacecraft) -> str:
+    torquer = spacecraft.torquer
+    texts = []
+    if torquer is not None:
+        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
+        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
+        texts.append(f"steerable torquer, {strength}{assumed}")
+    if spacecraft.channels:
+        texts.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
+    return "; ".join(texts)
