@@ -139,7 +139,7 @@ def _completed_examples(ctx: click.Context, param: click.Parameter, incomplete: 
     "--from", "name", metavar="NAME", shell_complete=_completed_examples, help="One of the examples of --list instead."
 )
 @click.option("--list", "listed", is_flag=True, help="List the examples that there are, and write nothing.")
-@click.option("--force", is_flag=True, help="Replace a file that is already there.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
 @quiet_option
 def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: bool) -> None:
     """Write a commented spacecraft file (default spacecraft.yaml); a FILE of - is standard output.
@@ -156,7 +156,7 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
         return
     text = example_text(_known(name) if name else BUILT_IN)
     if file != STDOUT and check_place(file).exists() and not force:
-        raise CannotWrite(file, "it is already there; --force replaces it")
+        raise CannotWrite(file, "already exists; use --force")
     write_whole(file, text)
     if file != STDOUT and not quiet:
         say(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")

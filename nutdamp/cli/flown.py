@@ -126,7 +126,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
     plan = compared.recommended
     show_failures(compared)
     if plan is not None:
-        job.remark(f"using the recommended plan, {plan.scheme}")
+        job.remark(f"using recommended plan: {plan.scheme}")
     job.note(comparison_warnings(compared, cones=not judged))
     if plan is None:
         raise Infeasible(f"{joined(reasons(compared))}; `nutdamp plan` says more")

@@ -40,7 +40,7 @@ FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
-quiet_option = click.option("-q", "--quiet", is_flag=True, help="No remarks on standard error.")
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
 
 
 class FileInput(NamedTuple):
@@ -64,7 +64,7 @@ class FileInput(NamedTuple):
             if self.path is None:
                 remark(f"reading {path}")
             return Source(read_text(Path(path)), path, self.settings)
-        remark("no spacecraft file named, and no spacecraft.yaml here: using the built-in example (see `nutdamp init`)")
+        remark("no spacecraft file given: using the built-in example (see `nutdamp init`)")
         return Source(example_text(), "example.yaml", self.settings)
 
 
@@ -85,7 +85,7 @@ set_option = click.option(
     multiple=True,
     metavar="KEY=VALUE",
     callback=_settings,
-    help="Change a key: limits.gap=1s; repeatable.",
+    help="Change a key, e.g. limits.gap=1s; repeatable.",
 )
 
 

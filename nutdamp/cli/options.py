@@ -413,7 +413,7 @@ def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark
     planned = [SCHEMES[name] for name in names]
     for option in options.without_effect([scheme.options for scheme in planned]) if planned else ():
         readers = [name for name, scheme in SCHEMES.items() if option in names_of(scheme.options)]
-        remark(f"--{option.replace('_', '-')} does nothing here: it is for {' and '.join(readers)}")
+        remark(f"warning: --{option.replace('_', '-')} ignored: it is for {' and '.join(readers)}")
     if body.goal.sun is not None:
         without = [scheme.name for scheme in planned if not scheme.reads_sun]
         if len(without) == len(planned):

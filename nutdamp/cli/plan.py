@@ -124,7 +124,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
         if plans:
-            raise BadRequest("--blocks: no plan is made of command blocks; --scheme command-block says why")
+            raise BadRequest("--blocks: no plan is made of command blocks; run --scheme command-block for the reason")
         return {}
     if source is not chosen:
         job.remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")

@@ -57,7 +57,7 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
     with job.working("filming"):
         deliver([(output, lambda: lambda stream: animation.film(stream, flight, timed, output, width))])
     if output != "-":
-        job.remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g} s of motion in a second")
+        job.remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g}× real time")
 
 
 @click.command("simulate", cls=SessionCommand)

@@ -177,7 +177,7 @@ def decode(data: bytes, name: str) -> str:
         return FaultyFile([_place(before, len(before)).fault(name, "", problem)])
 
     if len(data) > MAX_BYTES:
-        raise FaultyFile([Fault(name, 0, 0, "", "larger than 1 MiB; that is no spacecraft file")])
+        raise FaultyFile([Fault(name, 0, 0, "", "too large: more than 1 MiB")])
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise fault(0, "the text is UTF-16; save it as UTF-8")
     if b"\0" in data:
@@ -412,7 +412,7 @@ _SYNTAX = (
     (r"could not find expected ':'", "no 'key: value' (a space must follow the colon)", True),
     (r"unexpected end of stream", "the quotation mark is never closed", True),
     (r"unknown escape", "unknown \\ escape; use single quotes for texts with a backslash", False),
-    (r"expected <block end>", "indentation that fits no line above, or text behind a closed value", False),
+    (r"expected <block end>", "inconsistent indentation, or text behind a closed value", False),
     (r"expected ',' or '[\]}]'", "a comma or the closing bracket is missing", False),
     (r"sequence entries are not", "'- ' where no list can begin; put it on a line of its own", False),
     (r"expected the node content", "a value is missing before this", False),

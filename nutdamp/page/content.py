@@ -120,7 +120,7 @@ def report_page(
             headline=(headline.plain[:lead], headline.plain[lead:]),
             verdict="" if decided is None else decisions.verdict(decided),
             margins=() if decided is None else tuple(map(_margin, glance.requirement_rows(decided))),
-            facts=None if decided is None else facts_of("Final state", glance.ends(decided)),
+            facts=None if decided is None else facts_of("Final state, after the last pulse", glance.ends(decided)),
             warnings=() if decided is None else tuple(_warnings(compared, decided)),
             notes=tuple(notes[: glance.NOTES]),
             motion=()

@@ -132,9 +132,8 @@ def _at_end(decision: Decision) -> str:
     """Verdict on the end, regardless of cones on the way."""
     cases, nominal = decision.cases, decision.nominal
     if nominal is None:
-        what = "nutation is damped" if decision.plan.spacecraft.goal.axis is None else "target is reached"
-        what = what if decision.damped else what.replace(" is ", " is NOT ")
-        return f"nothing is required at the end; with nominal values the {what}"
+        what, done = ("nutation", "damped") if decision.plan.spacecraft.goal.axis is None else ("target", "reached")
+        return f"no requirement in file; {what} {'NOT ' * (not decision.damped)}{done} with nominal values"
     if decision.unknown:
         return f"NOT met{' with nominal values' * (not nominal)}: {UNDECIDED}"
     if cases is not None and cases.complying is not None:
@@ -184,21 +183,21 @@ def size(bound: Bound, value: float | None) -> str:
 
 
 def _met(line: Line) -> str:
-    """Verdict on a part: met or not; for one that is not required, whether that counts as damped or reached."""
+    """Verdict on a part: met or not; on one that is not required, damped or reached."""
     if line.bound.required:
         return VERDICT[line.met]
     done = "reached" if line.bound.part is Part.DISTANCE else "damped"
-    return MISSING if line.met is None else f"{done} (not required)" if line.met else f"NOT {done} (not required)"
+    return MISSING if line.met is None else f"{'NOT ' * (not line.met)}{done}"
 
 
 def cost(decision: Decision) -> Iterator[tuple[str, str]]:
     """Cost and end of the plan: names and values."""
     pulses = decision.flight.schedule
-    count = f"{len(pulses)} pulse{'s' * (len(pulses) != 1)}"
+    count = f"pulses: {len(pulses)}"
     if pulses.propellant is None:
-        yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')} in {count}"
+        yield "impulse", f"{quantity(pulses.total_impulse, 'N m s')}, {count}"
     else:
-        yield "propellant", f"{mass(pulses.propellant)} in {count}"
+        yield "propellant", f"{mass(pulses.propellant)}, {count}"
     yield "last pulse ends", moment(pulses.end) if len(pulses) else "no pulse is needed"
 
 
@@ -249,7 +248,7 @@ def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
     if body.goal.axis is not None:
         off = degrees(flown.residual.axis_error)
         table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
-    table.add_row("after that", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
+    table.add_row("final state", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
     if lasting(flown):
         table.add_row("", lasting(flown))
     add_aspects(table, watched)

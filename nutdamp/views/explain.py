@@ -258,11 +258,9 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
     """The keys below ``key``, section by section; those of tolerances, which are all alike, once."""
     if key.section is None:
         return
-    listed = get_origin(_plain(key.field.type)) is list
-    title = f"{key.path}, each entry" if listed and key.section is not ToleranceSection else key.path
     children = [entry for entry in every if entry.parent == key.path]
     about = " ".join((key.section.__doc__ or "").split())
-    yield TopicPart(title, (about, TopicRows(tuple(child.row for child in children))))
+    yield TopicPart(key.path, (about, TopicRows(tuple(child.row for child in children))))
     below = [child for child in children if child.section is not None]
     if below and all(child.section is ToleranceSection for child in below):
         alike = [entry for entry in every if entry.parent == below[0].path]

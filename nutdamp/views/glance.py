@@ -103,7 +103,8 @@ def headline(compared: Comparison, decision: Decision | None, robust: str = "") 
     blocks = f"blocks {len(pulses.blocks)}, " if pulses.blocks else ""
     count = f"{blocks}pulses {len(pulses)}, {spent}, ends at {pulses.end:.4g} s"
     lead = ("NOT ENOUGH: ", "bold red") if decision.met is False else ("FLY ", "bold")
-    return Text.assemble(lead, (robust or plan.scheme, "bold"), f": {count}")
+    ideal = " (ideal impulses)" * pulses.idealised
+    return Text.assemble(lead, (robust or plan.scheme, "bold"), f"{ideal}: {count}")
 
 
 class RequirementRow(NamedTuple):
@@ -183,9 +184,9 @@ def ends(decision: Decision) -> Table:
     table, formula, (least, turn) = facts(), plan.residual, limits(body)
     angles = [f"nutation {short_angle(left.nutation, least)}", f"body cone {short_angle(left.body_cone, least)}"]
     angles += [f"space cone {short_angle(left.space_cone, least)}"]
-    if formula is not None:
-        angles[0] += f" (17: {short_angle(formula.nutation, least)})"
-    table.add_row("ends, deg", "  ".join(angles))
+    if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
+        angles[0] += f" (17: {by_impulses})"
+    table.add_row("after pulses, deg", "  ".join(angles))
     first, second = angle_texts(body, decision.final.axis)
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rich.text import Text
@@ -20,6 +20,8 @@ WARNING, NOTE, REASON = "warning", "note", "reason"
 """Severities: a warning may change what is fired; a reason says why a plan is recommended."""
 
 NAME = re.compile(r"\{(\w+)\}")
+
+INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
 
 UNITS: dict[str, Callable[[float], str]] = {
     "_deg": lambda value: degrees(math.radians(value)),
@@ -43,7 +45,15 @@ def severity(note: Note) -> str:
 def text(note: Note) -> str:
     """The sentence of a note with its values, without a full stop."""
     entry, values = note_entries()[note.code], note.values
-    return NAME.sub(lambda name: _shown(name[1], values[name[1]]), entry.sentence).removesuffix(".")
+    shown = {name: _shown(name, value) for name, value in values.items()}
+    first, *clauses = entry.sentence.removesuffix(".").split("; ")
+    differing = [clause for clause in clauses if _compared(clause, shown) == clause]
+    return NAME.sub(lambda name: shown[name[1]], "; ".join([_compared(first, shown), *differing]))
+
+
+def _compared(clause: str, shown: Mapping[str, str]) -> str:
+    """A clause without "instead of" the same value, as it is ``shown``."""
+    return INSTEAD.sub(lambda pair: pair[0] if shown[pair[1]] != shown[pair[2]] else f"{{{pair[1]}}}", clause)
 
 
 def _shown(name: str, value: Value) -> str:

@@ -77,7 +77,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
     remarks: list[Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
     return summary(
         [*head, statement(decided), *margin_lines(decided)],
-        lambda **_: end_comparison(simulation).transposed("screen"),
+        lambda **_: end_comparison(simulation).transposed("screen", f"end of track, {moment(extremes.until)}"),
         [*remarks, *[FRAME_N] * (body.attitude is None)],
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), _extremes(simulation)] if verbose else (),

@@ -28,7 +28,7 @@ from nutdamp.views.text import (
     short_angle,
 )
 
-FRAME_N = "tilt from H(0); azimuth about it, from the side to which the spin axis leans at t = 0"
+FRAME_N = "tilt from H(0); azimuth about it, from the initial tilt direction"
 """Frame of the two angles of a direction without an attitude in the file."""
 
 
@@ -151,7 +151,7 @@ def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) 
     if spacecraft.dissipation is not None:
         table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
     beyond = beyond_floors(spacecraft)
-    floor = f"no least impulse with {beyond}" if beyond else "removing all nutation takes no less"
+    floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
     table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
     if spacecraft.goal.axis is not None:

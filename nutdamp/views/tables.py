@@ -202,10 +202,10 @@ class DataTable:
         style = "" if met is None else "green" if met else "bold red"
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
-    def transposed(self, place: str) -> FittedColumns:
-        """A table of a screen with quantities down and rows across, named by the first column."""
+    def transposed(self, place: str, corner: str = "") -> FittedColumns:
+        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading."""
         name, *shown = self.at(place)
-        table = columns("", *(_text(name, row) for row in self.rows))
+        table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
             heading = f"{column.heading}, {column.unit}" if column.unit else column.heading
             cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from nutdamp.common.numerics import MISSING as MISSING
 from nutdamp.common.numerics import RPM as RPM
 from nutdamp.common.numerics import cleaned
+from nutdamp.schemes.catalogue import NAMES
 
 LONG = (
     ("s", 1.0, 3600.0),
@@ -33,9 +34,9 @@ def digits(value: float, count: int) -> str:
 
 
 def sentence(clause: str) -> str:
-    """A clause with a capital letter, unless it begins with a key of the file, and a full stop, unless it asks."""
+    """A clause with a capital letter, unless it begins with a scheme or a key, and a full stop, unless it asks."""
     first, _, _ = clause.partition(" ")
-    begun = clause if "." in first else clause[:1].upper() + clause[1:]
+    begun = clause if "." in first or first.rstrip(":") in NAMES else clause[:1].upper() + clause[1:]
     return begun if begun.endswith("?") else f"{begun}."
 
 
