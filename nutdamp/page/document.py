@@ -43,7 +43,8 @@ class Cell(NamedTuple):
 class Sheet:
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale.
+    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale; ``folds``:
+    on a phone each row is a list of its own.
     """
 
     title: str
@@ -51,6 +52,7 @@ class Sheet:
     rows: tuple[tuple[str, ...], ...]
     mark: int | None = None
     dots: tuple[str, ...] = ()
+    folds: bool = False
     kind: ClassVar[str] = "sheet"
 
     @property

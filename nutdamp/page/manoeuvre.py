@@ -24,7 +24,7 @@ from nutdamp.views import decisions
 from nutdamp.views.notes import text
 from nutdamp.views.pulses import MILLISECONDS, channel_text
 from nutdamp.views.schemes import limits
-from nutdamp.views.tables import Heading
+from nutdamp.views.tables import Heading, Shared
 from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle
 
 if TYPE_CHECKING:
@@ -138,12 +138,12 @@ def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
     _, after = flown.around_pulses()
     least, _ = limits(body)
     angles = after.nutation[np.array(counts) - 1].tolist()
-    columns.append((Heading("nutation after", "deg"), [short_angle(angle, least) for angle in angles]))
+    columns.append((Heading(Shared.NUTATION_AFTER, "deg"), [short_angle(angle, least) for angle in angles]))
     if points is not None:
         columns.append((Heading("hold if outside", "deg"), _ranges(points, counts, angles, least)))
     columns.append((Heading("done", number=False), ["☐"] * len(counts)))
     rows = tuple(zip(*(cells for _, cells in columns), strict=True))
-    return Sheet("Fire", tuple(column for column, _ in columns), rows)
+    return Sheet("Fire", tuple(column for column, _ in columns), rows, folds=True)
 
 
 def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float], limit: float) -> list[str]:
@@ -162,8 +162,8 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
 def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Heading, list[str]]]:
     body, pulses = plan.spacecraft, plan.pulses.pulses
     return [
-        (Heading("thrusters", number=False), [_thrusters(pulse, body) for pulse in pulses]),
-        (Heading("on-time", "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
+        (Heading(Shared.THRUSTERS, number=False), [_thrusters(pulse, body) for pulse in pulses]),
+        (Heading(Shared.ON_TIME, "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
     ]
 
 
@@ -182,12 +182,12 @@ def _block_columns(plan: Plan) -> list[tuple[Heading, list[str]]]:
     ]
     counts = "" if commands is None else " (counts)"
     return [
-        (Heading("thrusters", number=False), [names.get(block.channel, block.channel) for block in blocks]),
-        (Heading("first Sun pulse"), [str(block.first) for block in blocks]),
-        (Heading("delay", f"s{counts}"), delays),
-        (Heading("on-time", f"s{counts}"), widths),
-        (Heading("pulses"), [str(block.count) for block in blocks]),
-        (Heading("every", "spin"), [str(block.every) for block in blocks]),
+        (Heading(Shared.THRUSTERS, number=False), [names.get(block.channel, block.channel) for block in blocks]),
+        (Heading(Shared.FIRST_SUN_PULSE), [str(block.first) for block in blocks]),
+        (Heading(Shared.DELAY, f"s{counts}"), delays),
+        (Heading(Shared.ON_TIME, f"s{counts}"), widths),
+        (Heading(Shared.PULSES), [str(block.count) for block in blocks]),
+        (Heading(Shared.EVERY, "spin"), [str(block.every) for block in blocks]),
     ]
 
 
@@ -206,8 +206,8 @@ def _when(body: Spacecraft, starts: Vector, digits: int) -> tuple[Heading, list[
     dates = [body.utc(start, min(digits, MILLISECONDS)) for start in starts.tolist()]
     known = [date for date in dates if date is not None]
     if len(known) == len(dates):
-        return Heading("start", "UTC", number=False), known
-    return Heading("start", "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
+        return Heading(Shared.START, "UTC", number=False), known
+    return Heading(Shared.START, "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
 
 
 def _phases(flown: Flight, starts: Vector) -> tuple[Heading, list[str]]:

@@ -17,7 +17,7 @@ from nutdamp.views.decisions import VERDICT
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, lasting, most, quantity
 
 SLOW = 0.1
@@ -57,14 +57,14 @@ def _spin_share(held: HeldNutation) -> float | None:
 DEGREE = math.degrees(1.0)
 FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
-    Column("start_deg", "start", "deg", lambda held: math.degrees(held.thresholds.start), _digits(4), EVERYWHERE),
+    Column("start_deg", Shared.START, "deg", lambda held: math.degrees(held.thresholds.start), _digits(4), EVERYWHERE),
     Column("stop_deg", "stop", "deg", lambda held: math.degrees(held.thresholds.stop), _digits(4), EVERYWHERE),
     Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
-    Column("pulses_per_day", "pulses", "1/day", _of_cycle(lambda cycle: cycle.pulses, DAY), _digits(4),
+    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle(lambda cycle: cycle.pulses, DAY), _digits(4),
            f"{EVERYWHERE} other"),
     Column("cycles_per_day", "", "", _of_cycle(lambda cycle: cycle.cycles, DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle(lambda cycle: cycle.impulse, YEAR), where=FILES),
-    Column("propellant_kg_per_year", "propellant", "kg/year", _of_cycle(lambda cycle: cycle.propellant, YEAR),
+    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle(lambda cycle: cycle.propellant, YEAR),
            _digits(4), f"{EVERYWHERE} other"),
     Column("sigma", "", "", _of_cycle(lambda cycle: cycle.doubt), where=FILES),
     Column("", "cycle", "", _of_cycle(lambda cycle: cycle.cycles),
@@ -74,15 +74,15 @@ HELD = (
            EVERYWHERE),
     Column("nutation_high_deg", "before firing", "deg", _of_cycle(lambda cycle: cycle.high, DEGREE), _digits(3),
            EVERYWHERE),
-    Column("nutation_largest_deg", "max", "deg", _of_cycle(lambda cycle: cycle.largest, DEGREE), _digits(3),
+    Column("nutation_largest_deg", Shared.MOST, "deg", _of_cycle(lambda cycle: cycle.largest, DEGREE), _digits(3),
            EVERYWHERE),
-    Column("", "spin", "%/day", _spin_share, _digits(2), "screen"),
+    Column("", Shared.SPIN, "%/day", _spin_share, _digits(2), "screen"),
     Column("noise_deg", "", "", _of_band("noise"), where=FILES),
     Column("smallest_pulse_deg", "", "", _of_band("step"), where=FILES),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
            _digits(4), "screen", _tank),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
-    Column("", "verdict", "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", when=_required,
+    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", when=_required,
            kind=TEXT, met=lambda held: held.meets_requirement),
     Column("meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),

@@ -30,7 +30,7 @@ from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.plan_json import aspects_json, spacecraft_json
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import in_words, size_text
 
@@ -38,10 +38,11 @@ from nutdamp.views.tolerances import in_words, size_text
 def channel_table(spacecraft: Spacecraft) -> DataTable:
     """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
     columns = (
-        Column("name", "channel", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
+        Column("name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT),
         Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
                vector, "screen json", kind=TEXT),
-        Column("", "on-time", "", lambda row: (row.channel.min_on_time, row.channel.max_on_time), _range, "screen"),
+        Column("", Shared.ON_TIME, "", lambda row: (row.channel.min_on_time, row.channel.max_on_time), _range,
+               "screen"),
         Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
         Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
         Column("smallest_step_deg", "smallest step", "deg", lambda row: math.degrees(row.smallest),
@@ -66,10 +67,10 @@ class ValveRow(NamedTuple):
 
 
 VALVES = (
-    Column("", "channel", "", lambda row: row.channels, where="screen", kind=TEXT),
+    Column("", Shared.CHANNEL, "", lambda row: row.channels, where="screen", kind=TEXT),
     Column("on_time_s", "on-time commanded", "", lambda row: row.pulse.on_time, duration, "screen json"),
-    Column("effective_on_time_s", "effective on-time", "", lambda row: row.pulse.effective, duration, "screen json"),
-    Column("impulse_Nms", "impulse", "N m s", lambda row: row.pulse.impulse, lambda size: f"{size:.4g}",
+    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda row: row.pulse.effective, duration, "screen json"),
+    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda row: row.pulse.impulse, lambda size: f"{size:.4g}",
            "screen json"),
     Column("centroid_s", "centroid after the start", "", lambda row: row.pulse.centroid, duration, "screen json"),
 )  # fmt: skip
@@ -185,7 +186,7 @@ TOLERANCES = (
     Column("", "dispersion", "", lambda row: in_words(row.entry.tolerance), where="screen", kind=TEXT),
     Column("", "distribution", "", lambda row: row.entry.kind, where="screen", kind=TEXT),
     Column("", "one sigma or bias", "", lambda row: size_text(row.entry), where="screen"),
-    Column("", "thrusters", "", lambda row: ", ".join(row.thrusters), where="screen", kind=TEXT),
+    Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row.thrusters), where="screen", kind=TEXT),
 )
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from operator import attrgetter
+from typing import NamedTuple
 
 from rich.console import RenderableType
 from rich.table import Table
@@ -19,8 +21,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.notes import joined, ordered, screen_line
-from nutdamp.views.spacecraft import FRAME_N, add_aspects, cone_margins, direction_text, required, spin_text
-from nutdamp.views.tables import columns, facts
+from nutdamp.views.spacecraft import FRAME_N, aspect_facts, cone_margins, direction_text, required, spin_text
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
 from nutdamp.views.text import (
     MISSING,
     degrees,
@@ -143,28 +145,47 @@ def _at_end(decision: Decision) -> str:
     return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
-def decision_table(decision: Decision, values: str = "nominal") -> Table:
+class MarginRow(NamedTuple):
+    """A requirement, its limit, values with nominal values and in cases, margin, and whether it is ``met``, as text."""
+
+    name: str
+    limit: str
+    nominal: str
+    dispersed: str
+    margin: str
+    verdict: str
+    met: bool | None
+
+
+def decision_table(decision: Decision, values: str = Shared.NOMINAL) -> DataTable:
     """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads the residuals."""
     cases = decision.cases
-    heads = ["requirement", "limit", values]
-    if cases is not None:
-        heads.append(f"dispersed\n({exact_percent(cases.probability)})")
-    table = columns(*heads, "margin", "verdict", text=("verdict",))
+    level = "" if cases is None else f"({exact_percent(cases.probability)})"
+    columns = (
+        Column("", "requirement", "", attrgetter("name"), where="screen", kind=TEXT),
+        Column("", "limit", "", attrgetter("limit"), where="screen"),
+        Column("", values, "", attrgetter("nominal"), where="screen"),
+        Column("", "dispersed", level, attrgetter("dispersed"), where="screen" * bool(level)),
+        Column("", "margin", "", attrgetter("margin"), where="screen"),
+        Column("", Shared.VERDICT, "", attrgetter("verdict"), where="screen", kind=TEXT, met=attrgetter("met")),
+    )
+    return DataTable("Requirement", columns, list(_margins(decision)))
+
+
+def _margins(decision: Decision) -> Iterator[MarginRow]:
+    cases = decision.cases
     for line in decision.lines:
-        dispersed = [] if cases is None else [size(line.bound, line.dispersed)]
-        cells = (limit(line.bound), size(line.bound, line.nominal), *dispersed, size(line.bound, line.margin))
-        table.add_row(line.bound.part.label, *cells, coloured(_met(line), line.met))
+        nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
+        yield MarginRow(line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met)
     for aspect in decision.aspects:
         for bound, angle, left in cone_margins(aspect):
-            kept, none = left >= -SLACK, [""] * (cases is not None)
-            words = coloured(KEPT[kept] + " (nominal)" * (cases is not None), kept)
-            table.add_row(f"axis from {aspect.keep.name}", bound, degrees(angle), *none, degrees(left), words)
+            words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
+            name = f"axis from {aspect.keep.name}"
+            yield MarginRow(name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK)
     if cases is not None and cases.complying is not None:
         least, share = exact_percent(cases.probability), percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        words = coloured(VERDICT[cases.met], cases.met)
-        table.add_row(COUNT, f"≥ {least}", "", share, margin, words)
-    return table
+        yield MarginRow(COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met)
 
 
 def coloured(text: str, met: bool | None) -> Text:
@@ -203,10 +224,7 @@ def cost(decision: Decision) -> Iterator[tuple[str, str]]:
 
 def end_facts(decision: Decision) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
-    table = end_table(decision.flight, decision.aspects)
-    for name, value in cost(decision):
-        table.add_row(name, value)
-    return table
+    return facts([*end_rows(decision.flight, decision.aspects), *cost(decision)])
 
 
 def decision_screen(compared: Comparison, decision: Decision) -> list[RenderableType]:
@@ -228,35 +246,33 @@ def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
 
 def figures(decision: Decision) -> list[RenderableType]:
     """The numbers of a decision on a screen: margins, then the final motion."""
-    return [Text(), decision_table(decision), Text(), end_facts(decision)]
+    return [Text(), decision_table(decision).screen("screen"), Text(), end_facts(decision)]
 
 
-def margin_lines(decision: Decision, values: str = "nominal") -> list[RenderableType]:
+def margin_lines(decision: Decision, values: str = Shared.NOMINAL) -> list[RenderableType]:
     """The margins of a flight, where there are any; ``values`` heads the residuals."""
-    return [decision_table(decision, values)] if decision.lines or decision.aspects else []
+    return [decision_table(decision, values).screen("screen")] if decision.lines or decision.aspects else []
 
 
-def end_table(flown: Flight, watched: Iterable[Aspect]) -> Table:
+def end_rows(flown: Flight, watched: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
     """Spin axis and angular momentum after the last pulse, beside the target, and the motion from then on.
 
     ``watched``: least distances of the axis from directions in space.
     """
     body, final = flown.spacecraft, flown.final
-    table = facts()
-    table.add_row("spin axis ends at", direction_text(body, final.axis))
-    table.add_row("H ends at", direction_text(body, final.momentum))
+    yield "spin axis ends at", direction_text(body, final.axis)
+    yield "H ends at", direction_text(body, final.momentum)
     if body.goal.axis is not None:
         off = degrees(flown.residual.axis_error)
-        table.add_row("target", f"{direction_text(body, body.goal.axis)}; H ends {off} off")
-    table.add_row("final state", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}")
+        yield "target", f"{direction_text(body, body.goal.axis)}; H ends {off} off"
+    yield "final state", f"spin {spin_text(final.spin)}, nutation {degrees(final.nutation)}"
     if lasting(flown):
-        table.add_row("", lasting(flown))
-    add_aspects(table, watched)
+        yield "", lasting(flown)
+    yield from aspect_facts(watched)
     if body.attitude is None:
-        table.add_row("", FRAME_N)
+        yield "", FRAME_N
     elif body.attitude.frame is not None:
-        table.add_row("frame", body.attitude.frame)
-    return table
+        yield "frame", body.attitude.frame
 
 
 def lasting(flown: Flight) -> str:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.files.samples import OUTPUT_COLUMNS
@@ -24,11 +23,11 @@ from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import decisions
-from nutdamp.views.decisions import end_table
+from nutdamp.views.decisions import end_rows
 from nutdamp.views.plan_json import final_json, heading, target_json
 from nutdamp.views.spacecraft import bounds_text, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
 from nutdamp.views.text import degrees, digits
 from nutdamp.views.tolerances import (
     budgeted_outputs,
@@ -83,7 +82,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
-        parts += [Text(), Text("Nominal case", style="bold"), end_table(nominal, aspects(nominal))]
+        parts += [Text(), Text("Nominal case", style="bold"), facts(end_rows(nominal, aspects(nominal)))]
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
     parts += [Text(), *tolerance_budget(results)]
     if worst and _varies(results):
@@ -183,23 +182,37 @@ def _percentiles(results: Results) -> DataTable:
         if distribution is not None and distribution.minimum < 0.0:
             signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
         for sign in signs:
-            lower = sign == " ≥"
-            given = percentiles_json(column, plan, distribution, lower=lower)
-            values = {key: math.nan if value is None else scale * value for key, value in given.items()}
-            largest = max(abs(values["min"]), abs(values["max"]))
-            row = {key: None if math.isnan(value) else beside(value, largest) for key, value in values.items()}
+            given = percentiles_json(column, plan, distribution, lower=sign == " ≥")
+            row = percentile_row(f"{name}{sign}, {unit}", scale, given, lower=sign == " ≥")
             if distribution is not None:  # the nominal value has digits of its own: other places show it alone
-                row["nominal"] = "0" if abs(values["nominal"]) < NOTHING else digits(values["nominal"], 4)
-            row[""], row["max"] = f"{name}{sign}, {unit}", row["min" if lower else "max"]
+                plain = scale * (given["nominal"] or 0.0)
+                row["nominal"] = "0" if abs(plain) < NOTHING else digits(plain, 4)
             rows.append(row)
     return DataTable("Percentiles", PERCENTILES, rows)
 
 
+def percentile_row(
+    name: str, scale: float, given: Mapping[str, float | None], *, lower: bool = False, whole: bool = False
+) -> dict[str, str | None]:
+    """A row of `PERCENTILES`: values of `percentiles_json` times ``scale``, to the digits of the largest.
+
+    ``lower``: the least value is the worst; ``whole``: they are counts.
+    """
+    values = {key: math.nan if value is None else scale * value for key, value in given.items()}
+    largest = max(abs(values["min"]), abs(values["max"]))
+
+    def text(value: float) -> str | None:
+        return None if math.isnan(value) else f"{value:.0f}" if whole else beside(value, largest)
+
+    row = {key: text(value) for key, value in values.items()}
+    return {**row, "": name, "max": row["min" if lower else "max"]}
+
+
 PERCENTILES = (
     Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
-    Column("", "nominal", "", itemgetter("nominal"), where=BOTH),
+    Column("", Shared.NOMINAL, "", itemgetter("nominal"), where=BOTH),
     *(Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full") for key in LEVELS),
-    Column("", "max", "", itemgetter("max"), where=BOTH),
+    Column("", Shared.MOST, "", itemgetter("max"), where=BOTH),
 )
 """Columns of rows of texts: the name without a key, the values by the names of `percentiles_json`."""
 
@@ -320,8 +333,8 @@ def _cases(study: Study, rows: Sequence[Mapping[str, Any]]) -> DataTable:
 
 
 def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[Column]:
-    yield Column("", "case", "", itemgetter("case"), where="full", kind=WHOLE)
-    yield Column("", "", "", lambda row: "this case" if row["case"] else "nominal", where="case", kind=TEXT)
+    yield Column("", Shared.CASE, "", itemgetter("case"), where="full", kind=WHOLE)
+    yield Column("", "", "", lambda row: Shared.THIS_CASE if row["case"] else Shared.NOMINAL, where="case", kind=TEXT)
     for key, (name, unit, scale) in zip(OUTPUT_COLUMNS, NAMES, strict=True):
         largest = max((scale * abs(row[key]) for row in rows), default=0.0)
         yield Column("", name, unit, _known(key, scale), partial(beside, largest=largest), "case")
@@ -374,12 +387,12 @@ def _bounded(keep: Keep) -> list[str]:
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
 
 
-def add_angles(table: Table, keep: Sequence[Keep], flights: Sequence[Array]) -> None:
+def angle_rows(keep: Sequence[Keep], flights: Sequence[Array]) -> Iterator[tuple[str, ...]]:
     """Two rows for each cone: the least and the largest angle from its direction in each of ``flights``, (m, 2) rad."""
     for index, cone in enumerate(keep):
         for row, which in enumerate(("least", "largest")):
             cells = (f"{math.degrees(angles[index, row]):.4g}" for angles in flights)
-            table.add_row(Text(f"{which} from {cone.name}, deg", style="dim"), *cells)
+            yield f"{which} from {cone.name}, deg", *cells
 
 
 def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:

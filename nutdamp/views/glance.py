@@ -181,22 +181,22 @@ def _left(bound: Bound, value: float | None) -> str:
 def ends(decision: Decision) -> Table:
     """End of the flight, flown and by the impulse sum (17), and where the spin axis points."""
     plan, left, body = decision.plan, decision.flight.residual, decision.plan.spacecraft
-    table, formula, (least, turn) = facts(), plan.residual, limits(body)
+    formula, (least, turn) = plan.residual, limits(body)
     angles = [f"nutation {short_angle(left.nutation, least)}", f"body cone {short_angle(left.body_cone, least)}"]
     angles += [f"space cone {short_angle(left.space_cone, least)}"]
     if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
         angles[0] += f" (17: {by_impulses})"
-    table.add_row("after pulses, deg", "  ".join(angles))
+    rows = [("after pulses, deg", "  ".join(angles))]
     first, second = angle_texts(body, decision.final.axis)
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
     spun = abs(decision.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
     spin = f"; spin {decision.final.spin * RPM:.5g} rpm" * spun
-    table.add_row("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}")
+    rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
     if len(plan.pulses) and lasting(decision.flight):
-        table.add_row("", lasting(decision.flight))
-    return table
+        rows.append(("", lasting(decision.flight)))
+    return facts(rows)
 
 
 def _fired(plan: Plan, first: int) -> RenderableType:
@@ -232,11 +232,6 @@ def _fitted(
         tight = sorted(required, key=lambda row: row.worth)[:TIGHTEST]
         shown = [row for row in required if not row.met or row in tight]
         lines -= len(required) - len(shown)
-    table = facts()
-    for _ in range(3):
-        table.add_column()
-    for row in shown:
-        table.add_row(*row[:5])
     shown_notes: list[Text] = []
     for note in more:
         lines += lines_of(note)
@@ -246,7 +241,7 @@ def _fitted(
     hidden = len(more) - len(shown_notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
     steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
-    return Group(*head, *[table] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
+    return Group(*head, *[facts(row[:5] for row in shown)] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
 
 
 def comparison_screen(compared: Comparison) -> RenderableType:

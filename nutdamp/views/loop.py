@@ -19,11 +19,11 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import cost, end_table, margin_lines, statement
+from nutdamp.views.decisions import cost, end_rows, margin_lines, statement
 from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, seconds
 from nutdamp.views.summary import Remark, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, facts
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
 SHOWN = 40
@@ -52,14 +52,15 @@ def _apart(value: float) -> str:
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column("channel", "channel", "", lambda row: row.firing.pulse.channel, where="verified verified_json", kind=TEXT),
-    Column("", "start", "s", lambda row: row.firing.pulse.start, seconds, "screen"),
-    Column("start_s", "start", "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json",
+           kind=TEXT),
+    Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
+    Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
     Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
-    Column("", "on-time", "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
-    Column("on_time_s", "on-time", "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
+    Column("", Shared.ON_TIME, "s", lambda row: row.firing.pulse.on_time, seconds, "screen"),
+    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.firing.pulse.loaded[1], seconds, "verified verified_json"),
     Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
-    Column("", "channel", "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
+    Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
     Column("seen_deg", "nutation seen", "deg", lambda row: math.degrees(row.firing.seen), small_angle, "screen json"),
     Column("", "before", "deg", lambda row: math.degrees(row.before), small_angle, "screen"),
@@ -82,7 +83,7 @@ def _finite(value: float) -> float | None:
 
 
 MARGINS = (
-    Column("channel", "channel", "", lambda row: row.channel, where="screen json", kind=TEXT),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
     Column("late_deg", "late", "deg", lambda row: math.degrees(row.late), lambda late: f"{late:.4g}", "screen json"),
     Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
     Column("gain", "", "", lambda row: row.gain, where="json"),
@@ -117,7 +118,7 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
         _remarks(plan, decision),
         "--plot loop.png · nutdamp disperse --loop",
-        more=[margin_table(plan.margins).screen("screen"), end_table(plan.flight, plan.aspects)],
+        more=[margin_table(plan.margins).screen("screen"), facts(end_rows(plan.flight, plan.aspects))],
         verbose=verbose,
     )
 

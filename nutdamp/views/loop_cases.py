@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import IO, Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp import __version__
@@ -23,14 +23,15 @@ from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.views import decisions
 from nutdamp.views.dispersion import (
-    PERCENTS,
-    add_angles,
+    PERCENTILES,
+    angle_rows,
     angles_json,
     angles_note,
     beside,
     cone_lines,
     cones_json,
     correlation_json,
+    percentile_row,
     percentiles_json,
     requirement_lines,
     requirement_of,
@@ -38,7 +39,7 @@ from nutdamp.views.dispersion import (
 )
 from nutdamp.views.loop import described
 from nutdamp.views.plan_json import heading
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, columns
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import MISSING, degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
@@ -108,7 +109,7 @@ def _figures(scale: float, value: float) -> str:
 
 def _columns(study: LoopStudy) -> Iterator[Column]:
     """Columns of a case: its number (from 1), true inputs, outputs, angles to cones."""
-    yield Column("case", "case", "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
+    yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
     for entry in study.model.inputs.drawn:
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for output in SHOWN_OUTPUTS:
@@ -154,7 +155,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     if results.redrawn:
         drawn += f", unphysical ones drawn again: {results.redrawn:,}"
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
-    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results)]
+    parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results).screen("full")]
     parts += [angles_note(study.spacecraft), Text()]
     parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
     parts += list(_shares(results))
@@ -171,20 +172,23 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
     return Group(*parts)
 
 
-def _percentiles(results: LoopResults) -> Table:
-    table = columns("", "nominal", *(f"{percent:g} %" for percent in PERCENTS), "max")
+def _percentiles(results: LoopResults) -> DataTable:
+    rows = []
     for output, plan in zip(SHOWN_OUTPUTS, results.study.nominal.tolist(), strict=True):
         distribution = results.distribution(output.name)
         if distribution is not None and output.name == "spin_change":  # up or down, the largest change is the worst
             distribution, plan = Exact(np.abs(results.of(output.name))), abs(plan)
-        cells = [MISSING] * (len(PERCENTS) + 2)
-        if distribution is not None:
-            values = [plan, *distribution.quantiles(np.array(PERCENTS) / 100.0).tolist(), distribution.maximum]
-            cells = _numbers(output, values, max(abs(distribution.minimum), abs(distribution.maximum)))
-        table.add_row(Text(output.label, style="dim"), *cells)
-    for shown_column in table.columns[1:]:
-        shown_column.no_wrap = True
-    return table
+        given = percentiles_json(output.key, None if distribution is None else plan, distribution)
+        rows.append(percentile_row(output.label, output.scale, given, whole=output.name == "firings"))
+    return DataTable("Percentiles", PERCENTILES, rows)
+
+
+ENDS = (
+    Column("", "", "", itemgetter(0), where="screen", kind=TEXT),
+    Column("", Shared.NOMINAL, "", itemgetter(1), where="screen"),
+    Column("", Shared.THIS_CASE, "", itemgetter(2), where="screen"),
+)
+"""Columns of one case beside the nominal one, of rows of texts."""
 
 
 def _numbers(output: LoopOutput, values: Iterable[float], largest: float) -> list[str]:
@@ -238,7 +242,7 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
     table = DataTable(
         "What it depends on",
         (
-            Column("", "input", "", lambda entry: in_words(entry.name), where="screen", kind=TEXT),
+            Column("", Shared.INPUT, "", lambda entry: in_words(entry.name), where="screen", kind=TEXT),
             Column("", "one sigma", "", size_text, where="screen"),
             *(Column("", output.heading, "%", partial(percent, output), lambda share: f"{share:.1f}", "screen")
               for output in SHARED),
@@ -255,11 +259,12 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    table = columns("", "nominal", "this case")
+    rows: list[tuple[str, ...]] = []
     for output, *pair in zip(SHOWN_OUTPUTS, study.nominal.tolist(), row.values, strict=True):
         largest = max((abs(value) for value in pair if not math.isnan(value)), default=0.0)
-        table.add_row(Text(output.label, style="dim"), *_numbers(output, pair, largest))
-    add_angles(table, study.spacecraft.keep, [study.nominal_aspects, row.angles])
+        rows.append((output.label, *_numbers(output, pair, largest)))
+    rows += angle_rows(study.spacecraft.keep, [study.nominal_aspects, row.angles])
+    table = DataTable("End", ENDS, rows).screen("screen")
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
     if row.stop is not None and row.stop is not Ending.END:

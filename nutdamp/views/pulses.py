@@ -16,7 +16,7 @@ from nutdamp.flight.track import Track
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
 
 MILLISECONDS = 3
@@ -71,6 +71,10 @@ def _vector(name: str, unit: str) -> Column:
     return Column(f"{name}#_{unit}", name, unit, components, where="csv json flown")
 
 
+def _date(row: PulseRow) -> str | None:
+    return row.body.utc(row.pulse.loaded[0], MILLISECONDS)
+
+
 def _valves(schedule: Schedule) -> bool:
     return schedule.through_valves
 
@@ -80,31 +84,31 @@ PULSES = (
     Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, "csv json flown"),
     Column(
         "start_s",
-        "start",
+        Shared.START,
         "s",
         lambda row: row.pulse.loaded[0],
         seconds,
         "screen full simulate page csv json flown",
     ),
-    Column("", "start", "UTC", lambda row: row.body.utc(row.pulse.loaded[0], MILLISECONDS), clock, "full", kind=TEXT),
-    Column("", "start", "UTC", lambda row: row.body.utc(row.pulse.loaded[0], MILLISECONDS), where="page", kind=TEXT),
+    Column("", Shared.START, "UTC", _date, clock, "full", kind=TEXT),
+    Column("", Shared.START, "UTC", _date, where="page", kind=TEXT),
     Column("", "spin phase", "deg", lambda row: row.phase, lambda phase: longitude(phase).removesuffix(" deg"), "page"),
     Column(
         "on_time_s",
-        "on-time",
+        Shared.ON_TIME,
         "s",
         lambda row: row.pulse.loaded[1],
         on_time,
         "screen full simulate page csv json flown",
     ),
-    Column("", "effective on-time", "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
-    Column("", "channel", "", lambda row: channel_text(row.pulse, row.body), where="screen full simulate page",
+    Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
+    Column("", Shared.CHANNEL, "", lambda row: channel_text(row.pulse, row.body), where="screen full simulate page",
            kind=TEXT),
-    Column("channel", "channel", "", lambda row: row.pulse.channel, where="csv json flown", kind=TEXT),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where="csv json flown", kind=TEXT),
     _vector("torque", "Nm"),
     _vector("impulse", "Nms"),
-    Column("propellant_kg", "propellant", "kg", lambda row: row.pulse.propellant, where="csv json flown"),
-    Column("", "impulse", "N m s", lambda row: row.pulse.magnitude, lambda size: digits(size, 4), "full page"),
+    Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where="csv json flown"),
+    Column("", Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: digits(size, 4), "full page"),
     _cone("nutation", "before", "full simulate page csv flown"),
     _cone("nutation", "after", "full simulate page csv flown"),
     _cone("body_cone", "before", "page flown"),
@@ -135,7 +139,7 @@ def pulse_table(flown: Flight, *, phased: bool = False, least: float = math.inf)
         PulseRow(index, pulse, body, before, after, phase)
         for index, (pulse, phase) in enumerate(zip(pulses, phases.tolist(), strict=True))
     ]
-    left = Column("", "nutation after", "deg", lambda row: float(row.after.nutation[row.at]),
+    left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
     return DataTable("Pulses", (*_dated(body), left), rows, flown.schedule)
 
@@ -182,20 +186,20 @@ def _six(value: float) -> str:
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
-    Column("channel", "channel", "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT),
-    Column("first_sun_pulse", "first Sun pulse", "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.block.channel, where=EVERYWHERE, kind=TEXT),
+    Column("first_sun_pulse", Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
     Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
            kind=TEXT),
-    Column("delay_s", "delay", "s", lambda row: row.block.delay, _six, EVERYWHERE),
-    Column("delay_counts", "delay", "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
-    Column("delay_deg", "delay", "deg", _delay_angle, lambda angle: f"{angle:.2f}", EVERYWHERE),
+    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, _six, EVERYWHERE),
+    Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
+    Column("delay_deg", Shared.DELAY, "deg", _delay_angle, lambda angle: f"{angle:.2f}", EVERYWHERE),
     Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
     Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
-    Column("count", "pulses", "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
-    Column("every", "every", "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
-    Column("impulse_Nms", "impulse", "N m s",
+    Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
+    Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
+    Column("impulse_Nms", Shared.IMPULSE, "N m s",
            lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
-    Column("nutation_after_deg", "nutation after", "deg", lambda row: math.degrees(row.nutation), small_angle,
+    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", lambda row: math.degrees(row.nutation), small_angle,
            "csv page"),
 )  # fmt: skip
 

@@ -25,7 +25,7 @@ from nutdamp.views.notes import joined, note_json, screen_line
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import in_degrees
 from nutdamp.views.tolerances import in_words, stated_text
 
@@ -166,15 +166,15 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("variant", "", "", attrgetter("variant"), where="json", kind=TEXT)
     yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json", kind=WHOLE)
-    yield Column("end_s", "ends at", "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
-    yield Column("total_impulse_Nms", "impulse", "N m s", attrgetter("plan.pulses.total_impulse"), _four,
+    yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
+    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", attrgetter("plan.pulses.total_impulse"), _four,
                  "json" if fuelled else "full json")  # fmt: skip
     yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
-    yield Column("", "propellant", "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
+    yield Column("", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
     yield Column("nominal_nutation_deg", "", "", _nominal, where="json")
     yield Column("nutation_deg", "", "", lambda row: math.degrees(row.nutation), where="json")
     yield Column(f"{requirements.aim(body).value}_deg", "", "", lambda row: math.degrees(row.off), where="json")
-    yield Column("", "nominal", "deg", attrgetter("nominal"), in_degrees, "full")
+    yield Column("", Shared.NOMINAL, "deg", attrgetter("nominal"), in_degrees, "full")
     yield Column("", level, "deg", attrgetter("left"), in_degrees, "full")
     yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
     yield Column("samples", "", "", attrgetter("cases.samples"), where="json", kind=WHOLE)

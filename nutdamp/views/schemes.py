@@ -17,7 +17,7 @@ from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
 from nutdamp.views.decisions import COUNT, limit, size
 from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, turning
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, digits, short_angle, small_angle
 
 NOT = "✗"
@@ -113,14 +113,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column("scheme", "scheme", "", lambda row: row.plan.scheme, where="screen full page csv", kind=TEXT)
+    yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where="screen full page csv", kind=TEXT)
     yield Column("feasible", "", "", lambda row: row.plan.feasible, where="csv", kind=YES_NO)
     yield Column("recommended", "", "", lambda row: row.plan is chosen, where="csv", kind=YES_NO)
     yield Column("meets_requirement", "", "", lambda row: _csv_met(row), where="csv", kind=YES_NO)
     yield Column("met_fraction", "", "", _exact_share, where="csv")
     yield Column(
         "pulses",
-        "pulses",
+        Shared.PULSES,
         "",
         lambda row: len(row.plan.pulses) if row.plan.feasible else None,
         where="screen full page",
@@ -130,16 +130,18 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     end, impulse = _feasible(lambda plan: plan.pulses.end), _feasible(lambda plan: plan.pulses.total_impulse)
     yield Column("", "end", "s", end, lambda value: f"{value:.4g}", "screen")
     yield Column("end_s", "end", "s", end, _milli, "full page csv")
-    yield Column("total_impulse_Nms", "impulse", "N m s", impulse, _four, "full page csv" + " screen" * (not fuelled))
+    yield Column(
+        "total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, "full page csv" + " screen" * (not fuelled)
+    )
     yield Column("least_impulse_Nms", "", "", _feasible(lambda plan: plan.spacecraft.least_impulse), where="csv")
     for name, whole in ratios(body):
         yield Column("", f"impulse over {name}", "", _feasible(_over(whole)), lambda value: f"{value:.4f}", "full page")
     propellant = _feasible(lambda plan: plan.pulses.propellant)
-    yield Column("propellant_kg", "propellant", "kg", propellant, where="csv")
+    yield Column("propellant_kg", Shared.PROPELLANT, "kg", propellant, where="csv")
     if fuelled:
         spent = _feasible(lambda plan: None if plan.pulses.propellant is None else 1e3 * plan.pulses.propellant)
-        yield Column("", "propellant", "g", spent, _four, "full page")
-        yield Column("", "propellant", "g", spent, lambda value: f"{value:.4g}", "screen")
+        yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
+        yield Column("", Shared.PROPELLANT, "g", spent, lambda value: f"{value:.4g}", "screen")
     for name in ("nutation", "momentum_shift"):
         yield Column("", f"{_words(name)}, impulses (17)", "deg", _residual(name, "residual"), small_angle, "full")
     names = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
@@ -173,10 +175,10 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     speed = any(plan.delta_v is not None for plan in compared.plans)
     yield Column("delta_v_m_s", "|ΔV|", "m/s", lambda row: _speed(row.plan), _four, "csv" + " full page" * speed)
     if cases:
-        yield Column("", "cases", "%", _share, where="screen", kind=TEXT)
+        yield Column("", Shared.CASES, "%", _share, where="screen", kind=TEXT)
         yield Column("", COUNT, "%", _share, where="full page", kind=TEXT)
     yield from _bounds(compared)
-    yield Column("", "verdict", "", verdict, where="screen full page", kind=TEXT, met=_met)
+    yield Column("", Shared.VERDICT, "", verdict, where="screen full page", kind=TEXT, met=_met)
     yield Column("why", "", "", lambda row: infeasibility(row.plan), where="csv", kind=TEXT)
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.flight import end_state
@@ -20,9 +19,9 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import cost, margin_lines, statement
 from nutdamp.views.plan_json import aspects_json, decision_json, final_json, heading, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, shown_rows
-from nutdamp.views.spacecraft import FRAME_N, add_aspects, angle_names, angle_texts
+from nutdamp.views.spacecraft import FRAME_N, angle_names, angle_texts, aspect_facts
 from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, Column, DataTable, facts
+from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
 from nutdamp.views.text import degrees, longitude, moment, pointing
 
 IMPULSES, WIDTHS = "impulse approximation (17)", "full simulation"
@@ -54,7 +53,7 @@ def _columns(body: Spacecraft) -> Iterator[Column]:
     for heading_, name in (("spin axis", "axis"), ("H", "momentum")):
         for at, angle in enumerate(angle_names(body)):
             yield Column("", f"{heading_}: {angle}", "", _direction(name, at), where="screen")
-    yield Column("", "spin", "rad/s", lambda row: row.flight.final.spin, lambda spin: f"{spin:.6g}", "screen")
+    yield Column("", Shared.SPIN, "rad/s", lambda row: row.flight.final.spin, lambda spin: f"{spin:.6g}", "screen")
 
 
 def end_comparison(simulation: Simulation) -> DataTable:
@@ -80,7 +79,7 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
         lambda **_: end_comparison(simulation).transposed("screen", f"end of track, {moment(extremes.until)}"),
         [*remarks, *[FRAME_N] * (body.attitude is None)],
         "--csv track.csv · --plot motion.png · nutdamp verify",
-        more=[*_fired(simulation), _extremes(simulation)] if verbose else (),
+        more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
     )
 
@@ -104,17 +103,16 @@ def _fired(simulation: Simulation) -> Iterator[RenderableType]:
             yield Text(f"{len(shown.rows)} of {len(schedule)} pulses; --json writes all.", style="dim")
 
 
-def _extremes(simulation: Simulation) -> Table:
-    table, extremes, body = facts(), simulation.extremes, simulation.shown.spacecraft
-    table.add_row("spin axis in x, in y", f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame")
+def _extremes(simulation: Simulation) -> Iterator[tuple[str, str]]:
+    extremes, body = simulation.extremes, simulation.shown.spacecraft
+    yield "spin axis in x, in y", f"{_range(extremes.x)}, {_range(extremes.y)} of the inertial frame"
     if body.attitude is not None:
         frame = body.attitude.frame or "the frame of the file"
         west, east = map(longitude, extremes.right_ascension)
-        table.add_row("right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y")
-        table.add_row("declination", _range(extremes.declination))
-    add_aspects(table, aspects(simulation.shown, extremes.until))
-    table.add_row("track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}")
-    return table
+        yield "right ascension", f"{west.removesuffix(' deg')} to {east} in {frame}, from its axis x towards y"
+        yield "declination", _range(extremes.declination)
+    yield from aspect_facts(aspects(simulation.shown, extremes.until))
+    yield "track", f"{extremes.rows} rows, 0 to {moment(extremes.until)}"
 
 
 def _range(values: tuple[float, float]) -> str:

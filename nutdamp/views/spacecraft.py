@@ -62,7 +62,7 @@ def spin_text(spin: float) -> str:
     return f"{spin * RPM:.6g} rpm ({quantity(spin, 'rad/s')})"
 
 
-def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
+def aspect_facts(aspects: Iterable[Aspect]) -> Iterator[tuple[str, str]]:
     """Least angle of the spin axis from each direction that is watched, and its limit; ✗ where it is broken."""
     for aspect in aspects:
         keep = aspect.keep
@@ -70,7 +70,7 @@ def add_aspects(table: Table, aspects: Iterable[Aspect]) -> None:
         near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (aspect[1:3], aspect[3:5]))
         moves = aspect.largest_at > 0.0 or aspect.least_at > 0.0
         seen = f"{near} to {far}" if moves else f"{degrees(aspect.least)} at t = 0"
-        table.add_row(f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else ""))
+        yield f"axis from {keep.name}", f"{mark}{seen}" + (f" ({bounds})" if bounds else "")
 
 
 def bounds_text(keep: Keep) -> str:
@@ -133,41 +133,40 @@ def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Rend
 
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
     """Derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
+    return facts([*_derived(spacecraft), *aspect_facts(at_start(spacecraft)), *more])
+
+
+def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     inertia = spacecraft.inertia
     motion = spacecraft.widest
-    table = facts()
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
-    table.add_row("inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}")
+    yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
     if not inertia.symmetric:
         first, second, _ = inertia.moments
-        table.add_row("", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body")
-    table.add_row("spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0))
+        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body"
+    yield "spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0)
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
-    table.add_row("nutation", f"{now}{degrees(motion.nutation)} = {cones}")
+    yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
     still = math.isinf(spacecraft.body_period)
     in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
-    table.add_row("nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially")
+    yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
-        table.add_row("dissipation", dissipation_text(spacecraft, spacecraft.dissipation))
+        yield "dissipation", dissipation_text(spacecraft, spacecraft.dissipation)
     beyond = beyond_floors(spacecraft)
     floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
-    table.add_row(name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}")
+    yield name, f"A|ω0| = {quantity(spacecraft.least_impulse, 'N m s')}; {floor}"
     if spacecraft.goal.axis is not None:
         turn = quantity(turning(spacecraft), "N m s")
         least = "" if beyond else ", the least to turn H"
-        table.add_row("target", direction_text(spacecraft, spacecraft.goal.axis))
-        table.add_row("", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turn}{least}")
+        yield "target", direction_text(spacecraft, spacecraft.goal.axis)
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turn}{least}"
     if spacecraft.goal.spin is not None:
-        table.add_row("final spin", spin_text(spacecraft.goal.spin))
-    table.add_row("actuators", _actuators(spacecraft))
+        yield "final spin", spin_text(spacecraft.goal.spin)
+    yield "actuators", _actuators(spacecraft)
     for line, text in enumerate(_requirement(spacecraft)):
-        table.add_row("" if line else "requirement", text)
-    add_aspects(table, at_start(spacecraft))
-    for name, value in more:
-        table.add_row(name, value)
-    return table
+        yield "" if line else "requirement", text
 
 
 def _requirement(spacecraft: Spacecraft) -> Iterator[str]:

@@ -7,19 +7,21 @@ before that is spin 0. Else spin 1 begins at t = 0, and each is a turn of the bo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
 from nutdamp.errors import BadRequest
-from nutdamp.files.tabular import csv_text, number
+from nutdamp.files.tabular import number
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import LEGENDRE
 from nutdamp.flight.propagation import Flight
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-
-HEADER = ("spin", "start_utc", "start_s", "period_s", "pulses", "channel", "phase_deg", "on_time_s")
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable
 
 BETWEEN = "; "
 """Separator of the values of several pulses in one spin."""
@@ -38,6 +40,40 @@ PIECES = 16
 
 NEWTON = 3
 """Newton steps to the end of a turn within its piece: the second one is at rounding already."""
+
+
+class SpinRow(NamedTuple):
+    """A spin by its number, with its date, begin, end and period, s, and the pulses commanded in it."""
+
+    number: int
+    utc: str | None
+    begin: float
+    end: float
+    period: float
+    fired: list[Pulse]
+
+
+def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], str]:
+    """Seconds or degrees of each pulse of a spin."""
+    return lambda row: BETWEEN.join(number(_rounded(value(row, pulse))) for pulse in row.fired)
+
+
+def _rounded(value: float) -> float:
+    """Seconds or degrees without the rounding of the search."""
+    return round(value, DIGITS)
+
+
+SPINS = (
+    Column("spin", "", "", attrgetter("number"), where="csv", kind=WHOLE),
+    Column("start_utc", "", "", attrgetter("utc"), where="csv", kind=TEXT),
+    Column("start_s", "", "", lambda row: _rounded(row.begin), where="csv"),
+    Column("period_s", "", "", lambda row: _rounded(row.period), where="csv"),
+    Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
+    Column("channel", "", "", lambda row: BETWEEN.join(pulse.channel for pulse in row.fired), where="csv", kind=TEXT),
+    Column("phase_deg", "", "", _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
+           where="csv", kind=TEXT),
+    Column("on_time_s", "", "", _several(lambda _, pulse: pulse.loaded[1]), where="csv", kind=TEXT),
+)  # fmt: skip
 
 
 def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
@@ -61,17 +97,8 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         firing = fired.get(index, [])
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
-        phases = [360.0 * (1.0 - (end - pulse.loaded[0]) / period) for pulse in firing]
-        on_times = (_number(each.loaded[1]) for each in firing)
-        several = ([each.channel for each in firing], map(_number, phases), on_times)
-        times = [body.utc(begin) or "", _number(begin), _number(period), str(len(firing))]
-        rows.append([str(first + index), *times, *map(BETWEEN.join, several)])
-    return csv_text(HEADER, rows)
-
-
-def _number(value: float) -> str:
-    """Seconds or degrees without the rounding of the search."""
-    return number(round(value, DIGITS))
+        rows.append(SpinRow(first + index, body.utc(begin), begin, end, period, firing))
+    return DataTable("Spins", SPINS, rows).csv()
 
 
 def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.results import Note
@@ -87,33 +86,31 @@ def summary(
 def blocks_screen(flown: Flight, velocity: Vector | None) -> RenderableType:
     """The blocks of a flown schedule, its figures before and after, and its ``velocity`` change (3,) m/s."""
     table = block_table(flown)
-    return Group(Text(table.title, style="bold"), table.screen("screen"), Text(), _effects(flown, velocity))
+    return Group(Text(table.title, style="bold"), table.screen("screen"), Text(), facts(_effects(flown, velocity)))
 
 
-def _effects(flown: Flight, velocity: Vector | None) -> Table:
+def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]]:
     body, schedule, final = flown.spacecraft, flown.schedule, flown.final
     before, after = flown.around_pulses()
-    table = facts()
     for name, pulse in (("first pulse", schedule.pulses[0]), ("last pulse", schedule.pulses[-1])):
         start = pulse.loaded[0]
         dated = body.utc(start, 3)
-        table.add_row(name, f"starts at {moment(start)}" + (f", {dated}" if dated else ""))
+        yield name, f"starts at {moment(start)}" + (f", {dated}" if dated else "")
     for name, before_, after_ in zip(
         angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
     ):
-        table.add_row(f"H: {name}", f"{before_} to {after_}")
-    table.add_row("Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}")
-    table.add_row("spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}")
+        yield f"H: {name}", f"{before_} to {after_}"
+    yield "Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}"
+    yield "spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}"
     largest = float(max(before.nutation.max(), after.nutation.max()))
-    table.add_row("nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}")
+    yield "nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}"
     used = schedule.propellant
     tank = body.tank
     left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
     weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
-    table.add_row("propellant", f"{mass(used)}{left}{weighs}")
+    yield "propellant", f"{mass(used)}{left}{weighs}"
     if velocity is not None:
-        table.add_row("|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s"))
-    return table
+        yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
 
 
 def _sun_angle(body: Spacecraft, direction: Vector) -> str:

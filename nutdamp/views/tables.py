@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from typing import Any, NamedTuple
@@ -43,12 +43,40 @@ def lines_of(*parts: RenderableType) -> int:
     return sum(len(console.render_lines(part)) for part in parts)
 
 
-def facts() -> Table:
+def facts(rows: Iterable[Sequence[RenderableType]]) -> Table:
     """Names to the left, their values to the right."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim", overflow="fold")
-    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*row)
     return table
+
+
+class Shared:
+    """Headings that several tables have; every other heading stands in one module."""
+
+    CASE = "case"
+    CASES = "cases"
+    CHANNEL = "channel"
+    DELAY = "delay"
+    EFFECTIVE = "effective on-time"
+    END = "ends at"
+    EVERY = "every"
+    FIRST_SUN_PULSE = "first Sun pulse"
+    IMPULSE = "impulse"
+    INPUT = "input"
+    MOST = "max"
+    NOMINAL = "nominal"
+    NUTATION_AFTER = "nutation after"
+    ON_TIME = "on-time"
+    PROPELLANT = "propellant"
+    PULSES = "pulses"
+    SCHEME = "scheme"
+    SPIN = "spin"
+    START = "start"
+    THIS_CASE = "this case"
+    THRUSTERS = "thrusters"
+    VERDICT = "verdict"
 
 
 class FittedColumns(Table):
@@ -79,12 +107,9 @@ class FittedColumns(Table):
             if first.plain.strip():
                 named = f"{names[0]}:" if " " in names[0] else names[0]
                 yield Text(f"{named} {first.plain.strip()}".strip(), style="bold")
-            block = facts()
-            for name, cell in zip(names[1:], others, strict=True):
-                if cell.plain.strip():
-                    block.add_row(name, cell)
-            if block.row_count:
-                yield Padding(block, (0, 0, 0, 2))
+            rows = [(name, cell) for name, cell in zip(names[1:], others, strict=True) if cell.plain.strip()]
+            if rows:
+                yield Padding(facts(rows), (0, 0, 0, 2))
 
 
 def _cell(cell: RenderableType) -> Text:

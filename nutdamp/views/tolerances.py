@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.views.tables import columns, facts
+from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
 from nutdamp.views.text import quantity
 
 SHOWN = {
@@ -95,19 +96,30 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
         return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
     inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
     outputs = dict(budgeted_outputs(study))
-    heads = (head for label in outputs.values() for head in (f"{label}\ndeg", "linear\n%", "cases\n%"))
-    table = columns("input\n", "one sigma\nor bias", *heads)
-    for row in rows:
-        cells = []
-        for output, effect in zip(outputs, row.effects, strict=True):
-            seen = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
-            linear = float(first.shares(output)[row.inputs].sum())
-            cells += [f"{math.degrees(effect):.3g}", *(("bias", "") if row.bias else map(_percent, (linear, seen)))]
-        name, size = (text.replace(", ", ",\n") for text in (row.name, row.size))
-        table.add_row(Text(name, style="dim"), size, *cells)
     rest = (1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs)
-    shares = (max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True))
-    table.add_row(Text("interactions", "dim"), "", *(cell for share in shares for cell in ("", "", _percent(share))))
+    shares = [max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True)]
+
+    def linear(output: str, row: BudgetRow) -> str:
+        return "bias" if row.bias else _percent(float(first.shares(output)[row.inputs].sum())) if row.inputs else ""
+
+    def seen(at: int, output: str, row: BudgetRow) -> str:
+        if not row.inputs:
+            return _percent(shares[at])
+        cases = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
+        return "" if row.bias else _percent(cases)
+
+    def effect(at: int, row: BudgetRow) -> str:
+        return f"{math.degrees(row.effects[at]):.3g}" if row.inputs else ""
+
+    columns = [
+        Column("", Shared.INPUT, "", lambda row: row.name.replace(", ", ",\n"), where="screen", kind=TEXT),
+        Column("", "one sigma\nor bias", "", lambda row: row.size.replace(", ", ",\n"), where="screen"),
+    ]
+    for at, (output, label) in enumerate(outputs.items()):
+        columns.append(Column("", label, "deg", partial(effect, at), where="screen"))
+        columns.append(Column("", "linear", "%", partial(linear, output), where="screen"))
+        columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
+    table = DataTable("Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)])
     note = (
         "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
         f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
@@ -115,7 +127,7 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     )
     if study.model.groups:
         note += " Correlated inputs vary together: their effect is the root mean square of the group."
-    return [Text("Tolerance budget", "bold"), table, Text(note, "dim"), *map(Text, main_causes(results))]
+    return [Text(table.title, "bold"), table.screen("screen"), Text(note, "dim"), *map(Text, main_causes(results))]
 
 
 def _percent(share: float) -> str:
@@ -144,16 +156,38 @@ def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
     return (first.value, first.label), (second.value, second.label)
 
 
-def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> Table:
+class DrawnInput(NamedTuple):
+    """An input of one case, and its deviation from the nominal value."""
+
+    entry: DispersedInput
+    draw: float
+
+    def scaled(self, value: float, form: str = ".6g") -> str:
+        """A value in the unit for people."""
+        return f"{unit_of_people(self.entry)[1] * value:{form}}"
+
+    @property
+    def off(self) -> str:
+        """The deviation with its unit."""
+        if self.entry.unit == "":
+            return of_nominal(self.entry, self.draw, "+.4g")
+        return f"{self.scaled(self.draw, '+.4g')} {unit_of_people(self.entry)[0]}"
+
+
+INPUTS = (
+    Column("", Shared.INPUT, "", lambda row: in_words(row.entry.name), where="screen", kind=TEXT),
+    Column("", Shared.NOMINAL, "", lambda row: row.scaled(row.entry.nominal), where="screen"),
+    Column("", Shared.THIS_CASE, "", lambda row: row.scaled(row.entry.nominal + row.draw), where="screen"),
+    Column("", "off by", "", lambda row: row.off, where="screen"),
+    Column("", "in sigmas", "", lambda row: f"{row.draw / row.entry.sigma:+.2f}" if row.entry.sigma else "bias",
+           where="screen"),
+)  # fmt: skip
+
+
+def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
     """Every input of one case: nominal, drawn, and the deviation."""
-    inputs = columns("input", "nominal", "this case", "off by", "in sigmas")
-    for entry in drawn:
-        (unit, scale), draw = unit_of_people(entry), draws[entry.name]
-        sigmas = f"{draw / entry.sigma:+.2f}" if entry.sigma else "bias"
-        off = of_nominal(entry, draw, "+.4g") if entry.unit == "" else f"{scale * draw:+.4g} {unit}"
-        estimate, truth = (f"{scale * value:.6g}" for value in (entry.nominal, entry.nominal + draw))
-        inputs.add_row(Text(in_words(entry.name), style="dim"), estimate, truth, off, sigmas)
-    return inputs
+    rows = [DrawnInput(entry, draws[entry.name]) for entry in drawn]
+    return DataTable("Inputs", INPUTS, rows).screen("screen")
 
 
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
@@ -163,13 +197,10 @@ def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
 
 def unused_table(unused: Iterable[Unused]) -> Table:
     """Inputs without effect; names that share a reason are listed together."""
-    table = facts()
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
         reasons.setdefault(reason, []).append(in_words(name))
-    for reason, names in reasons.items():
-        table.add_row(", ".join(names), reason)
-    return table
+    return facts((", ".join(names), reason) for reason, names in reasons.items())
 
 
 def in_words(name: str) -> str:

@@ -27,7 +27,7 @@ from nutdamp.views.plan_json import heading, plan_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
 ROWS = 18
@@ -100,10 +100,10 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
     yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
     yield Column("shift_allowed_deg", "", "", lambda row: math.degrees(row.front.shift), where="csv")
-    yield Column("end_s", "ends at", "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
+    yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
-    yield Column("pulses", "pulses", "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
+    yield Column("pulses", Shared.PULSES, "", lambda row: len(row.plan.pulses), where="csv full brief", kind=WHOLE)
     yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="csv")
     yield Column("total_impulse_Nms", "", "", attrgetter("plan.pulses.total_impulse"), where="csv")
     yield Column("first_order_least", "", "", attrgetter("least"), where="csv")
@@ -115,10 +115,10 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
-    yield Column("scheme", "scheme", "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
+    yield Column("scheme", Shared.SCHEME, "", attrgetter("plan.scheme"), where=scheme, kind=TEXT)
     met = attrgetter("plan.meets_requirement")
     yield Column("meets_requirement", "", "", met, where="csv", kind=YES_NO)
-    yield Column("", "verdict", "", met, decisions.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
+    yield Column("", Shared.VERDICT, "", met, decisions.VERDICT.__getitem__, "full brief" * judged, kind=TEXT, met=met)
 
 
 def _allowed(front: Front) -> str:

@@ -47,6 +47,38 @@ def test_a_module_can_be_read_in_a_sitting() -> None:
     assert {path: count for path, count in lines.items() if count > LONGEST} == {}
 
 
+HEADED = {"Column": 1, "Heading": 0}
+"""Classes of columns, and the place of the heading among their arguments."""
+
+
+def headings(tree: ast.Module) -> Iterator[str]:
+    """The headings of tables that stand in a module as literals, those of tables without declaration too."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+        given = node.args if name == "columns" else node.args[HEADED[name] :][:1] if name in HEADED else []
+        yield from (
+            each.value
+            for each in given
+            if isinstance(each, ast.Constant) and isinstance(each.value, str) and each.value
+        )
+
+
+def test_a_heading_of_tables_stands_in_one_module() -> None:
+    homes = defaultdict(set)
+    for path, tree in trees().items():
+        if path.partition("/")[0] in ("views", "figures", "page", "cli"):
+            for heading in headings(tree):
+                homes[heading].add(path)
+    shared = next(node for node in trees()["views/tables.py"].body if getattr(node, "name", "") == "Shared")
+    for node in ast.walk(shared):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            homes[node.value].add("views/tables.py")
+    assert len(homes) > 80
+    assert {heading: paths for heading, paths in homes.items() if len(paths) > 1} == {}
+
+
 def test_a_class_name_stands_once() -> None:
     named = defaultdict(list)
     for path, tree in trees().items():

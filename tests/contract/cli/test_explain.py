@@ -260,7 +260,13 @@ def test_a_further_source_of_words_is_a_line(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def columns_written() -> Iterator[str]:
-    yield from (*EFFECTIVE, *tabular.HEADER, *telemetry.TIMES, *telemetry.MEASURED, *spin_table.HEADER)
+    yield from (
+        *EFFECTIVE,
+        *tabular.HEADER,
+        *telemetry.TIMES,
+        *telemetry.MEASURED,
+        *(column.key for column in spin_table.SPINS),
+    )
     yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
     for key in (key for key, where in keys_of_columns() if "csv" in where or "json" not in where):
         yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]

@@ -28,7 +28,9 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
 from nutdamp.views.exchange import export_text
-from nutdamp.views.spin_table import HEADER, spin_table
+from nutdamp.views.spin_table import SPINS, spin_table
+
+HEADER = [column.key for column in SPINS]
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

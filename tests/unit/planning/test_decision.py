@@ -231,10 +231,7 @@ def test_a_cone_that_is_broken_is_not_met_whatever_is_left_and_plans_that_keep_t
     (stray,) = broken.strays
     assert math.degrees(stray.least) < 16.0
     flown = Decision(broken.plan, counted(0.714, 0.9))  # cones count in each case; the row is of nominal values
-    rows = [
-        [str(list(column.cells)[-1 if one is broken else -2]) for column in decisions.decision_table(one).columns]
-        for one in (broken, flown)
-    ]
+    rows = [decisions.decision_table(one).cells("screen")[-1 if one is broken else -2] for one in (broken, flown)]
     assert f"{math.degrees(stray.least) - 16.0:.4g} deg" in rows[0]
     assert Decision(replace(broken.plan, spacecraft=replace(watched(16.0), requirement=None))).met is False
     # One-pulse leaves the axis where it no longer passes the star, but shifts H by more than is required.
