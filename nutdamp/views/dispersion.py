@@ -205,7 +205,8 @@ def percentile_row(
         return None if math.isnan(value) else f"{value:.0f}" if whole else beside(value, largest)
 
     row = {key: text(value) for key, value in values.items()}
-    return {**row, "": name, "max": row["min" if lower else "max"]}
+    row[""], row["max"] = name, row["min" if lower else "max"]
+    return row
 
 
 PERCENTILES = (

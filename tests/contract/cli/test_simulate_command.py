@@ -73,7 +73,7 @@ def test_schedules_by_hand_may_be_short_and_are_doubted_where_they_contradict(ru
 def test_without_a_scheme_the_recommended_plan_is_propagated_and_named(run: Run) -> None:
     ended = run("simulate")
     assert ended.returncode == 0
-    assert "using the recommended plan, two-pulse\n" in ended.stderr
+    assert "using recommended plan: two-pulse\n" in ended.stderr
     assert ended.stdout == run("simulate", "--scheme", "two-pulse").stdout
 
 
