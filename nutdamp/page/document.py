@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest
-from nutdamp.views.tables import DataTable, Heading
+from nutdamp.views.tables import DataTable, Heading, Shared
 from nutdamp.views.text import MISSING, sentence
 
 if TYPE_CHECKING:
@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
 
 class Cell(NamedTuple):
-    """Text of one cell, flush right for a ``number``, and the place of its ``dot`` in % of the largest number."""
+    """Text of a cell, flush right for a ``number``; place of its ``dot`` in % of the largest number; ``bar``, %."""
 
     text: str
     number: bool
     dot: float | None = None
+    bar: float | None = None
 
     @property
     def missed(self) -> bool:
@@ -43,8 +44,8 @@ class Cell(NamedTuple):
 class Sheet:
     """A table with one row for each thing compared; the first column names it.
 
-    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale; ``folds``:
-    on a phone each row is a list of its own.
+    ``mark`` is the row to stand out; ``dots``: names of columns in which a dot shows each number to scale, ``bars``:
+    a bar each percentage; ``folds``: on a phone each row is a list of its own.
     """
 
     title: str
@@ -53,6 +54,7 @@ class Sheet:
     mark: int | None = None
     dots: tuple[str, ...] = ()
     folds: bool = False
+    bars: tuple[str, ...] = ()
     kind: ClassVar[str] = "sheet"
 
     @property
@@ -63,6 +65,8 @@ class Sheet:
 
     def _column(self, at: int, heading: Heading) -> list[Cell]:
         texts = [row[at] for row in self.rows]
+        if heading.name in self.bars:
+            return [Cell(text, heading.number, bar=number_in(text)) for text in texts]
         if heading.name not in self.dots:
             return [Cell(text, heading.number) for text in texts]
         numbers = [number_in(text) for text in texts]
@@ -298,6 +302,10 @@ def sheet(title: str, table: DataTable, *, place: str = "page", dots: tuple[str,
     return Sheet(title, table.headings(place), table.cells(place), table.mark, dots)
 
 
+SHARES = (Shared.LINEAR, Shared.CASES)
+"""Columns of shares of the variance."""
+
+
 def sheet_of(title: str, table: Table) -> Sheet:
     """A table of a screen as a `Sheet`: the same cells; a heading in two lines is name and unit."""
     columns = []
@@ -305,7 +313,7 @@ def sheet_of(title: str, table: Table) -> Sheet:
         name, _, unit = plain(column.header).partition("\n")
         columns.append(Heading(name, unit, column.justify == "right"))
     first = columns[0]
-    return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table))
+    return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table), bars=SHARES)
 
 
 def facts_of(title: str, table: Table) -> FactList:

@@ -65,6 +65,7 @@ class Shared:
     FIRST_SUN_PULSE = "first Sun pulse"
     IMPULSE = "impulse"
     INPUT = "input"
+    LINEAR = "linear"
     MOST = "max"
     NOMINAL = "nominal"
     NUTATION_AFTER = "nutation after"

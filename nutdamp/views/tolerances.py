@@ -117,7 +117,7 @@ def tolerance_budget(results: Results) -> list[RenderableType]:
     ]
     for at, (output, label) in enumerate(outputs.items()):
         columns.append(Column("", label, "deg", partial(effect, at), where="screen"))
-        columns.append(Column("", "linear", "%", partial(linear, output), where="screen"))
+        columns.append(Column("", Shared.LINEAR, "%", partial(linear, output), where="screen"))
         columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
     table = DataTable("Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)])
     note = (

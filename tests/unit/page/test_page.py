@@ -164,6 +164,9 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
         assert number_in(text) == value
     made = Sheet("a", (Heading("b"), Heading("c", "s")), (("1", "4"), ("2", "1"), ("3", "–")), dots=("c",))
     assert [[cell.dot for cell in row] for row in made.cells] == [[None, 100.0], [None, 25.0], [None, None]]
+    shares = Sheet("a", (Heading("b"), Heading("c", "%")), (("1", "40.4"), ("2", "bias")), bars=("c",))
+    assert [row[1].bar for row in shares.cells] == [40.4, None]
+    assert block_html(shares).count('<b style="width:40.4%"></b>') == 1
     shown = block_html(Prose("report --disperse flies them; < 1e-9 deg is left, a-b breaks"))
     assert '<span class="whole-word">--disperse</span> flies' in shown
     assert '<span class="whole-word">&lt; 1e-9 deg</span> is left, a-b breaks' in shown
