@@ -98,7 +98,7 @@ REFUSED: list[str | bytes] = [
 
 def test_what_is_no_plain_yaml_mapping_is_refused_in_one_line_a_fault() -> None:
     check_text("files.yaml-refused", "\n".join(f"{text!r}\n    {refusal(text)}" for text in REFUSED))
-    assert refusal(b"#" * (MAX_BYTES + 1)).startswith("f.yaml: more than 1 MiB")
+    assert refusal(b"#" * (MAX_BYTES + 1)).startswith("f.yaml: too large: more than 1 MiB")
 
 
 def test_duplicate_keys_are_all_reported_with_the_first_place() -> None:
@@ -139,7 +139,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         with pytest.raises(CannotRead, match=reason):
             read_text(path)
     (tmp_path / "large.yaml").write_bytes(b"#" * (MAX_BYTES + 10))
-    with pytest.raises(FaultyFile, match="more than 1 MiB"):
+    with pytest.raises(FaultyFile, match="too large: more than 1 MiB"):
         read_text(tmp_path / "large.yaml")
 
 
