@@ -26,7 +26,10 @@ from nutdamp.spacecraft.schedule import Schedule
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
-    form, flown = search.model.left(chosen.sequence.state), left_by(propagation.flown(search.body, chosen.schedule))
+    form, flown = (
+        search.model.left(search.state(chosen.sequence.blocks)),
+        left_by(propagation.flown(search.body, chosen.schedule)),
+    )
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
     if first:
         return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
@@ -119,7 +122,7 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
     for round_ in range(ROUNDS + 1):
-        for number, sequence in enumerate(best if round_ == 0 else search.nearer(flights)):
+        for number, sequence in enumerate(search.fired(best if round_ == 0 else search.nearer(flights))):
             met = any(flight.rank[:2] == (False, 0.0) for flight in flights)
             pulses = sum(len(flight.schedule) for flight in flights)
             if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or (met and number >= FLOWN * (round_ == 0)):
