@@ -76,6 +76,9 @@ DOUBTFUL = 1.5
 DOUBTS = 100
 """Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
 
+DEARER = 1.01
+"""Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
+
 CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
@@ -85,8 +88,8 @@ SURELY = 3.0
 LOWER = 0.98
 """Share of the nutation above which it does not count as lowered."""
 
-CLOSEST, FEW = 12, (6, 4)
-"""Widths and numbers of later blocks that are looked at, by each of their merits, and widths and numbers of few pulses."""
+CLOSEST, FEW = 24, 4
+"""Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
 
 TOGETHER = 32
 """Sequences behind which others are looked for at once."""
@@ -131,6 +134,7 @@ class BlockSearch:
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
         self._states: dict[Blocks, BlockState] = {(): self.model.start}
+        self._known = math.inf  # least cost of a sequence that complied in a flight
         self._fired: dict[Blocks, Schedule | Infeasible] = {}
         self._flights: dict[Blocks, FlownSequence] = {}
         self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
@@ -176,7 +180,7 @@ class BlockSearch:
         gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
         more = _by_blocks((*of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
-        return [*first.values(), *islice(others, 2 * FLOWN)]
+        return [*first.values(), *islice(others, 4 * FLOWN)]
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
@@ -235,7 +239,11 @@ class BlockSearch:
             work.spend(LOOKED * math.prod(shape))
             severity, cost = self._severity(state, channel, trial, after, left, shape)
             doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
-            keys = (_in_order(severity, cost), few), (severity, few // 2), (doubted, DOUBTS if self.small else few)
+            keys = (
+                (_in_order(severity, cost), few),
+                (severity, DOUBTS if self.small else few // 2),
+                (doubted, DOUBTS if self.small else few),
+            )
             index = np.unique(np.concatenate([_least_of_all(*key) for key in keys]))
             at = np.unravel_index(index, shape)
             wait, delay, width, count, every = (np.broadcast_to(part, shape)[at] for part in trial)
@@ -333,7 +341,7 @@ class BlockSearch:
         trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
         kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
         left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
-        return np.asarray(left / self._most[Part.NUTATION]).reshape(-1, len(widths) * len(counts))
+        return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(-1, len(widths) * len(counts))
 
     def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
         """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is left."""
@@ -355,11 +363,10 @@ class BlockSearch:
                 continue
             widths = commandable_widths(self.commands, channel)
             spent = np.multiply.outer(acts(channel, widths).on_time, counts).ravel()
+            gentle = np.tile(counts <= FEW, len(widths))
+            damping = np.where(gentle, self._undamped(state, channel, every), np.inf)
             nearest = np.concatenate([_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1)
-            few = np.add.outer(
-                len(counts) * evenly(np.arange(len(widths)), FEW[0]), np.arange(min(FEW[1], len(counts)))
-            )
-            for index in (nearest, few.reshape(1, -1)):
+            for index in (nearest, _least(damping, CLOSEST), evenly(np.flatnonzero(gentle), CLOSEST)[None]):
                 yield channel, self._at_delays(state, channel, waits, index, every)
 
     def _parts(self) -> list[BlockSequence]:
@@ -471,9 +478,12 @@ class BlockSearch:
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
     def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences, one after the other; the pulses of a dozen of them are fired together."""
+        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
+
+        The pulses of a dozen of them are fired together.
+        """
         for begin in range(0, len(sequences), FLOWN):
-            some = sequences[begin : begin + FLOWN]
+            some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self._known * DEARER]
             new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
             if new:
                 self._fired.update(zip(new, self._together(new), strict=True))
@@ -489,7 +499,8 @@ class BlockSearch:
     def flown(self, sequence: BlockSequence) -> FlownSequence:
         """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
         if sequence.blocks not in self._flights:
-            next(self.fired([sequence]))
+            if sequence.blocks not in self._fired:
+                self._fired[sequence.blocks] = self._together([sequence.blocks])[0]
             schedule = self._fired[sequence.blocks]
             if isinstance(schedule, Infeasible):
                 raise schedule
@@ -498,6 +509,8 @@ class BlockSearch:
             missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for a Sun pulse
             rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
             self._flights[sequence.blocks] = FlownSequence(rank, schedule, sequence)
+            if rank[:2] == (False, 0.0):
+                self._known = min(self._known, sequence.rank[1])
         return self._flights[sequence.blocks]
 
     def doubted(self, flights: list[FlownSequence]) -> None:
