@@ -7,14 +7,13 @@ looked for behind the most promising. The best dozen are flown from the Sun puls
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
 from itertools import islice
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +21,15 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly, fire_all
+from nutdamp.schemes.block_flights import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
+from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
+from nutdamp.spacecraft.constraints import Windows, commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
-from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
-Blocks = tuple[Block, ...]
-
-FLOWN = 12
-"""Sequences of blocks that are flown; as many more where none of them complies."""
 
 GENTLE = 10
 """Multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too."""
@@ -64,6 +58,9 @@ BESIDE = 0.01
 SHARES = np.linspace(0.0, 1.0, 13)[1:]
 """Shares of the way that a first block may go, where others follow."""
 
+CHEAPER = 0.9
+"""Multiple of the cost of a sequence below which one that leaves more is looked at, too."""
+
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
 
@@ -76,17 +73,11 @@ DOUBTFUL = 1.5
 DOUBTS = 100
 """Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
 
-DEARER = 1.01
-"""Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
-
 CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
 SURELY = 3.0
 """Largest difference of a block's length from the way to the target, over its end error."""
-
-LOWER = 0.98
-"""Share of the nutation above which it does not count as lowered."""
 
 CLOSEST, FEW = 24, 4
 """Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
@@ -98,58 +89,24 @@ LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
 
 
-class BlockSequence(NamedTuple):
-    """Blocks and their rank in closed form: the less, the better.
-
-    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
-    ``share``: the share.
-    """
-
-    blocks: Blocks
-    rank: tuple[float, float, float]
-    share: float = math.inf
-
-
-class FlownSequence(NamedTuple):
-    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
-
-    rank: tuple[bool, float, float, float]
-    schedule: Schedule
-    sequence: BlockSequence
-
-
-START = BlockSequence((), (math.inf, math.inf, math.inf))
-"""No blocks, before which all others come."""
-
-
 class BlockSearch:
     """The command blocks of one spacecraft and their ranking in closed form."""
 
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
-        self.bounds = [self._lowered(bound) for bound in requirements.bounds(spacecraft)]
-        self._most = {bound.part: bound.most for bound in self.bounds}
+        self.flights = BlockFlights(spacecraft)
+        self._most = {bound.part: bound.most for bound in self.flights.bounds}
         self._named = {channel.name: channel for channel in channels}
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
         self._states: dict[Blocks, BlockState] = {(): self.model.start}
-        self._known = math.inf  # least cost of a sequence that complied in a flight
-        self._fired: dict[Blocks, Schedule | Infeasible] = {}
-        self._flights: dict[Blocks, FlownSequence] = {}
         self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
         self.pause = math.ceil(limits.gap / self.model.turn)
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
-
-    def _lowered(self, bound: requirements.Bound) -> requirements.Bound:
-        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
-        goal = self.body.goal
-        if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
-            return bound
-        return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -168,29 +125,29 @@ class BlockSearch:
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
             sequences += firsts
         self.most = math.inf
-        unsure = _by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
+        unsure = by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
         self.doubtful = sorted(unsure.values(), key=lambda sequence: sequence.rank[1:])
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = list(_by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
+        ranked = list(by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
         clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
-        first = _by_blocks((*ranked[: FLOWN // 2], *clear, *each))
+        first = by_blocks((*ranked[: FLOWN // 2], *clear, *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
         gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
-        more = _by_blocks((*of_each_kind(ranked)[:FLOWN], *gentle))
+        more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
         return [*first.values(), *islice(others, 4 * FLOWN)]
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = _by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
+        complying = by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
         cheapest = sorted(complying.values(), key=lambda sequence: sequence.rank)
-        for sequence in self.fired(cheapest[: DOUBTS if self.small else FLOWN]):
+        for sequence in self.flights.fired(cheapest[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 break
             with suppress(Infeasible):
-                if self.flown(sequence).rank[:2] == (False, 0.0):
+                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return sequence.rank[1]
         return math.inf
 
@@ -214,8 +171,10 @@ class BlockSearch:
         states = [self.state(sequence.blocks) for sequence in before]
         if len(states) == 1:
             return states[0]
-        columns = (np.array([getattr(state, name) for state in states])[:, None, None, None] for name in NUMBERS)
-        return BlockState(**dict(zip(NUMBERS, columns, strict=True)))
+        columns: dict[str, Any] = {
+            name: np.array([getattr(state, name) for state in states])[:, None, None, None] for name in NUMBERS
+        }
+        return BlockState(**columns)
 
     def behind(
         self,
@@ -267,7 +226,7 @@ class BlockSearch:
         shape: tuple[int, ...],
     ) -> tuple[Array, Array]:
         """Largest share of a bound, infinite for blocks that may not be, and cost of blocks, by rows to choose from."""
-        severity = functools.reduce(np.maximum, [self.share(bound, left) for bound in self.bounds])
+        severity = self.flights.share(left)
         over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
         over = over | self._dark(state, channel, trial, after) | self._longer_round(state, after)
         over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
@@ -275,10 +234,6 @@ class BlockSearch:
         rows = shape[0] * shape[1], shape[2] * shape[3]
         severity = np.broadcast_to(np.where(over, np.inf, severity), shape).reshape(rows)
         return severity, np.broadcast_to(after.cost, shape).reshape(rows)
-
-    def share(self, bound: requirements.Bound, left: requirements.Left) -> Array:
-        """Share of a ``bound`` that is ``left``: 1 or less keeps it."""
-        return np.asarray(requirements.left_of(bound.part, left, self.body) / bound.most)
 
     def _spaced(self, every: int) -> bool:
         """True where pulses in one of ``every`` spins keep limits.gap."""
@@ -296,15 +251,14 @@ class BlockSearch:
         """
         start = self.model.start
         waits = self._waits(start, self.earliest, WAITS if abs(start.phasor) > 0.0 else 1)
-        short = [(*each, self._short_by(start, *each)) for each in self._kinds()]
+        short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds()]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
         within = SURELY
         while True:
-            chosen = ((*each, np.flatnonzero(lacks[0] <= within)[None]) for *each, lacks in short)
             trials = (
-                (channel, self._at_delays(start, channel, waits, index, every))
-                for channel, every, index in chosen
-                if index.size
+                (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
+                for channel, every, lacks in short
+                if np.any(lacks <= within)
             )
             sequences = sorted(self.behind([START], start, trials), key=lambda sequence: sequence.rank)
             enough = SURELY * max(sequences[0].rank[0], 1.0) if sequences else math.inf
@@ -468,8 +422,8 @@ class BlockSearch:
         if np.any(state.phasor):
             best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
         steps = [np.floor(delay / self.commands.delay_step) + around for delay in best for around in AROUND]
-        steps = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
-        return trial._replace(delay=self.commanded(np.concatenate(steps, axis=-1) * self.commands.delay_step))
+        alike = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
+        return trial._replace(delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step))
 
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
@@ -477,80 +431,39 @@ class BlockSearch:
         most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
-    def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
-        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
-
-        The pulses of a dozen of them are fired together.
-        """
-        for begin in range(0, len(sequences), FLOWN):
-            some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self._known * DEARER]
-            new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
-            if new:
-                self._fired.update(zip(new, self._together(new), strict=True))
-            yield from some
-
-    def _together(self, some: Sequence[Blocks]) -> Sequence[Schedule | Infeasible]:
-        """Pulses of sequences; one by one where the motion of one of them cannot be followed."""
-        try:
-            return fire_all(self.body, some)[0]
-        except Infeasible as reason:
-            return [reason] if len(some) == 1 else [self._together([blocks])[0] for blocks in some]
-
-    def flown(self, sequence: BlockSequence) -> FlownSequence:
-        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
-        if sequence.blocks not in self._flights:
-            if sequence.blocks not in self._fired:
-                self._fired[sequence.blocks] = self._together([sequence.blocks])[0]
-            schedule = self._fired[sequence.blocks]
-            if isinstance(schedule, Infeasible):
-                raise schedule
-            left = left_by(propagation.flown(self.body, schedule))
-            share = max(float(self.share(bound, left)) for bound in self.bounds)
-            missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for a Sun pulse
-            rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
-            self._flights[sequence.blocks] = FlownSequence(rank, schedule, sequence)
-            if rank[:2] == (False, 0.0):
-                self._known = min(self._known, sequence.rank[1])
-        return self._flights[sequence.blocks]
-
-    def doubted(self, flights: list[FlownSequence]) -> None:
-        """Fly sequences cheaper than the best of ``flights``, the cheapest first, until one complies; add them."""
-        best = min((flight.rank for flight in flights if not flight.rank[0]), default=None)
-        most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
-        known = {flight.sequence.blocks for flight in flights}
-        cheaper = [sequence for sequence in self.doubtful if sequence.rank[1] < most and sequence.blocks not in known]
-        for sequence in self.fired(cheaper[: DOUBTS if self.small else FLOWN]):
+    def doubted(self) -> None:
+        """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""
+        most = self.flights.known * (1.0 - SAME_COST)
+        cheaper = [each for each in self.doubtful if each.rank[1] < most and each.blocks not in self.flights.of]
+        for sequence in self.flights.fired(cheaper[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 return
             with suppress(Infeasible):
-                flights.append(self.flown(sequence))
-                if flights[-1].rank[:2] == (False, 0.0):
+                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return
 
-    def nearer(self, flights: Sequence[FlownSequence]) -> list[BlockSequence]:
-        """Neighbours of the best of ``flights`` that leave least where the closed form errs as it does for those.
+    def nearer(self) -> list[BlockSequence]:
+        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those.
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
         sequences = list[BlockSequence]()
-        distinct = {flight.sequence.blocks: flight for flight in sorted(flights, key=lambda flight: flight.rank)}
-        best = of_each_kind([flight.sequence for flight in distinct.values()])
-        for flight in (distinct[each.blocks] for each in best[:CORRECTED]):
+        best = of_each_kind(flight.sequence for flight in self.flights.all)
+        for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
             *earlier, last = flight.sequence.blocks
             before, state = START._replace(blocks=tuple(earlier)), self.state(tuple(earlier))
             off = self.model.apart(self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule))
             trials = [(self._named[last.channel], self._around(before, last))]
             sequences += self.behind([before], state, trials, off=off)
-        known = {flight.sequence.blocks for flight in flights}
-        other = (sequence for sequence in sequences if sequence.blocks not in known)
-        ranked = _by_blocks(sorted(other, key=lambda sequence: sequence.rank))
-        chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
-        return [self._in_form(sequence) for sequence in _by_blocks(chosen).values()]
+        other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
+        ranked = by_blocks(sorted(other, key=lambda sequence: sequence.rank))
+        clear = sorted(ranked.values(), key=lambda sequence: sequence.share)[: FLOWN // 2]
+        chosen = (*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values()))
+        return [self._in_form(sequence) for sequence in by_blocks(chosen).values()]
 
     def _in_form(self, sequence: BlockSequence) -> BlockSequence:
         """The sequence, ranked by the closed form alone."""
-        left = self.model.left(self.state(sequence.blocks))
-        share = max(float(self.share(bound, left)) for bound in self.bounds)
+        share = float(self.flights.share(self.model.left(self.state(sequence.blocks))))
         return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
 
     def _around(self, before: BlockSequence, last: Block) -> Trial:
@@ -577,17 +490,16 @@ def _following(blocks: Sequence[Block]) -> int:
 
 def _least(keys: Array, most: int) -> NDArray[np.intp]:
     """Indices of the ``most`` least keys of each row, in any order."""
-    return (
-        np.argpartition(keys, most - 1, axis=1)[:, :most]
-        if most < keys.shape[1]
-        else np.tile(np.arange(keys.shape[1]), (len(keys), 1))
-    )
+    rows, count = keys.shape
+    if most >= count:
+        return np.tile(np.arange(count), (rows, 1))
+    return np.asarray(np.argpartition(keys, most - 1, axis=1)[:, :most])
 
 
 def _least_of_all(keys: Array, most: int) -> NDArray[np.intp]:
     """Indices into all keys of the ``most`` least of each row, but for infinite ones."""
     index = (_least(keys, most) + keys.shape[1] * np.arange(len(keys))[:, None]).ravel()
-    return index[np.isfinite(keys.ravel()[index])]
+    return np.asarray(index[np.isfinite(keys.ravel()[index])])
 
 
 def _in_order(shares: Array, cost: Array) -> Array:
@@ -596,23 +508,16 @@ def _in_order(shares: Array, cost: Array) -> Array:
     return np.where(shares <= 1.0, cost / dearest - 2.0 + 1e-9 * shares, shares)
 
 
-def _by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
-    """Sequences by their blocks, the last of equal ones at the place of the first."""
-    return {sequence.blocks: sequence for sequence in sequences}
-
-
-def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
-    """The first sequence of each kind: flights may differ where closed forms do not."""
-    kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
-    for sequence in ranked:
-        kinds.setdefault(tuple((block.channel, block.every) for block in sequence.blocks), sequence)
-    return list(kinds.values())
-
-
 def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
-    """Sequences that leave least, and the front of miss against cost: ``most`` of each."""
-    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[BlockSequence]()
+    """Sequences that leave least, and a front of miss against cost: ``most`` of each."""
+    ranked = of_each_kind(sorted(sequences, key=lambda sequence: sequence.rank), "width", "count", "every")
+    return list(by_blocks((*ranked[:most], *_front(ranked)[:most])).values())
+
+
+def _front(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
+    """Of sequences in order of their rank those that cost distinctly less than all before them."""
+    front = list[BlockSequence]()
     for sequence in ranked:
-        if not front or sequence.rank[1] < front[-1].rank[1]:
+        if not front or sequence.rank[1] < CHEAPER * front[-1].rank[1]:
             front.append(sequence)
-    return list(_by_blocks((*ranked[:most], *front[:most])).values())
+    return front
