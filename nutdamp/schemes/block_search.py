@@ -320,7 +320,8 @@ class BlockSearch:
             gentle = np.tile(counts <= FEW, len(widths))
             damping = np.where(gentle, self._undamped(state, channel, every), np.inf)
             nearest = np.concatenate([_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1)
-            for index in (nearest, _least(damping, CLOSEST), evenly(np.flatnonzero(gentle), CLOSEST)[None]):
+            some = evenly(np.flatnonzero(gentle), CLOSEST if len(lacks) > 1 else FEW * CLOSEST)
+            for index in (nearest, _least(damping, CLOSEST), some[None]):
                 yield channel, self._at_delays(state, channel, waits, index, every)
 
     def _parts(self) -> list[BlockSequence]:
