@@ -9,6 +9,7 @@ that stays in the cache.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -48,7 +49,7 @@ class Series:
     ) -> None:
         first, second, third = moments
         count = len(step)
-        self.step, self.acceleration, self.jerk, self.moments = step, acceleration, jerk, moments
+        self.now, self.step, self.acceleration, self.jerk, self.moments = now, step, acceleration, jerk, moments
         self.coupling = np.stack([(second - third) / first, (third - first) / second, (first - second) / third])
         self.coupled = bool(self.coupling[2].any())
         self.rates = np.empty((LARGEST_ORDER + 1, 5, count))
@@ -76,6 +77,19 @@ class Series:
         rates = self.rates[: self.order + 1, :3].sum(axis=0)
         quaternion = self.turns[: self.order + 1].sum(axis=0)
         return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
+
+    def at(self, way: Array | float, cases: Any = ...) -> tuple[Array, Array]:
+        """Rates (3, m), unit quaternions (4, m) of ``cases`` after a ``way``, (m,) or one, in shares of the step."""
+        rates, turns = self.rates[: self.order + 1], self.turns[: self.order + 1]
+        if np.ndim(way) == 0:
+            powers = way ** np.arange(self.order + 1)
+            rate, quaternion = (np.tensordot(powers, part, 1)[:, cases] for part in (rates, turns))
+        else:
+            rates, turns = rates[:, :3, cases], turns[:, :, cases]
+            rate, quaternion = rates[-1], turns[-1]
+            for order in range(self.order - 1, -1, -1):
+                rate, quaternion = rate * way + rates[order], quaternion * way + turns[order]
+        return rate[:3], quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
 
     def _size(self, order: int) -> float:
         """Size of the terms of one order."""
@@ -270,6 +284,34 @@ class MotionStretch(NamedTuple):
         return later._replace(since=times, torque=torque)
 
 
+class DenseStretch(NamedTuple):
+    """Motion from a ``start`` for ``length`` (n,) s, that is known all the way: by a ``series``, or in closed form."""
+
+    start: MotionStretch
+    length: Array
+    series: Series | None = None
+
+    def at(self, way: Array | float, cases: Any = ...) -> MotionStretch:
+        """Motion of ``cases`` after a ``way``, (m,) or one, as a share of the length."""
+        here = self.start.some(cases)
+        since = here.since + way * self.length[cases]
+        if self.series is None:
+            return here.moved(since)
+        rates, quaternion = self.series.at(way, cases)
+        return here._replace(since=since, rates=rates, quaternion=quaternion)
+
+
+def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:
+    """Motion that `advance` makes with these arguments, which stay as they are, one piece after the other."""
+    if here.torque is None and here.bodies.free:
+        yield DenseStretch(here, duration)
+        return
+    begun = here._replace(rates=here.rates.copy(), quaternion=here.quaternion.copy())
+    for series in _series(begun, duration, *_pushed(here)):
+        start = here._replace(since=series.now, rates=series.rates[0, :3], quaternion=series.turns[0])
+        yield DenseStretch(start, series.step, series)
+
+
 class Observer(Protocol):
     """Observer of the motion of cases; see `sky`."""
 
@@ -384,15 +426,20 @@ def _pass(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
 
 def advance(here: MotionStretch, duration: Array) -> None:
     """Propagate rates and quaternion by ``duration`` (n,) s, in place."""
-    bodies, torque, slope = here.bodies, here.torque, here.slope
+    bodies = here.bodies
     if not duration.any():
         return
-    if torque is None and bodies.free:
+    if here.torque is None and bodies.free:
         _arc(bodies.moments, bodies.forcing.growth, here.rates, here.quaternion, duration)
         return
+    _integrate(here, duration, *_pushed(here))
+
+
+def _pushed(here: MotionStretch) -> tuple[Array, Array | None]:
+    """Constant angular acceleration (3, n) rad/s², and its slope, rad/s³, or None."""
+    bodies, torque, slope = here.bodies, here.torque, here.slope
     acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
-    jerk = None if slope is None or not slope.any() else slope / bodies.moments
-    _integrate(here, duration, acceleration, jerk)
+    return acceleration, None if slope is None or not slope.any() else slope / bodies.moments
 
 
 def cos_sin(angle: Any) -> tuple[Any, Any]:
@@ -455,6 +502,13 @@ def _integrate(here: MotionStretch, duration: Array, acceleration: Array, jerk: 
     if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
         _integrate_symmetric(here, duration, acceleration)
         return
+    for _ in _series(here, duration, acceleration, jerk):
+        pass
+
+
+def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None) -> Iterator[Series]:
+    """Series of `_integrate`, one after the other."""
+    forcing, moments = here.bodies.forcing, here.bodies.moments
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     if jerk is not None:
         last = acceleration + jerk * duration
@@ -467,7 +521,7 @@ def _integrate(here: MotionStretch, duration: Array, acceleration: Array, jerk: 
     for number in range(steps):
         gone = duration * (number / steps)
         push = acceleration if jerk is None else acceleration + jerk * gone
-        _step(here._replace(since=here.since + gone), duration / steps, push, jerk)
+        yield from _step(here._replace(since=here.since + gone), duration / steps, push, jerk)
 
 
 def _expect_short(span: float) -> None:
@@ -500,15 +554,18 @@ def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Arr
     quaternion[:] = first.real, second.real, second.imag, first.imag
 
 
-def _step(here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12) -> None:
-    """One step of ``step`` (n,) s, in place; halved where the series does not converge."""
+def _step(
+    here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12
+) -> Iterator[Series]:
+    """Series of one step of ``step`` (n,) s, in place; halved where it does not converge."""
     bodies, now, rates, quaternion = here[:4]
     series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
     if series.converges():
+        yield series
         rates[:], quaternion[:] = series.end()
         return
     if halvings == 0:
         raise Infeasible(TOO_FAST)
     for begin in (0.0, 0.5):
         push = acceleration if jerk is None else acceleration + jerk * (begin * step)
-        _step(here._replace(since=now + begin * step), 0.5 * step, push, jerk, halvings - 1)
+        yield from _step(here._replace(since=now + begin * step), 0.5 * step, push, jerk, halvings - 1)

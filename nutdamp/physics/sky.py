@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.batch import MotionStretch
+from nutdamp.physics.batch import DenseStretch, MotionStretch, pieces
 
 OBLIQUITY = math.radians(23.43928)
 """Obliquity of the ecliptic at J2000.0."""
@@ -113,8 +113,8 @@ class AxisWatch:
 
     def _take(self, number: int, least: Array, largest: Array, cases: Any = ...) -> None:
         rows = np.arange(self.least.shape[1])[self.rows][cases]
-        self.least[number, rows] = np.minimum(self.least[number, rows], least)
-        self.largest[number, rows] = np.maximum(self.largest[number, rows], largest)
+        np.minimum.at(self.least[number], rows, least)  # a case may come twice
+        np.maximum.at(self.largest[number], rows, largest)
 
     def _arc(self, moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
@@ -125,7 +125,7 @@ class AxisWatch:
         for number, direction in enumerate(self._towards(momentum)):
             begins, beta = _angles(axis, direction), _angles(momentum, direction)
             along = np.sum(axis * direction, axis=0) - np.cos(theta) * np.cos(beta)
-            ahead = np.sum(np.cross(momentum, axis, axis=0) * direction, axis=0)
+            ahead = np.sum(_cross(momentum, axis) * direction, axis=0)
             nearest = np.arctan2(ahead, along) % CIRCLE  # how far round from where it is the axis comes nearest
             farthest = (nearest + math.pi) % CIRCLE
             least, largest = np.abs(beta - theta), np.minimum(beta + theta, CIRCLE - beta - theta)
@@ -155,22 +155,24 @@ class AxisWatch:
         pace = _momentum(here) / np.minimum(first, second)
         if not np.array_equal(first, second):
             pace = pace + np.abs(here.rates[2])
-        count = max(math.ceil(float(np.max(pace * duration)) * ROWS / CIRCLE), 1)
-        begin, step, nearing = here.since, duration / count, self._look(here, ...)
-        for index in range(count):
-            then, before, here = here, nearing, here.moved(begin + (index + 1) * step)
-            nearing = self._look(here, ...)
-            for number, (rise, fall) in enumerate(zip(before, nearing, strict=True)):
-                cases = np.flatnonzero(rise * fall < 0.0)  # in between the axis comes nearest, or goes farthest
+        nearing = [self._look(here, ...)]
+        for piece in pieces(here, duration):
+            count = max(math.ceil(float(np.max(pace * piece.length)) * ROWS / CIRCLE), 1)
+            nearing = [nearing[-1], *(self._look(piece.at((index + 1) / count), ...) for index in range(count))]
+            for number, rates in enumerate(np.array(nearing).swapaxes(0, 1)):
+                steps, cases = np.nonzero(rates[:-1] * rates[1:] < 0.0)  # in between it comes nearest, or goes farthest
                 if len(cases):
-                    self._between(then.some(cases), step[cases], (rise[cases], fall[cases]), number, cases)
+                    ends = rates[steps, cases], rates[steps + 1, cases]
+                    self._between(piece, steps / count, (steps + 1) / count, ends, number, cases)
 
-    def _between(self, then: MotionStretch, step: Array, rates: tuple[Array, Array], number: int, cases: Any) -> None:
-        """Record extremes within a step, by `SECANTS` from the ``rates`` (nearer, farther) at its ends."""
-        begin, end, (rise, fall) = np.zeros_like(step), step, rates
+    def _between(
+        self, piece: DenseStretch, begin: Array, end: Array, rates: tuple[Array, Array], number: int, cases: Any
+    ) -> None:
+        """Record extremes between two shares of a piece, by `SECANTS` from the ``rates`` (nearer, farther) there."""
+        rise, fall = rates
         for _ in range(SECANTS):
             way = begin + (end - begin) * rise / (rise - fall)
-            here = self._look(then.moved(then.since + way), cases)[number]
+            here = self._look(piece.at(way, cases), cases)[number]
             before = here * rise > 0.0
             begin, rise = np.where(before, way, begin), np.where(before, here, rise)
             end, fall = np.where(before, end, way), np.where(before, fall, here)
@@ -222,16 +224,23 @@ def _momentum(here: MotionStretch) -> Array:
     return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
 
 
+def _cross(first: Array, second: Array) -> Array:
+    """Cross products of vectors (3, n)."""
+    a, b, c = first
+    x, y, z = second
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
+
+
 def _rotated(quaternion: Array, vector: Array) -> Array:
     """Vectors (3, n) rotated by unit quaternions (4, n)."""
     w, axis = quaternion[0], quaternion[1:]
-    once = np.cross(axis, vector, axis=0)
-    return np.asarray(vector + 2.0 * (w * once + np.cross(axis, once, axis=0)))
+    once = _cross(axis, vector)
+    return np.asarray(vector + 2.0 * (w * once + _cross(axis, once)))
 
 
 def _angles(first: Array, second: Array) -> Array:
     """Angles (n,) between vectors (3, n), exact to rounding from 0 to π."""
-    across = np.cross(first, second, axis=0)
+    across = _cross(first, second)
     return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
 
 
@@ -337,7 +346,7 @@ class SunPulseClock:
         """Angle between spin axis and Sun, (n,) rad."""
         w, x, y, z = here.quaternion
         axis = self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-        across = np.linalg.norm(np.cross(axis, self.sun, axis=0), axis=0)
+        across = np.linalg.norm(_cross(axis, self.sun), axis=0)
         return np.asarray(np.arctan2(across, np.sum(axis * self.sun, axis=0)))
 
     @property

@@ -12,11 +12,12 @@ import cmath
 import functools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
@@ -27,7 +28,7 @@ from nutdamp.physics import attitude, precession
 from nutdamp.physics.batch import Bodies, MotionStretch
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Valve, spread
-from nutdamp.spacecraft.equipment import Block, Channel, SunSensor
+from nutdamp.spacecraft.equipment import Block, Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
@@ -44,8 +45,11 @@ EXACT = 1e-13
 BLIND = 32
 """Spin turns in a row without a Sun pulse, after which none is waited for."""
 
+NEVER = np.iinfo(np.int64).max
+"""Number of a Sun pulse that is not waited for."""
+
 FIRED, INTEGRATED = 1.0, 40.0
-"""Units of `work` of a pulse that is fired, of a symmetric body and of one whose motion is integrated."""
+"""Units of `work` of a pulse that is fired, and of the motion of all flights to the next where it is integrated."""
 
 
 def spin_turn(spacecraft: Spacecraft) -> float:
@@ -81,17 +85,16 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     angles = attitude.angle_between(flown.axis(times_of), body.sun)
     seen = np.array([sensor.sees(angle) for angle in angles.tolist()], dtype=bool)
     if len(times_of) and not seen.any():
-        _expect_seen(sensor, float(times_of[0]), float(angles[0]))
+        raise _blind(float(times_of[0]), float(angles[0]))
     return np.asarray(times_of[seen])
 
 
-def _expect_seen(sensor: SunSensor, time: float, angle: float) -> None:
-    """Raise Infeasible where the sensor does not see the Sun at this ``angle`` (rad) from the spin axis."""
-    if not sensor.sees(angle):
-        raise Infeasible(
-            f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the spin axis: "
-            "there is no Sun pulse"
-        )
+def _blind(time: float, angle: float) -> Infeasible:
+    """Reason why there is no Sun pulse: the sensor does not see the Sun at this ``angle`` (rad) from the spin axis."""
+    return Infeasible(
+        f"the Sun sensor does not see the Sun at {time:.4g} s, {math.degrees(angle):.4g}° from the spin axis: "
+        "there is no Sun pulse"
+    )
 
 
 def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
@@ -106,56 +109,66 @@ def to_sun_pulse(flown: Flight, times: Vector) -> Vector:
 
 
 class SunPulses:
-    """Sun pulses of a spacecraft as its sensor gives them, one after the other.
+    """Sun pulses that flights of a spacecraft wait for, as its sensor gives them; the flights go on together.
 
-    ``seen``: whether the sensor saw each passage of the Sun through its azimuth so far; those that it saw count. Raises
-    Infeasible where there is no Sun or no sensor.
+    ``numbers``: those of each flight, 1 the first after t = 0; they must not decrease. Iterating gives the motion of
+    all at a passage of the Sun, and the flights that one of their numbers comes to then. ``seen``: whether the sensor
+    saw each passage so far, (n,); those that it saw count. ``failures``: why a flight ended before its last number, or
+    None: its axis is too near to the Sun, or the sensor sees it no more. Raises Infeasible where there is no Sun or no
+    sensor.
     """
 
-    def __init__(self, spacecraft: Spacecraft) -> None:
-        self.clock, self.seen, self._count = sun_clock(spacecraft), list[bool](), 0
+    def __init__(self, spacecraft: Spacecraft, numbers: Sequence[Sequence[int]]) -> None:
+        self.clock, self.seen = sun_clock(spacecraft, len(numbers)), list[NDArray[np.bool_]]()
+        self.failures: list[Infeasible | None] = [None] * len(numbers)
         assert spacecraft.sun_sensor is not None
         self._sensor = spacecraft.sun_sensor
+        self._numbers = [iter(each) for each in numbers]
+        self._due = np.array([next(each, NEVER) for each in self._numbers])
 
-    def next(self, number: int) -> MotionStretch:
-        """Motion at the Sun pulse of this ``number``, 1 the first after t = 0; numbers must not decrease.
+    def fail(self, flight: int, reason: Infeasible) -> None:
+        """End a flight."""
+        self.failures[flight], self._due[flight] = reason, NEVER
 
-        Raises Infeasible where there is none: the axis is too near to the Sun, or the sensor sees it no more.
-        """
-        motion, sensor = self.clock.here, self._sensor
-        if sensor.sees_all:
-            before = float(self.clock.time[0])
-            self.seen += [True] * (number - len(self.seen))
-            motion = self.clock.sun_pulse(number)
-            self._expect_found(before)
-            return motion
-        unseen: list[tuple[float, float]] = []
-        while self._count < number:
-            before = float(self.clock.time[0])
-            motion = self.clock.sun_pulse(len(self.seen) + 1)
-            self._expect_found(before)
-            angle = float(self.clock.angle(motion)[0])
-            self.seen.append(bool(sensor.sees(angle)))
-            self._count += self.seen[-1]
-            unseen = [] if self.seen[-1] else [*unseen, (float(motion.since[0]), angle)]
-            if len(unseen) > BLIND:
-                _expect_seen(sensor, *unseen[0])
-        return motion
+    def __iter__(self) -> Iterator[tuple[MotionStretch, list[int]]]:
+        clock, sensor, count = self.clock, self._sensor, np.zeros(len(self._due), dtype=np.int64)
+        unseen = [list[tuple[float, float]]() for _ in self._due]
+        while (following := int(self._due.min(initial=NEVER))) < NEVER:
+            before, passage = clock.time, following if sensor.sees_all else len(self.seen) + 1
+            motion = clock.sun_pulse(passage)
+            for flight in np.flatnonzero(clock.lost & (self._due < NEVER)).tolist():
+                text = f"no Sun pulse comes after {max(float(before[flight]), 0.0):.4g} s"
+                self.fail(flight, Infeasible(f"{text}: the spin axis is too near to the Sun"))
+            angles = np.zeros(len(count)) if sensor.sees_all else clock.angle(motion)
+            sees = sensor.sees_all | np.asarray(sensor.sees(angles))
+            count = np.full_like(count, passage) if sensor.sees_all else count + sees
+            self.seen += [sees] * (passage - len(self.seen))
+            for flight in np.flatnonzero(~sees & (self._due < NEVER)).tolist():
+                unseen[flight].append((float(motion.since[flight]), float(angles[flight])))
+                if len(unseen[flight]) > BLIND:
+                    self.fail(flight, _blind(*unseen[flight][0]))
+            for flight in np.flatnonzero(sees).tolist():
+                unseen[flight].clear()
+            flights = np.flatnonzero(sees & (count >= self._due)).tolist()
+            for flight in flights:
+                self._due[flight] = next(self._numbers[flight], NEVER)
+            if flights:
+                yield motion, flights
 
-    def _expect_found(self, before: float) -> None:
-        if self.clock.lost[0]:
-            raise Infeasible(f"no Sun pulse comes after {max(before, 0.0):.4g} s: the spin axis is too near to the Sun")
 
-
-def sun_clock(spacecraft: Spacecraft) -> SunPulseClock:
-    """Sun pulses of a spacecraft from t = 0; raises Infeasible where it has none."""
+def sun_clock(spacecraft: Spacecraft, flights: int = 1) -> SunPulseClock:
+    """Sun pulses of so many flights of a spacecraft from t = 0; raises Infeasible where it has none."""
     sensor, sun = spacecraft.sun_sensor, spacecraft.sun
     if sensor is None or sun is None:
         raise Infeasible("there is no Sun pulse; the file needs sun and sun_sensor")
     dynamics, start = make_dynamics(spacecraft), spacecraft.initial
-    bodies = Bodies(np.array(dynamics.moments)[:, None], dynamics.constant, dynamics.forcing)
-    state = MotionStretch(bodies, np.zeros(1), start.rates[:, None], start.quaternion[:, None])
-    return SunPulseClock(state, sun[:, None], math.copysign(1.0, spacecraft.spin), sensor.azimuth)
+    moments, rates, quaternion, suns = (
+        np.repeat(np.asarray(part, dtype=np.float64)[:, None], flights, axis=1)
+        for part in (dynamics.moments, start.rates, start.quaternion, sun)
+    )
+    bodies = Bodies(moments, dynamics.constant, dynamics.forcing)
+    state = MotionStretch(bodies, np.zeros(flights), rates, quaternion)
+    return SunPulseClock(state, suns, math.copysign(1.0, spacecraft.spin), sensor.azimuth)
 
 
 def pushes(pulse: Pulse, torque: Vector) -> list[TorqueRamp]:
@@ -168,7 +181,10 @@ def pushes(pulse: Pulse, torque: Vector) -> list[TorqueRamp]:
 
 def first_sun_pulse(spacecraft: Spacecraft) -> float:
     """Time of the first Sun pulse, s; raises Infeasible where there is none."""
-    return float(SunPulses(spacecraft).next(1).since[0])
+    sun_pulses = SunPulses(spacecraft, [(1,)])
+    for motion, _ in sun_pulses:
+        return float(motion.since[0])
+    raise sun_pulses.failures[0] or Infeasible("")
 
 
 def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> Schedule:
@@ -177,35 +193,89 @@ def fired(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = No
 
 
 def fire(spacecraft: Spacecraft, blocks: Sequence[Block], seed: int | None = None) -> tuple[Schedule, list[bool]]:
-    """Pulses fired by ``blocks``, with the Sun pulses of their own motion, and `SunPulses.seen`.
+    """Pulses fired by ``blocks``, and `SunPulses.seen`; raises what `fire_all` gives as reasons."""
+    (schedule,), seen = fire_all(spacecraft, [blocks], seed)
+    if isinstance(schedule, Infeasible):
+        raise schedule
+    return schedule, [bool(sees[0]) for sees in seen]
 
-    With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. Raises Infeasible
-    where there is no Sun pulse, where a channel is not known, where a pulse would begin before the one before is over,
-    and where the propellant does not last.
+
+def fire_all(
+    spacecraft: Spacecraft, sequences: Sequence[Sequence[Block]], seed: int | None = None
+) -> tuple[list[Schedule | Infeasible], list[NDArray[np.bool_]]]:
+    """Pulses fired by each of the sequences of blocks, with the Sun pulses of its own motion, and `SunPulses.seen`.
+
+    With a ``seed`` the Sun pulses have the jitter of the sensor, which the nominal motion is without. In the place of a
+    schedule is the reason where there is no Sun pulse, where a channel is not known, where a pulse would begin before
+    the one before is over, and where the propellant does not last.
     """
-    channels = {channel.name: channel for channel in spacecraft.channels}
-    sun_pulses, sensor, errors = SunPulses(spacecraft), spacecraft.sun_sensor, np.random.default_rng(seed)
-    clock = sun_pulses.clock
-    jitter = 0.0 if seed is None or sensor is None else sensor.jitter
-    supply, pulses, per_kg = Supply(spacecraft), list[Pulse](), shed(spacecraft)
-    for block in blocks:
-        channel = channels.get(block.channel)
+    sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
+    firings = [_Firing(spacecraft, blocks) for blocks in sequences]
+    clock, sensor, errors = sun_pulses.clock, spacecraft.sun_sensor, np.random.default_rng(seed)
+    jitter, count = 0.0 if seed is None or sensor is None else sensor.jitter, len(sequences)
+    arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
+    over = np.zeros(count)
+    for motion, flights in sun_pulses:
+        work.spend((0.0 if arcs else INTEGRATED) + FIRED * len(flights))
+        delays, widths, given = motion.since * 0.0, np.zeros(count), dict[int, Pulse]()
+        for flight in flights:
+            try:
+                block, given[flight] = firings[flight].next()
+            except Infeasible as reason:
+                sun_pulses.fail(flight, reason)
+                continue
+            delays[flight], widths[flight] = jitter * errors.standard_normal() + block.delay, block.width
+            due = float(motion.since[flight] + delays[flight])
+            if due < over[flight] - 1e-9:
+                text = f"a pulse of {block.channel} would begin at {due:.6g} s, before the one before is over"
+                sun_pulses.fail(flight, Infeasible(text))
+        spent = np.zeros(count)
+        spent[list(given)] = [pulse.propellant or 0.0 for pulse in given.values()]
+        sheds = None if per_kg is None else per_kg[:, None] * spent
+        starts = clock.fire(motion, delays, cast("float", widths), _together(given, count), sheds)
+        for flight, pulse in given.items():
+            firings[flight].pulses.append(pulse.moved(float(starts[flight])))
+        over[list(given)] = clock.over[list(given)]
+    for flight, firing in enumerate(firings):
+        if sun_pulses.failures[flight] is None and firing.supply.shortage is not None:
+            sun_pulses.fail(flight, Infeasible(firing.supply.shortage))
+    schedules = [Schedule(tuple(firing.pulses), blocks=tuple(firing.blocks)) for firing in firings]
+    return [reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)], sun_pulses.seen
+
+
+class _Firing:
+    """Pulses of ``blocks``, fired one after the other."""
+
+    def __init__(self, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
+        self.blocks, self.supply, self.pulses = blocks, Supply(spacecraft), list[Pulse]()
+        self._channels = {channel.name: channel for channel in spacecraft.channels}
+        self._left = ((block, number) for block in blocks for number in block.sun_pulses)
+
+    def next(self) -> tuple[Block, Pulse]:
+        """Block of the next pulse, and the pulse as from t = 0; raises Infeasible for a channel that is not known."""
+        block, _ = next(self._left)
+        channel = self._channels.get(block.channel)
         if channel is None:
             raise Infeasible(f"the spacecraft has no channel {block.channel}")
-        for number in block.sun_pulses:
-            work.spend(FIRED if spacecraft.inertia.symmetric and not spacecraft.disturbances else INTEGRATED)
-            motion, over = sun_pulses.next(number), clock.over[0]
-            delay = motion.since * 0.0 + jitter * errors.standard_normal() + block.delay
-            due = float(motion.since[0] + delay[0])
-            if due < over - 1e-9:
-                raise Infeasible(f"a pulse of {channel.name} would begin at {due:.6g} s, before the one before is over")
-            given = supply.fire(on_command(channel, 0.0, block.width), channel)
-            sheds = None if per_kg is None else (per_kg * (given.propellant or 0.0))[:, None]
-            torque = np.zeros(3) if given.torque is None else given.torque
-            start = float(clock.fire(motion, delay, block.width, pushes(given, torque[:, None]), sheds)[0])
-            pulses.append(given.moved(start))
-    supply.expect_to_last()
-    return Schedule(tuple(pulses), blocks=tuple(blocks)), sun_pulses.seen
+        return block, self.supply.fire(on_command(channel, 0.0, block.width), channel)
+
+
+def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
+    """Torques of ``count`` flights by the pulses of some: of the others, and once a pulse is over, there are none."""
+    ramps = {
+        flight: pushes(pulse, (np.zeros(3) if pulse.torque is None else pulse.torque)[:, None])
+        for flight, pulse in given.items()
+    }
+    together = []
+    for index in range(max(map(len, ramps.values()), default=0)):
+        begin, end, first, last = np.zeros(count), np.zeros(count), np.zeros((3, count)), np.zeros((3, count))
+        for flight, each in ramps.items():
+            ramp = each[min(index, len(each) - 1)] if each else TorqueRamp(0.0, 0.0, first[:, :1], last[:, :1])
+            begin[flight], end[flight] = ramp.begin if index < len(each) else ramp.end, ramp.end
+            if index < len(each):
+                first[:, [flight]], last[:, [flight]] = ramp.first, ramp.last
+        together.append(TorqueRamp(begin, end, first, last))
+    return together
 
 
 INVERTED = 6
@@ -280,14 +350,9 @@ class BlockState:
         here = replace(self, sun_angle=self.sun_angle + off.sun_angle, longitude=self.longitude + off.longitude)
         return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
 
-    def at(self, index: tuple[Any, ...], shape: tuple[int, ...]) -> BlockState:
-        """State at one index of many, which have a ``shape``."""
 
-        def one(value: Any) -> Any:
-            return np.broadcast_to(value, shape)[index]
-
-        parts = {part.name: one(getattr(self, part.name)) for part in fields(self) if part.name != "fired"}
-        return BlockState(**parts, fired={name: int(one(count)) for name, count in self.fired.items()})
+NUMBERS = ("sun_angle", "longitude", "phasor", "sun_pulse", "spin", "used", "cost")
+"""Fields of `BlockState` that are numbers."""
 
 
 class BlockModel:

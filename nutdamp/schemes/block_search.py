@@ -7,12 +7,13 @@ looked for behind the most promising. The best dozen are flown from the Sun puls
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
 from itertools import islice
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,15 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fired
+from nutdamp.schemes.block_flights import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
+from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
+from nutdamp.spacecraft.constraints import Windows, commandable_widths
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
-from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
-
-FLOWN = 12
-"""Sequences of blocks that are flown; as many more where none of them complies."""
 
 GENTLE = 10
 """Multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too."""
@@ -61,6 +58,9 @@ BESIDE = 0.01
 SHARES = np.linspace(0.0, 1.0, 13)[1:]
 """Shares of the way that a first block may go, where others follow."""
 
+CHEAPER = 0.9
+"""Multiple of the cost of a sequence below which one that leaves more is looked at, too."""
+
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
 
@@ -79,32 +79,14 @@ CORRECTED = 4
 SURELY = 3.0
 """Largest difference of a block's length from the way to the target, over its end error."""
 
-LOWER = 0.98
-"""Share of the nutation above which it does not count as lowered."""
+CLOSEST, FEW = 24, 4
+"""Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
+
+TOGETHER = 32
+"""Sequences behind which others are looked for at once."""
 
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
-
-
-class BlockSequence(NamedTuple):
-    """Blocks, the motion after them in closed form, and their rank: the less, the better.
-
-    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
-    ``share``: the share.
-    """
-
-    blocks: tuple[Block, ...]
-    state: BlockState
-    rank: tuple[float, float, float]
-    share: float = math.inf
-
-
-class FlownSequence(NamedTuple):
-    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
-
-    rank: tuple[bool, float, float, float]
-    schedule: Schedule
-    sequence: BlockSequence
 
 
 class BlockSearch:
@@ -113,10 +95,12 @@ class BlockSearch:
     def __init__(self, spacecraft: Spacecraft, channels: Sequence[Channel], commands: Commands) -> None:
         self.body, self.channels, self.commands = spacecraft, channels, commands
         self.model = BlockModel(spacecraft)
-        self.bounds = [self._lowered(bound) for bound in requirements.bounds(spacecraft)]
+        self.flights = BlockFlights(spacecraft)
+        self._most = {bound.part: bound.most for bound in self.flights.bounds}
+        self._named = {channel.name: channel for channel in channels}
         self.looked = 0
         self.most = math.inf  # what a sequence may cost
-        self._flights: dict[tuple[Block, ...], FlownSequence] = {}
+        self._states: dict[Blocks, BlockState] = {(): self.model.start}
         self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
         limits = spacecraft.limits
         self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
@@ -124,215 +108,241 @@ class BlockSearch:
         self.dark = Windows(spacecraft).dark
         self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
 
-    def _lowered(self, bound: requirements.Bound) -> requirements.Bound:
-        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
-        goal = self.body.goal
-        if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
-            return bound
-        return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
-
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
-        start = BlockSequence((), self.model.start, (math.inf, math.inf, math.inf))
-        sequences = self._single(start)
+        sequences = self._single()
         firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
             self.most = self.least_cost(sequences)
             if work.exhausted() or (self.most < math.inf and not self.small):
                 break
             if number == 2:
-                small = self.behind(start, self._rest(start), few=2) if abs(start.state.phasor) > 0.0 else ()
-                firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *islice(self._parts(start), FIRST)]
-                firsts += self._all_firsts(start) if self.small else []
+                small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
+                firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
+                firsts += self._all_firsts() if self.small else []
             else:
                 firsts = _promising(firsts, FIRST // 2)
-            firsts = [first for first in firsts if first.rank[1] < self.most]
-            firsts = [more for first in firsts for more in self.behind(first, self._rest(first), few=4)]
+            firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
             sequences += firsts
         self.most = math.inf
-        unsure = _by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
+        unsure = by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
         self.doubtful = sorted(unsure.values(), key=lambda sequence: sequence.rank[1:])
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = list(_by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
+        ranked = list(by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
         clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
-        first = _by_blocks((*ranked[: FLOWN // 2], *clear, *each))
+        first = by_blocks((*ranked[: FLOWN // 2], *clear, *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
         gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
-        more = _by_blocks((*of_each_kind(ranked)[:FLOWN], *gentle))
+        more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
-        return [*first.values(), *islice(others, 2 * FLOWN)]
+        return [*first.values(), *islice(others, 4 * FLOWN)]
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = _by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
+        complying = by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
         cheapest = sorted(complying.values(), key=lambda sequence: sequence.rank)
-        for sequence in islice(cheapest, DOUBTS if self.small else FLOWN):
+        for sequence in self.flights.fired(cheapest[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 break
             with suppress(Infeasible):
-                if self.flown(sequence).rank[:2] == (False, 0.0):
+                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return sequence.rank[1]
         return math.inf
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
-        named = {channel.name: channel for channel in self.channels}
         spin = self.body.spin
-        return max(float(self.model.turned_by(named[block.channel], block.width, spin)) for block in sequence.blocks)
+        return max(
+            float(self.model.turned_by(self._named[block.channel], block.width, spin)) for block in sequence.blocks
+        )
+
+    def state(self, blocks: Blocks) -> BlockState:
+        """Motion after blocks, in closed form."""
+        if blocks not in self._states:
+            *before, last = blocks
+            trial = Trial(last.first - _following(before), last.delay, last.width, last.count, last.every)
+            self._states[blocks] = self.model.after(self.state(tuple(before)), self._named[last.channel], trial)
+        return self._states[blocks]
+
+    def _motions(self, before: Sequence[BlockSequence]) -> BlockState:
+        """Motions after some sequences in one, with three more axes behind that of the sequences."""
+        states = [self.state(sequence.blocks) for sequence in before]
+        if len(states) == 1:
+            return states[0]
+        columns: dict[str, Any] = {
+            name: np.array([getattr(state, name) for state in states])[:, None, None, None] for name in NUMBERS
+        }
+        return BlockState(**columns)
 
     def behind(
         self,
-        before: BlockSequence,
-        trials: Iterator[tuple[Channel, Trial]],
+        before: Sequence[BlockSequence],
+        state: BlockState,
+        trials: Iterable[tuple[Channel, Trial]],
         few: int = FLOWN,
         off: BlockState | None = None,
-    ) -> Iterator[BlockSequence]:
-        """The best ``few`` of the ``trials`` of each channel, after the blocks ``before``.
+    ) -> list[BlockSequence]:
+        """The best of the ``trials`` of each channel, after the blocks ``before``, from their `_motions`, ``state``.
 
+        The axes of trials are the sequences before, and three more: the best ``few`` are chosen along the last two.
         ``off``: by how much they end elsewhere than the closed form says, as far as that is known.
         """
-        number = 1
-        for block in before.blocks[-1:]:
-            number = block.first + (block.count - 1) * block.every + 1
-        tank = self.body.tank
+        following, sequences = np.array([_following(each.blocks) for each in before]), list[BlockSequence]()
         for channel, trial in trials:
-            state = self.model.after(before.state, channel, trial)
-            left = self.model.left(state if off is None else state.shifted(off))
-            shape = np.shape(left.nutation)
-            self.looked += int(np.prod(shape))
-            work.spend(LOOKED * float(np.prod(shape)))
-            severity = np.max(np.broadcast_arrays(*(self.share(bound, left) for bound in self.bounds)), axis=0)
-            over = np.asarray(state.sun_pulse) > self.body.horizon + self.model.turn
-            over = over | self._dark(before.state, channel, trial, state) | self._longer_round(before.state, state)
-            over = over if tank is None else over | (state.used > tank.propellant)
-            cost = np.broadcast_to(state.cost, shape)
-            severity = np.where(np.isnan(severity) | over | (cost >= self.most), np.inf, severity)
-            failed = np.where(severity <= 1.0, 0.0, severity).ravel()
-            doubted = np.where(severity <= DOUBTFUL, 0.0, severity).ravel()
-            chosen = [*np.lexsort((cost.ravel(), failed))[:few], *np.argsort(severity, axis=None)[: few // 2]]
-            chosen += [*np.lexsort((cost.ravel(), doubted))[: DOUBTS if self.small else few]]
-            for index in dict.fromkeys(chosen):
-                if math.isfinite(failed[index]):
-                    at = np.unravel_index(index, shape)
-                    wait, delay, width, count, every = (np.broadcast_to(part, shape)[at].item() for part in trial)
-                    interval = every if count > 1 else self.commands.every[0]
-                    block = Block(channel.name, number + wait, round(delay, 12), round(width, 12), count, interval)
-                    here = state.at(at, shape)
-                    rank = float(failed[index]), float(cost.ravel()[index]), float(here.sun_pulse)
-                    yield BlockSequence((*before.blocks, block), here, rank, float(severity.ravel()[index]))
+            after = self.model.after(state, channel, trial)
+            left = self.model.left(after if off is None else after.shifted(off))
+            shape = np.broadcast_shapes((len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation)))
+            self.looked += math.prod(shape)
+            work.spend(LOOKED * math.prod(shape))
+            severity, cost = self._severity(state, channel, trial, after, left, shape)
+            doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
+            keys = (
+                (_in_order(severity, cost), few),
+                (severity, DOUBTS if self.small else few // 2),
+                (doubted, DOUBTS if self.small else few),
+            )
+            index = np.unique(np.concatenate([_least_of_all(*key) for key in keys]))
+            at = np.unravel_index(index, shape)
+            wait, delay, width, count, every = (np.broadcast_to(part, shape)[at] for part in trial)
+            every = np.where(count > 1, every, self.commands.every[0])
+            share, ends = severity.ravel()[index], np.broadcast_to(after.sun_pulse, shape)[at]
+            ranks = np.where(share <= 1.0, 0.0, share), cost.ravel()[index], ends
+            columns = following[at[0]] + wait, np.round(delay, 12), np.round(width, 12), count, every
+            lists = zip(*(column.tolist() for column in (at[0], share, *ranks, *columns)), strict=True)
+            for parent, severe, failed, spent, end, *block in lists:
+                blocks = (*before[parent].blocks, Block(channel.name, *block))
+                sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
+        return sequences
 
-    def share(self, bound: requirements.Bound, left: requirements.Left) -> Array:
-        """Share of a ``bound`` that is ``left``: 1 or less keeps it."""
-        return np.asarray(requirements.left_of(bound.part, left, self.body) / bound.most)
+    def _severity(
+        self,
+        state: BlockState,
+        channel: Channel,
+        trial: Trial,
+        after: BlockState,
+        left: requirements.Left,
+        shape: tuple[int, ...],
+    ) -> tuple[Array, Array]:
+        """Largest share of a bound, infinite for blocks that may not be, and cost of blocks, by rows to choose from."""
+        severity = self.flights.share(left)
+        over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
+        over = over | self._dark(state, channel, trial, after) | self._longer_round(state, after)
+        over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
+        over = over | np.isnan(severity) | (after.cost >= self.most)
+        rows = shape[0] * shape[1], shape[2] * shape[3]
+        severity = np.broadcast_to(np.where(over, np.inf, severity), shape).reshape(rows)
+        return severity, np.broadcast_to(after.cost, shape).reshape(rows)
 
     def _spaced(self, every: int) -> bool:
         """True where pulses in one of ``every`` spins keep limits.gap."""
         return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
 
-    def _counts(self, start: BlockState, every: int) -> NDArray[np.int64]:
+    def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
-        most = int((self.body.horizon - float(start.sun_pulse)) / (every * self.model.turn)) + 1
-        if not self._spaced(every):
-            return np.arange(0)
+        most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
         return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
 
-    def _single(self, start: BlockSequence) -> list[BlockSequence]:
+    def _single(self) -> list[BlockSequence]:
         """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
 
         What surely ends worse than the best ones found is left out: see `_short_by`.
         """
-        short = [
-            (channel, every, self._short_by(start.state, channel, every))
-            for channel in self.channels
-            for every in self.commands.every
-        ]
+        start = self.model.start
+        waits = self._waits(start, self.earliest, WAITS if abs(start.phasor) > 0.0 else 1)
+        short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds()]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
         within = SURELY
         while True:
             trials = (
-                (channel, trial)
+                (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
                 for channel, every, lacks in short
-                for trial in self._chosen(start.state, channel, every, np.argwhere(lacks <= within))
+                if np.any(lacks <= within)
             )
-            sequences = sorted(self.behind(start, trials), key=lambda sequence: sequence.rank)
+            sequences = sorted(self.behind([START], start, trials), key=lambda sequence: sequence.rank)
             enough = SURELY * max(sequences[0].rank[0], 1.0) if sequences else math.inf
             if enough <= within or within >= most or work.exhausted():
                 return sequences
             within = min(enough, 10.0 * within, most)
 
+    def _kinds(self) -> Iterator[tuple[Channel, int]]:
+        """Channels and intervals that pulses may have."""
+        return itertools.product(self.channels, filter(self._spaced, self.commands.every))
+
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
-        """Least miss of blocks of each width and number, (w, n), in shares of its bound.
+        """Least miss of blocks of each width and number, (k, w n) after each of k motions, in shares of its bound.
 
         Where the spin is to change, the spin. With a target the length of the rhumb line: a block that is longer or
         shorter than the way ends no nearer than a third of the difference. Else the nutation, which they can lower by
         the sum of their kicks at most.
         """
-        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)[None, :]
-        bounds = {bound.part: bound.most for bound in self.bounds}
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
+        if self.body.goal.spin is None and self.body.goal.axis is None:
+            return self._undamped(state, channel, every)
         if self.body.goal.spin is not None:
             gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
-            return np.asarray(np.abs(self.body.goal.spin - self.body.spin - gained) / bounds[Part.SPIN])
-        if self.body.goal.axis is None:
-            trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
-            kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
-            left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
-            return np.asarray(np.maximum(left, 0.0) / bounds[Part.NUTATION])
-        way = float(self.model.course(state)[1])
-        full, _ = self.model.full_pulses(state, channel, widths, counts)
-        length = full * self.model.turned_by(channel, widths, self.body.spin)
-        return np.asarray(np.abs(length - way) / bounds[Part.DISTANCE])
+            lacks = np.abs(self.body.goal.spin - state.spin - gained) / self._most[Part.SPIN]
+        else:
+            full, _ = self.model.full_pulses(state, channel, widths, counts)
+            length = full * self.model.turned_by(channel, widths, self.body.spin)
+            lacks = np.abs(length - self.model.course(state)[1]) / self._most[Part.DISTANCE]
+        return np.asarray(lacks).reshape(-1, len(widths) * len(counts))
 
-    def _chosen(self, state: BlockState, channel: Channel, every: int, index: NDArray[np.int64]) -> Iterator[Trial]:
-        """The blocks of the widths and numbers with an ``index`` (k, 2), after every wait and at the best delays."""
-        if len(index):
-            widths = commandable_widths(self.commands, channel)[index[:, 0]]
-            counts = self._counts(state, every)[index[:, 1]]
-            for wait in self._waits(state, self.earliest, WAITS if abs(state.phasor) > 0.0 else 1):
-                yield self._at_delays(state, channel, wait, widths, counts, every)
+    def _undamped(self, state: BlockState, channel: Channel, every: int) -> Array:
+        """Nutation that is left at least, as in `_short_by`."""
+        widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
+        trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
+        kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
+        left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
+        return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(-1, len(widths) * len(counts))
 
-    def _rest(self, before: BlockSequence) -> Iterator[tuple[Channel, Trial]]:
-        """Blocks that go the rest of the way, or take the nutation that is left."""
-        state, least = before.state, self.pause if before.blocks else self.earliest
-        if self.small:
-            yield from self._grid(state, least)
-            return
-        _, way = self.model.course(state)
-        for channel in self.channels:
-            widths = evenly(commandable_widths(self.commands, channel), MOST_WIDTHS)
-            if not len(widths):
+    def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
+        """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is left."""
+        step = TOGETHER if self.model.steady and not len(self.dark[0]) else 1
+        least, sequences = self.pause if before and before[0].blocks else self.earliest, list[BlockSequence]()
+        for begin in range(0, len(before), step):
+            some = before[begin : begin + step]
+            state = self._motions(some)
+            trials = self._grid(state, least) if self.small else self._rest(state, least)
+            sequences += self.behind(some, state, trials, few)
+        return sequences
+
+    def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
+        """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and of few pulses."""
+        waits = self._waits(state, least, LATER_WAITS)
+        for channel, every in self._kinds():
+            lacks, counts = self._short_by(state, channel, every), self._counts(state, every)
+            if not lacks.size:
                 continue
-            step = self.model.turned_by(channel, widths, float(state.spin))
-            full = np.divide(float(way), step, out=np.zeros_like(step), where=step > 0.0)  # none of a torque along spin
-            near = self.model.pulses(state, channel, widths, full, self.commands.max_count)
-            near = np.rint(near)[:, None] + np.arange(-1, 2)
-            few = np.broadcast_to(np.arange(1, 5), (len(widths), 4))
-            counts = np.concatenate([near, few], axis=1).clip(1, self.commands.max_count).astype(int)
-            for every in self.commands.every:
-                if not self._spaced(every):
-                    continue
-                for wait in self._waits(state, least, LATER_WAITS):
-                    yield channel, self._at_delays(state, channel, wait, widths[:, None], counts, every)
+            widths = commandable_widths(self.commands, channel)
+            spent = np.multiply.outer(acts(channel, widths).on_time, counts).ravel()
+            gentle = np.tile(counts <= FEW, len(widths))
+            damping = np.where(gentle, self._undamped(state, channel, every), np.inf)
+            nearest = np.concatenate([_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1)
+            some = evenly(np.flatnonzero(gentle), CLOSEST if len(lacks) > 1 else FEW * CLOSEST)
+            for index in (nearest, _least(damping, CLOSEST), some[None]):
+                yield channel, self._at_delays(state, channel, waits, index, every)
 
-    def _parts(self, start: BlockSequence) -> Iterator[BlockSequence]:
+    def _parts(self) -> list[BlockSequence]:
         """First blocks that go a part of the way to the target."""
-        heading, way = self.model.course(start.state)
-        every = next((spins for spins in self.commands.every if self._spaced(spins)), None)
+        start, sequences = self.model.start, list[BlockSequence]()
+        heading, way = self.model.course(start)
+        every = next(filter(self._spaced, self.commands.every), None)
         if self.body.goal.axis is None or every is None:
-            return
+            return sequences
         for channel in self.channels:
-            widths = evenly(commandable_widths(self.commands, channel), 3)
-            for width in widths.tolist():
-                step = float(self.model.turned_by(channel, width, float(start.state.spin)))
+            for width in evenly(commandable_widths(self.commands, channel), 3).tolist():
+                step = float(self.model.turned_by(channel, width, start.spin))
                 delay = self.commanded(self.model.delay(channel, heading, width))
-                first = float(start.state.sun_pulse) + float(delay) + float(acts(channel, width).over)
+                first = start.sun_pulse + float(delay) + float(acts(channel, width).over)
                 fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
                 counts = np.rint([*SHARES * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
-                for count in np.unique(counts.clip(1, self.commands.max_count).astype(int)).tolist():
-                    for wait in self._waits(start.state, self.earliest, 1):
-                        trial = Trial(wait, delay, width, count, every)
-                        yield from self.behind(start, iter([(channel, trial)]), few=1)
+                counts = np.unique(counts.clip(1, self.commands.max_count).astype(int))
+                rows = np.meshgrid(self._waits(start, self.earliest, 1), counts)
+                wait, count = (row.reshape(-1, 1, 1) for row in rows)
+                sequences += self.behind([START], start, [(channel, Trial(wait, delay, width, count, every))], 1)
+        return sequences
 
     @cached_property
     def small(self) -> bool:
@@ -351,24 +361,22 @@ class BlockSearch:
         return np.arange(1, min(self.commands.max_count, self.allowed) + 1)
 
     def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
-        """All blocks of each channel, from ``least`` Sun pulses on: by wait, delay, width and number of pulses."""
-        waits = np.array(self._waits(state, least, LATER_WAITS))[:, None, None, None]
-        for channel in self.channels:
-            widths = commandable_widths(self.commands, channel)[:, None]
-            parts = waits, self._delays[:, None, None], widths, self._all_counts
-            shape = np.broadcast_shapes(*map(np.shape, parts))
-            wait, delay, width, count = (np.broadcast_to(part, shape) for part in parts)
-            for every in filter(self._spaced, self.commands.every):
-                yield channel, Trial(wait, delay, width, count, every)
+        """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by delay."""
+        for channel, every in self._kinds():
+            widths = commandable_widths(self.commands, channel)
+            parts = np.meshgrid(self._waits(state, least, LATER_WAITS), widths, self._all_counts)
+            wait, width, count = (part.reshape(-1, 1) for part in parts)
+            yield channel, Trial(wait, self._delays, width, count, every)
 
-    def _all_firsts(self, start: BlockSequence) -> list[BlockSequence]:
+    def _all_firsts(self) -> list[BlockSequence]:
         """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
-        firsts = self.behind(start, self._grid(start.state, self.earliest), few=ALL_FIRSTS)
+        start = self.model.start
+        firsts = self.behind([START], start, self._grid(start, self.earliest), ALL_FIRSTS)
         return sorted(firsts, key=lambda first: first.rank[1])[:ALL_FIRSTS]
 
     def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
-        after = np.floor((self.dark[1] - float(state.sun_pulse)) / self.model.turn)
+        after = np.floor((self.dark[1] - np.min(state.sun_pulse)) / self.model.turn)
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
@@ -397,25 +405,26 @@ class BlockSearch:
         return dark
 
     def _at_delays(
-        self, state: BlockState, channel: Channel, wait: int, widths: Array, counts: NDArray[np.int64], every: int
+        self, state: BlockState, channel: Channel, waits: Sequence[int], index: NDArray[np.intp], every: int
     ) -> Trial:
-        """The blocks at the delays that serve the heading best, and at those that serve the nutation best."""
-        widths, counts = np.broadcast_arrays(widths, counts)
-        chosen = []
-        if self.body.goal.axis is not None:
-            heading, _ = self.model.course(state)
-            chosen.append(self.model.delay(channel, heading, widths))
-        if abs(state.phasor) > 0.0:
-            chosen.append(self.model.damping_delay(state, channel, Trial(wait, 0.0, widths, counts, every)))
-        if not chosen:
-            chosen.append(np.zeros(widths.shape))
+        """Blocks after each of the ``waits`` at the delays that serve the heading best, and the nutation best.
+
+        ``index`` (k, m): widths and numbers as in `_short_by`, for each of k motions.
+        """
+        counts = self._counts(state, every)
+        widths = commandable_widths(self.commands, channel)[index // len(counts)][:, None, :, None]
+        wait, count = np.array(waits)[:, None, None], counts[index % len(counts)][:, None, :, None]
+        trial = Trial(wait, self._delays, widths, count, every)
         if len(self._delays) <= ALL_DELAYS:
-            delay = np.broadcast_to(self._delays, (*widths.shape, len(self._delays)))
-        else:  # and none at all: what is best just before a Sun pulse
-            near = [np.floor(delay / self.commands.delay_step)[..., None] + AROUND for delay in chosen]
-            steps = np.concatenate([*near, np.zeros((*widths.shape, 1))], axis=-1)
-            delay = self.commanded(steps * self.commands.delay_step)
-        return Trial(wait, delay, widths[..., None], counts[..., None], every)
+            return trial
+        best = list[Array]()
+        if self.body.goal.axis is not None:
+            best.append(self.model.delay(channel, self.model.course(state)[0], widths))
+        if np.any(state.phasor):
+            best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
+        steps = [np.floor(delay / self.commands.delay_step) + around for delay in best for around in AROUND]
+        alike = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
+        return trial._replace(delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step))
 
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
@@ -423,98 +432,93 @@ class BlockSearch:
         most = math.floor(longest / step * (1.0 + 1e-12))
         return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
 
-    def flown(self, sequence: BlockSequence) -> FlownSequence:
-        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
-        if sequence.blocks in self._flights:
-            return self._flights[sequence.blocks]
-        schedule = fired(self.body, sequence.blocks)
-        left = left_by(propagation.flown(self.body, schedule))
-        share = max(float(self.share(bound, left)) for bound in self.bounds)
-        missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for another Sun pulse
-        rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
-        self._flights[sequence.blocks] = FlownSequence(rank, schedule, sequence)
-        return self._flights[sequence.blocks]
-
-    def doubted(self, flights: list[FlownSequence]) -> None:
-        """Fly sequences cheaper than the best of ``flights``, the cheapest first, until one complies; add them."""
-        best = min((flight.rank for flight in flights if not flight.rank[0]), default=None)
-        most = math.inf if best is None or best[1] > 0.0 else best[2] * (1.0 - SAME_COST)
-        known = {flight.sequence.blocks for flight in flights}
-        cheaper = (sequence for sequence in self.doubtful if sequence.rank[1] < most and sequence.blocks not in known)
-        for sequence in islice(cheaper, DOUBTS if self.small else FLOWN):
+    def doubted(self) -> None:
+        """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""
+        most = self.flights.known * (1.0 - SAME_COST)
+        cheaper = [each for each in self.doubtful if each.rank[1] < most and each.blocks not in self.flights.of]
+        for sequence in self.flights.fired(cheaper[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 return
             with suppress(Infeasible):
-                flights.append(self.flown(sequence))
-                if flights[-1].rank[:2] == (False, 0.0):
+                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return
 
-    def nearer(self, flights: Sequence[FlownSequence]) -> list[BlockSequence]:
-        """Neighbours of the best of ``flights`` that leave least where the closed form errs as it does for those.
+    def nearer(self) -> list[BlockSequence]:
+        """Neighbours of the best of the flights that leave least where the closed form errs as it does for those.
 
         Nutation on the way, which that form leaves out, is much the same then.
         """
-        named, sequences = {channel.name: channel for channel in self.channels}, list[BlockSequence]()
-        distinct = {flight.sequence.blocks: flight for flight in sorted(flights, key=lambda flight: flight.rank)}
-        best = of_each_kind([flight.sequence for flight in distinct.values()])
-        for flight in (distinct[each.blocks] for each in best[:CORRECTED]):
+        sequences = list[BlockSequence]()
+        best = of_each_kind(flight.sequence for flight in self.flights.all)
+        for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
             *earlier, last = flight.sequence.blocks
-            state, number, channel = self.model.start, 1, named[last.channel]
-            for block in earlier:
-                trial = Trial(block.first - number, block.delay, block.width, block.count, block.every)
-                state = self.model.after(state, named[block.channel], trial)
-                number = block.first + (block.count - 1) * block.every + 1
-            before = BlockSequence(tuple(earlier), state, (math.inf, math.inf, math.inf))
-            off = self.model.apart(flight.sequence.state, propagation.flown(self.body, flight.schedule))
-            trials = iter([(channel, self._around(before, channel, last, number))])
-            sequences += self.behind(before, trials, off=off)
-        known = {flight.sequence.blocks for flight in flights}
-        other = (sequence for sequence in sequences if sequence.blocks not in known)
-        ranked = _by_blocks(sorted(other, key=lambda sequence: sequence.rank))
-        chosen = (*islice(ranked.values(), FLOWN // 2), *of_each_kind(ranked.values()))
-        return [self._in_form(sequence) for sequence in _by_blocks(chosen).values()]
+            before, state = START._replace(blocks=tuple(earlier)), self.state(tuple(earlier))
+            off = self.model.apart(self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule))
+            trials = [(self._named[last.channel], self._around(before, last))]
+            sequences += self.behind([before], state, trials, off=off)
+        other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
+        ranked = by_blocks(sorted(other, key=lambda sequence: sequence.rank))
+        clear = sorted(ranked.values(), key=lambda sequence: sequence.share)[: FLOWN // 2]
+        chosen = (*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values()))
+        return [self._in_form(sequence) for sequence in by_blocks(chosen).values()]
 
     def _in_form(self, sequence: BlockSequence) -> BlockSequence:
         """The sequence, ranked by the closed form alone."""
-        left = self.model.left(sequence.state)
-        share = max(float(self.share(bound, left)) for bound in self.bounds)
+        share = float(self.flights.share(self.model.left(self.state(sequence.blocks))))
         return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
 
-    def _around(self, before: BlockSequence, channel: Channel, last: Block, number: int) -> Trial:
-        """Blocks about as long and as late as the ``last`` one, from the Sun pulse of that ``number`` on."""
+    def _around(self, before: BlockSequence, last: Block) -> Trial:
+        """Blocks about as long and as late as the ``last`` one, behind those ``before``."""
+        channel, number = self._named[last.channel], _following(before.blocks)
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
         widths = np.union1d(evenly(every, MOST_WIDTHS), every[max(at - 3, 0) : at + 4])
         as_long = np.rint(last.count * acts(channel, np.array([last.width])).on_time / acts(channel, widths).on_time)
-        least = self.pause if before.blocks else self.earliest
         waits = np.arange(-1, 2) + (last.first - number)
+        waits = waits[waits >= (self.pause if before.blocks else self.earliest)]
         delays = self.commanded(np.asarray(last.delay + np.arange(-3, 4) * self.commands.delay_step, dtype=np.float64))
         most = min(self.commands.max_count, self.allowed)
         counts = (as_long[:, None] + np.arange(-2, 3)).clip(1, most).astype(int)
-        waits = waits[waits >= least][:, None, None, None]
-        shape = np.broadcast_shapes(waits.shape, (len(delays), 1, 1), counts.shape)
-        parts = waits, delays[:, None, None], widths[:, None], counts
-        wait, delay, width, count = (np.broadcast_to(part, shape) for part in parts)
-        return Trial(wait, delay, width, count, last.every)
+        parts = np.broadcast_arrays(waits[:, None, None], widths[:, None], counts)
+        wait, width, count = (part.reshape(-1, 1) for part in parts)
+        return Trial(wait, delays, width, count, last.every)
 
 
-def _by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
-    """Sequences by their blocks, the last of equal ones at the place of the first."""
-    return {sequence.blocks: sequence for sequence in sequences}
+def _following(blocks: Sequence[Block]) -> int:
+    """Number of the first Sun pulse after blocks."""
+    return blocks[-1].sun_pulses[-1] + 1 if blocks else 1
 
 
-def of_each_kind(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
-    """The first sequence of each kind: flights may differ where closed forms do not."""
-    kinds: dict[tuple[tuple[str, int], ...], BlockSequence] = {}
-    for sequence in ranked:
-        kinds.setdefault(tuple((block.channel, block.every) for block in sequence.blocks), sequence)
-    return list(kinds.values())
+def _least(keys: Array, most: int) -> NDArray[np.intp]:
+    """Indices of the ``most`` least keys of each row, in any order."""
+    rows, count = keys.shape
+    if most >= count:
+        return np.tile(np.arange(count), (rows, 1))
+    return np.asarray(np.argpartition(keys, most - 1, axis=1)[:, :most])
+
+
+def _least_of_all(keys: Array, most: int) -> NDArray[np.intp]:
+    """Indices into all keys of the ``most`` least of each row, but for infinite ones."""
+    index = (_least(keys, most) + keys.shape[1] * np.arange(len(keys))[:, None]).ravel()
+    return np.asarray(index[np.isfinite(keys.ravel()[index])])
+
+
+def _in_order(shares: Array, cost: Array) -> Array:
+    """Keys that put first what keeps its bounds, by cost, and then what does not, by the share of a bound."""
+    dearest = float(np.max(cost, where=np.isfinite(cost), initial=1e-300))
+    return np.where(shares <= 1.0, cost / dearest - 2.0 + 1e-9 * shares, shares)
 
 
 def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
-    """Sequences that leave least, and the front of miss against cost: ``most`` of each."""
-    ranked, front = sorted(sequences, key=lambda sequence: sequence.rank), list[BlockSequence]()
+    """Sequences that leave least, and a front of miss against cost: ``most`` of each."""
+    ranked = of_each_kind(sorted(sequences, key=lambda sequence: sequence.rank), "width", "count", "every")
+    return list(by_blocks((*ranked[:most], *_front(ranked)[:most])).values())
+
+
+def _front(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
+    """Of sequences in order of their rank those that cost distinctly less than all before them."""
+    front = list[BlockSequence]()
     for sequence in ranked:
-        if not front or sequence.rank[1] < front[-1].rank[1]:
+        if not front or sequence.rank[1] < CHEAPER * front[-1].rank[1]:
             front.append(sequence)
-    return list(_by_blocks((*ranked[:most], *front[:most])).values())
+    return front

@@ -13,8 +13,9 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
+from nutdamp.schemes.block_flights import FLOWN, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockSearch, FlownSequence
+from nutdamp.schemes.block_search import BLOCKS, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
@@ -26,7 +27,10 @@ from nutdamp.spacecraft.schedule import Schedule
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
-    form, flown = search.model.left(chosen.sequence.state), left_by(propagation.flown(search.body, chosen.schedule))
+    form, flown = (
+        search.model.left(search.state(chosen.sequence.blocks)),
+        left_by(propagation.flown(search.body, chosen.schedule)),
+    )
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
     if first:
         return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
@@ -46,7 +50,8 @@ def off_ticks(tick: float | None, commands: Commands) -> tuple[Note, ...]:
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
     """Keys of the file that keep the blocks ``chosen``, of up to ``most``, from leaving less."""
     left = left_by(propagation.flown(search.body, chosen.schedule))
-    missed = {bound.part: bound.most for bound in search.bounds if float(search.share(bound, left)) > 1.0}
+    shares = search.flights.shares(left)
+    missed = {bound.part: bound.most for bound in search.flights.bounds if float(shares[bound.part]) > 1.0}
     more = [note("more-blocks", blocks=BLOCKS)] * (len(chosen.schedule.blocks) == most < BLOCKS)
     named = [*more, *too_coarse(search.model, search.channels, missed), *used_up(search.body, chosen.schedule)]
     return named or [note("finer-commands")]
@@ -90,7 +95,7 @@ def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
         yield note("larger-count", count=commands.max_count)
 
 
-FLOWN_PULSES = 1000
+FLOWN_PULSES = 2000
 """Pulses that are flown, after which no further sequence is."""
 
 ROUNDS = 3
@@ -114,24 +119,25 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = BlockSearch(spacecraft, channels, commands)
-    flights: list[FlownSequence] = []
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(options.max_blocks or BLOCKS)
     for round_ in range(ROUNDS + 1):
-        for number, sequence in enumerate(best if round_ == 0 else search.nearer(flights)):
-            met = any(flight.rank[:2] == (False, 0.0) for flight in flights)
-            pulses = sum(len(flight.schedule) for flight in flights)
-            if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or (met and number >= FLOWN * (round_ == 0)):
+        if round_ > 0 and search.flights.complies:
+            break
+        for number, sequence in enumerate(search.flights.fired(best if round_ == 0 else search.nearer())):
+            pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
+            enough = search.flights.complies and number >= FLOWN * (round_ == 0)
+            if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or enough:
                 break
             try:
-                flights.append(search.flown(sequence))
+                search.flights.flown(sequence)
             except Infeasible as reason:
-                why = f"the best block in closed form cannot be flown: {reason}" if not flights else why
-    search.doubted(flights)
-    if not flights:
+                why = f"the best block in closed form cannot be flown: {reason}"
+    search.doubted()
+    if not search.flights.of:
         raise Infeasible(why)
-    chosen = _cheapest(flights)
+    chosen = _cheapest(search.flights.all)
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first), *off_ticks(tick, commands)]
     if chosen.rank[1] > 1.0:

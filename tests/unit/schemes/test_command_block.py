@@ -26,8 +26,9 @@ from nutdamp.physics import attitude
 from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
+from nutdamp.schemes.block_flights import FLOWN, BlockFlights, BlockSequence, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
-from nutdamp.schemes.block_search import FLOWN, BlockSearch, BlockSequence, FlownSequence
+from nutdamp.schemes.block_search import BlockSearch
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
@@ -138,10 +139,9 @@ def test_nutation_on_the_way_is_reckoned_with_where_blocks_would_miss(seed: int,
     search = BlockSearch(body, usable(body), body.commands)
 
     def shares() -> Iterator[float]:
-        single = search._single(BlockSequence((), search.model.start, (math.inf,) * 3))
-        for found in sorted(single, key=lambda one: one.share)[:200]:
+        for found in sorted(search._single(), key=lambda one: one.share)[:200]:
             with suppress(Infeasible):
-                yield search.flown(found).rank[1]
+                yield search.flights.flown(found).rank[1]
 
     assert planned(body, ONE, met=False).severity <= 1.02 * max(min(shares()), 1.0)
 
@@ -157,13 +157,13 @@ def test_more_blocks_and_smaller_pulses_are_tried_where_one_block_does_not_do(mo
     assert len(single.pulses.blocks) == 1
     assert len(plan.pulses.blocks) > 1 or plan.meets_requirement
     assert plan.severity <= single.severity
-    severities, flown = list[float](), BlockSearch.flown
+    severities, flown = list[float](), BlockFlights.flown
 
-    def counted(self: BlockSearch, found: BlockSequence) -> FlownSequence:
+    def counted(self: BlockFlights, found: BlockSequence) -> FlownSequence:
         severities.append(flown(self, found).rank[1])
         return flown(self, found)
 
-    monkeypatch.setattr(BlockSearch, "flown", counted)
+    monkeypatch.setattr(BlockFlights, "flown", counted)
     plan = planned(replace(some_body(2), requirement=within(0.1, 0.1)), met=False)
     assert len(severities) > FLOWN
     assert plan.severity == pytest.approx(min(severities))
@@ -287,7 +287,7 @@ def test_no_other_block_is_better_is_said_of_the_best_one_alone() -> None:
         assert body.commands is not None
         search = BlockSearch(body, body.channels, body.commands)
         best, plan = search.best(1), planned(body, ONE, met=False)
-        flights = [search.flown(found) for found in best]
+        flights = [search.flights.flown(found) for found in best]
         assert scope_note(search, flights[0], first=True).code == "blocks-compared"
         assert scope_note(search, flights[-1], first=False).code == "blocks-flown"
         assert plan.pulses.blocks == min(flights, key=lambda flight: flight.rank).sequence.blocks
