@@ -160,8 +160,11 @@ SCHEME = "optimal"
 STEP = 1e-30
 """Imaginary step of derivatives."""
 
-MARGINS = (1.0, 0.75, 0.5, 1.3)
-"""Over the sigmas of the probability required: margins that are tried first."""
+MARGINS = (1.0, 1.3, 0.75, 0.5)
+"""Over the sigmas of the probability required: margins that are tried first, until enough cases comply."""
+
+CLOSE = 0.985
+"""Severity of the last case that must comply from which a margin is small enough."""
 
 LESSER = (1.0, 0.8, 0.6)
 """Multiples of the largest feasible margin, where that is not enough."""
@@ -177,6 +180,16 @@ TRYING = 101
 
 ROUNDS = 4
 """Times that the margin is adapted."""
+
+TRIES, AIMED, NEAREST, FACTOR = 4, 0.995, 0.1, 0.8
+"""Margins tried once enough cases comply with one; the level aimed at; how near the next one comes to those before, of
+their distance; and its share of the least one, where no lower one is known."""
+
+ROUNDING = 1e-9
+"""Of a number of cases."""
+
+AGAINST = "against dispersions"
+"""Label of plans with a margin."""
 
 REPAIRS = 24
 """Times that a burn which breaks a limit is moved elsewhere."""
@@ -267,6 +280,15 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
     yield from search.plans()
 
 
+def level(results: Results) -> float:
+    """Severity of the last case that must comply: 1 or less where enough do, as far as it is known."""
+    last = int((1.0 - results.probability) * results.done + ROUNDING)
+    severities = results.worst.severities
+    if results.study.model.spacecraft.keep or last >= len(severities):
+        return 1.0 if results.meets_requirement else math.inf
+    return float(severities[last])
+
+
 class _MarginSearch:
     """Search for one spacecraft."""
 
@@ -320,15 +342,22 @@ class _MarginSearch:
         return math.sqrt(-2.0 * math.log(max(1.0 - self.probability, 1e-9)))
 
     def plans(self) -> Iterator[tuple[str, Plan]]:
-        """Plans by the first margins, then by those between which the share required, or the largest, lies."""
-        seen: dict[float, float] = {}
-        first = self._first()
-        for number in range(len(first) + ROUNDS):
-            margin = first[number] if number < len(first) else self._next(seen)
-            seen[margin] = 0.0
-            for variant, plan, share in self.tried(margin):
-                seen[margin] = share
+        """Plans by margins between which the least lies with which enough cases comply, or the most cases do."""
+        seen: dict[float, tuple[float, float]] = {}
+        first, closer = self._first(), 0
+        while closer < TRIES:
+            if any(level <= 1.0 for _, level in seen.values()):
+                margin, closer = self._between(seen), closer + 1
+            elif len(seen) < len(first) + ROUNDS:
+                margin = first[len(seen)] if len(seen) < len(first) else self._next(seen)
+            else:
+                return
+            seen[margin] = 0.0, math.inf
+            for variant, plan, results in self.tried(margin):
+                seen[margin] = results.met_fraction or 0.0, level(results)
                 yield variant, plan
+            if CLOSE <= seen[margin][1] <= 1.0:
+                return
 
     def _first(self) -> list[float]:
         """First margins: about that of the probability, or up to the largest that can be kept."""
@@ -341,27 +370,32 @@ class _MarginSearch:
             low, high = (middle, high) if chance.solve(middle).excess <= KEPT else (low, middle)
         return [self.sigmas, *(factor * low for factor in LESSER if low > 0.0)]
 
-    def _next(self, seen: dict[float, float]) -> float:
-        """Another margin: towards the least with which as many cases comply as must, else beside the best."""
-        enough = [margin for margin, share in seen.items() if share >= self.probability]
-        if enough:
-            least = min(enough)
-            return 0.5 * (least + max((margin for margin in seen if margin < least), default=0.0))
-        best = max(seen, key=lambda margin: seen[margin])
+    def _between(self, seen: dict[float, tuple[float, float]]) -> float:
+        """Margin towards the least with which enough cases comply, by the levels beside it."""
+        least = min(margin for margin, (_, level) in seen.items() if level <= 1.0)
+        most = max((margin for margin in seen if margin < least), default=0.0)
+        over, under = seen[most][1] if most else math.inf, seen[least][1]
+        if math.isinf(over):
+            return max(FACTOR * least, 0.5 * (most + least))
+        share = min(max((over - AIMED) / (over - under), NEAREST), 1.0 - NEAREST)
+        return most + share * (least - most)
+
+    def _next(self, seen: dict[float, tuple[float, float]]) -> float:
+        """Another margin, beside the one with which most cases comply."""
+        best = max(seen, key=lambda margin: seen[margin][0])
         below = max((margin for margin in seen if margin < best), default=0.5 * best)
         above = min((margin for margin in seen if margin > best), default=1.5 * best)
         return 0.5 * (best + (below if best - below > above - best else above))
 
-    def tried(self, margin: float) -> Iterator[tuple[str, Plan, float]]:
-        """Plan of a margin, if there is one, and its share of complying cases."""
+    def tried(self, margin: float) -> Iterator[tuple[str, Plan, Results]]:
+        """Plan of a margin, if there is one, in the trial cases."""
         schedule = self.schedule(margin)
         if schedule is None:
             return
         plan = planning.judged(self.spacecraft, SCHEME, schedule, self.options)
         if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
             results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
-            share = results.met_fraction or 0.0
-            yield f"against dispersions, {margin:.3g} σ", plan, share
+            yield f"{AGAINST}, {margin:.3g} σ", plan, results
 
     def _few(self, solution: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""

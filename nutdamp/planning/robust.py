@@ -7,8 +7,10 @@ and, where `optimal` is among the schemes, its earliest ends, for errors of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -17,7 +19,8 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.errors import Infeasible
-from nutdamp.montecarlo.study import SAMPLES, SEED, Results, run, study_of, threads_here
+from nutdamp.montecarlo.statistics import ROWS, vectors
+from nutdamp.montecarlo.study import EARLY, SAMPLES, SEED, Results, run, study_of, threads_here
 from nutdamp.planning import chance_plan
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
@@ -26,9 +29,10 @@ from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Cases, PlanCandidate, cases_of, entered, equal_from, fly_all
 from nutdamp.schemes.catalogue import Options
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
-from nutdamp.spacecraft.model import Spacecraft, required_share
-from nutdamp.spacecraft.requirements import SAME_COST
+from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
 from nutdamp.spacecraft.schedule import channel_pulse
 
 SHORTEST = 0.8
@@ -39,6 +43,9 @@ HALVINGS, FINER = 7, 3
 
 FEW = 8
 """Pulses up to which each is shortened alone."""
+
+TRIMS, RESERVE = 4, 0.5
+"""Trimmed plans that are flown, and by how many sigmas of their number fewer cases are predicted to fail than may."""
 
 
 def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
@@ -62,7 +69,7 @@ def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[
     low, high, best = SHORTEST, 1.0, plan
     for _ in range(halvings):
         middle = 0.5 * (low + high)
-        shorter = _scaled(plan, which, middle)
+        shorter = _scaled(plan, [middle if index in which else 1.0 for index in range(len(plan.pulses))])
         if shorter is not None and complies(shorter):
             best, high = shorter, middle
         else:
@@ -70,13 +77,13 @@ def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[
     return best
 
 
-def _scaled(plan: Plan, which: list[int], share: float) -> Plan | None:
-    """Plan with some of its on-times at a ``share``; None where it breaks a limit or its requirement."""
+def _scaled(plan: Plan, ratios: Sequence[float]) -> Plan | None:
+    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement."""
     body = plan.spacecraft
     channels = {channel.name: channel for channel in body.channels}
     pulses = tuple(
-        channel_pulse(channels[pulse.channel], pulse.t, share * pulse.on_time) if index in which else pulse
-        for index, pulse in enumerate(plan.pulses)
+        pulse if ratio == 1.0 else channel_pulse(channels[pulse.channel], pulse.t, ratio * pulse.on_time)
+        for pulse, ratio in zip(plan.pulses, ratios, strict=True)
     )
     with suppress(Infeasible):
         scaled = planning.judged(body, plan.scheme, replace(plan.pulses, pulses=pulses), plan.options)
@@ -106,6 +113,7 @@ class Fresh(NamedTuple):
 
     cases: Cases
     interval: tuple[float, float]
+    results: Results | None = None
 
     @property
     def met(self) -> float:
@@ -206,7 +214,7 @@ Attempt = Callable[[], Iterable[tuple[str, Plan]]]
 def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
     """Attempts of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    planned, varied = list[Attempt](), list[Attempt]()
+    planned, margins, varied = list[Attempt](), list[Attempt](), list[Attempt]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
@@ -214,9 +222,9 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         varied.append(partial(_alignments, body, base.scheme, options))
         varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
+            margins.append(partial(chance_plan.plans, body, options))
             varied.append(partial(_early, body, options))
-            varied.append(partial(chance_plan.plans, body, options))
-    return [*planned, *varied]
+    return [*planned, *margins, *varied]
 
 
 def compare(
@@ -234,9 +242,11 @@ def compare(
     body = comparison.spacecraft
     probability = required_share(body.requirement)
     entries: dict[object, PlanCandidate] = {}
+    ranks: RobustComparison | None = None
     with work.budget("the robust plans", work.FRONTS):
         for number, trial in enumerate(trials):
             watch(number)
+            margins = False
             for variant, plan in () if work.exhausted() else trial():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
@@ -245,37 +255,150 @@ def compare(
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
+                margins = margins or variant.startswith(chance_plan.AGAINST)
+                known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
-                    entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
+                    if known is not None and known.cases.requested == samples:
+                        entries[kind] = copy(known)
+                        entries[kind].variant = variant
+                    else:
+                        entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
+            if margins:
+                ranks = _flown(comparison, entries, samples, probability)
+                if ranks.meets_requirement and not ranks.lucky:  # no variant of a scheme costs less
+                    return _trimmed(ranks)
+    return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
+
+
+def _flown(
+    comparison: Comparison,
+    entries: dict[object, PlanCandidate],
+    samples: int,
+    probability: float,
+    watch: Callable[[], None] = lambda: None,
+) -> RobustComparison:
+    """Comparison of the ``entries`` in all cases, where they may be chosen, and the choice."""
     candidates = list(entries.values())
     usual = None if comparison.recommended is None else entries.get(_kind(comparison.recommended))
     always = [candidate for candidate in candidates if candidate is usual]
-    fly_all(candidates, samples, probability, always, partial(watch, len(trials)))
+    fly_all(candidates, samples, probability, always, watch)
     ranks = ranked(comparison, candidates, samples, probability)
-    return ranks if ranks.chosen is None else _trimmed(_checked(ranks, candidates))
+    return ranks if ranks.chosen is None else _checked(ranks, candidates)
 
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
     """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too."""
-    chosen, samples, required = ranks.chosen, ranks.samples, ranks.probability
-    if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky:
+    chosen, required = ranks.chosen, ranks.probability
+    if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky or ranks.fresh is None:
         return ranks
-    flown: dict[Plan, tuple[PlanCandidate, Fresh]] = {}
+    best, predicted = _Flown(chosen, ranks.fresh), False
+    while not predicted:  # again from nearer by
+        shorter, predicted = _shorter(best, f"{chosen.variant}, trimmed", ranks)
+        if shorter is None:
+            break
+        best = shorter
+    if best.candidate is chosen:
+        return ranks
+    candidates = best.candidate, *ranks.candidates
+    return replace(ranks, chosen=best.candidate, candidates=candidates, ground=Ground.COST, fresh=best.fresh)
 
-    def complies(plan: Plan) -> bool:
+
+def _shorter(long: _Flown, variant: str, ranks: RobustComparison) -> tuple[_Flown | None, bool]:
+    """Plan with shorter on-times, None where nothing is gained, and whether its flight was as predicted.
+
+    Ends of cases are predicted to move with the nominal one, and where they are not known flown for each try; where too
+    few cases comply in flight, on-times are taken between both plans, as far as the ends between theirs allow.
+    """
+    plan, samples, required = long.candidate.plan, ranks.samples, ranks.probability
+
+    def flown(shorter: Plan) -> _Flown | None:
         with suppress(Infeasible):
-            trimmed = entered(plan, f"{chosen.variant}, trimmed", study_of(plan.spacecraft, plan.pulses), samples)
-            fly_all([trimmed], samples, required)
-            fresh = _fresh(trimmed, samples) if trimmed.cases.decided and (trimmed.met or 0.0) >= required else None
-            if fresh is not None and fresh.met >= required:
-                flown[plan] = trimmed, fresh
-        return plan in flown
+            candidate = entered(shorter, variant, study_of(shorter.spacecraft, shorter.pulses), samples)
+            fly_all([candidate], samples, 0.0)
+            fresh = _fresh(candidate, samples)
+            return None if fresh is None else _Flown(candidate, fresh)
+        return None
 
-    best = trimmed(chosen.plan, complies)
-    if best is chosen.plan or best.pulses.cost > chosen.plan.pulses.cost * (1.0 - SAME_COST):
-        return ranks
-    robust, fresh = flown[best]
-    return replace(ranks, chosen=robust, candidates=(robust, *ranks.candidates), ground=Ground.COST, fresh=fresh)
+    def enough(short: _Flown | None) -> bool:
+        return short is not None and min(short.candidate.met or 0.0, short.fresh.met) >= required
+
+    nominal = _nominal(plan) if long.known else None
+    if nominal is None:
+        best = trimmed(plan, lambda shorter: enough(flown(shorter)))
+    else:
+        best = trimmed(plan, lambda shorter: long.complies((_nominal(shorter) - nominal,) * 2))
+    share = 1.0
+    for tries in range(TRIMS):
+        shorter = _between(plan, best, share)
+        if shorter is None or shorter.pulses.cost > plan.pulses.cost * (1.0 - SAME_COST):
+            break
+        short = flown(shorter)
+        if short is None or enough(short):
+            return short, tries == 0
+        if not short.known:
+            break
+        share *= long.share(short)
+    return None, True
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """A candidate and its result in fresh cases."""
+
+    candidate: PlanCandidate
+    fresh: Fresh
+
+    @property
+    def known(self) -> bool:
+        """True if the end vectors of all cases are known, and decide on compliance alone."""
+        body, fresh = self.candidate.plan.spacecraft, self.fresh.results
+        alone = not body.keep and body.tank is None and body.goal.spin is None
+        return alone and self.candidate.results is not None and fresh is not None and fresh.done <= EARLY
+
+    @property
+    def ends(self) -> list[Vector]:
+        """End vectors (10, n) of the cases of both draws, see `statistics.vectors`."""
+        every = (self.candidate.results, self.fresh.results)
+        return [results.early[:, : results.done] for results in every if results is not None]
+
+    def complies(self, moved: Sequence[Vector]) -> bool:
+        """True if with the ends of each draw ``moved`` by so much the required share of it complies."""
+        body = self.candidate.plan.spacecraft
+        aim = 2 if requirements.aim(body) is Part.SHIFT else 5
+        for ends, by in zip(self.ends, moved, strict=True):
+            there = ends + by
+            chord = np.sqrt((there[aim : aim + 3] ** 2).sum(axis=0))
+            left = Left(np.arctan(np.hypot(there[0], there[1])), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)), 0.0)
+            may = (1.0 - required_share(body.requirement)) * there.shape[1]
+            if np.count_nonzero(requirements.severity(body, left) > 1.0) > may - RESERVE * math.sqrt(may):
+                return False
+        return True
+
+    def share(self, other: _Flown) -> float:
+        """Largest share of the way to the ends of another plan with which enough cases comply."""
+        ways = [there - here for here, there in zip(self.ends, other.ends, strict=True)]
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.complies([middle * way for way in ways]) else (low, middle)
+        return low
+
+
+def _between(long: Plan, short: Plan, share: float) -> Plan | None:
+    """Plan with on-times so far from those of one plan to those of another; None where there is none."""
+    if share == 1.0 or short is long:
+        return short
+    ratios = [
+        1.0 + share * (less.on_time / more.on_time - 1.0) for more, less in zip(long.pulses, short.pulses, strict=True)
+    ]
+    return _scaled(long, ratios)
+
+
+def _nominal(plan: Plan) -> Vector:
+    """End vectors (10, 1) of a plan with nominal values, see `statistics.vectors`."""
+    study, ends = study_of(plan.spacecraft, plan.pulses), np.empty((ROWS, 1))
+    vectors(study.model, study.ends_of({}), ends)
+    return ends
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
@@ -306,7 +429,7 @@ def _fresh(chosen: PlanCandidate, samples: int) -> Fresh | None:
         results = run(Results(study, samples), threads=threads_here())
     except Infeasible:  # a case among them takes too long to fly
         return None
-    return Fresh(cases_of(results), results.interval)
+    return Fresh(cases_of(results), results.interval, results)
 
 
 def ranked(

@@ -1,10 +1,11 @@
 """Benchmarks of the whole command and of the work inside, as ratios of one run.
 
-    python tests/benchmarks/run.py [--runs 9] [--json FILE] [--markdown]
+    python tests/benchmarks/run.py [--runs 9] [--json FILE] [--markdown] [--jobs [WORD]]
 
 Whole processes take turns with what they are compared with, after one unmeasured turn, so that a machine that slows
 down slows them all; times are medians: of processor time, but of the time passed where several threads work.
 `--markdown` prints a table. What a process works inside is timed by `inside.py`, in a process of its own.
+`--jobs` measures instead the `JOBS` whose name has the word: the least processor time, in units of one loop of Python.
 A limit that is missed is marked, and the exit status is 1.
 """
 
@@ -37,6 +38,14 @@ class Process(NamedTuple):
     limit: float | None = None
     memory: float | None = None
     threads: bool = False
+
+
+class Job(NamedTuple):
+    """A command, and the most processor time that it may take, in units of `LOOP`."""
+
+    name: str
+    arguments: tuple[str, ...]
+    goal: float
 
 
 class Row(NamedTuple):
@@ -134,6 +143,19 @@ def fan(channels: int, periods: float) -> str:
     return f"{BODY}thrusters:\n{''.join(thrusters)}limits: {{horizon: {horizon} s}}\n"
 
 
+LOOP = ("-c", "sum(i*i for i in range(2_000_000))")
+"""The unit of jobs: the least processor time of fifteen such processes."""
+
+JOBS = (
+    Job("plan, cases counted", (*NUTDAMP, "plan"), 5.0),
+    Job("plan --robust", (*NUTDAMP, "plan", "--robust"), 18.0),
+    Job("trade", (*NUTDAMP, "trade"), 22.0),
+    Job("report", (*NUTDAMP, "report", "-o", "report.html"), 28.0),
+    Job("disperse, 2e4 cases", (*DISPERSE, "2e4"), 7.0),
+    Job("disperse, 1e6 cases", (*DISPERSE, "1e6"), 50.0),
+)
+
+
 class Taken(NamedTuple):
     """Time passed and processor time, s, and peak memory, MiB, of one process."""
 
@@ -194,6 +216,20 @@ def inside(folder: str) -> list[Row]:
     return [Row(**row) for row in json.loads(done.stdout)]
 
 
+def jobs(runs: int, folder: str, word: str) -> bool:
+    """Print the least processor time of the `JOBS` with a ``word`` in their names; True if all keep their goals."""
+    chosen = [job for job in JOBS if word in job.name]
+    loop, least = math.inf, dict.fromkeys(chosen, math.inf)
+    for _ in range(runs):
+        loop = min(loop, *(measured(LOOP, folder).worked for _ in range(math.ceil(15 / runs))))
+        for job in chosen:
+            least[job] = min(least[job], measured(job.arguments, folder).worked)
+    for job, seconds in least.items():
+        missed = "" if seconds <= job.goal * loop else "  MISSED"
+        print(f"{job.name:34} {seconds / loop:7.1f} u  (goal {job.goal:g} u){missed}")
+    return all(seconds <= job.goal * loop for job, seconds in least.items())
+
+
 def line(row: Row) -> str:
     """A row as people read it."""
     scale, unit = next((s, u) for s, u in ((1.0, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")) if row.seconds * s >= 1.0)
@@ -232,12 +268,15 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=9)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--markdown", action="store_true")
+    parser.add_argument("--jobs", metavar="WORD", nargs="?", const="")
     chosen = parser.parse_args()
     on = machine()
     print(f"{on['processor']}, {on['cores']} cores, Python {on['python']}, {chosen.runs} runs", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for name, text in (("dispersed", DISPERSED), ("four", fan(4, 40)), ("sixteen", fan(16, 100))):
             (Path(folder) / f"{name}.yaml").write_text(text, encoding="utf-8")
+        if chosen.jobs is not None:
+            return 0 if jobs(chosen.runs, folder, chosen.jobs) else 1
         rows = [*processes(chosen.runs, folder), *inside(folder)]
     if chosen.markdown:
         print(markdown(rows))

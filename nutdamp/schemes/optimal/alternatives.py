@@ -121,9 +121,10 @@ def elsewhere(
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
     with work.budget("other ends", MOST_ELSEWHERE):
         for share in ELSEWHERE:
-            if work.exhausted() or not problem.dear(best, first.cost):
+            sooner = begin + share * (horizon - begin)
+            if work.exhausted() or not problem.dear(best, first.cost) or not problem.feasible(sooner):
                 break
-            best = problem.cheaper(best, cheapest(begin + share * (horizon - begin)))
+            best = problem.cheaper(best, cheapest(sooner))
     return best
 
 

@@ -18,6 +18,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.schemes.correction import bounded_step
 from nutdamp.schemes.optimal import highs, refinement
+from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
 from nutdamp.schemes.optimal.refinement import Influence
 from nutdamp.spacecraft.constraints import Windows, keeps_limits
@@ -195,20 +196,27 @@ def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
     times = np.array([piece.time for piece in pieces])
     scale = np.full(len(times), float(times.max(initial=1e-9)))
     most = body.horizon - body.limits.earliest
+    task = Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
+    firing = np.array([piece.channel is not None for piece in pieces])
+    which = np.array([problem.channels.index(piece.channel) for piece in pieces if piece.channel is not None])
 
-    def left(times: Vector) -> Vector:
-        return refinement.misses(problem.flown(_schedule(problem, pieces, times)), problem.equations) / size
+    def left(rows: Vector) -> Vector:
+        """Misses of many times (k, n) s, (k, equations), over |H|."""
+        if task is None:
+            flown = (problem.flown(_schedule(problem, pieces, times)) for times in rows)
+            return np.array([refinement.misses(flight, problem.equations) for flight in flown]) / size
+        starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
+        return task.misses(np.tile(which, (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
 
-    value = left(times)
+    value = left(times[None])[0]
     for _ in range(NEWTON_STEPS):
         if np.linalg.norm(value) <= CONVERGED or work.exhausted():
             break
-        step = 1e-6 * scale
-        slopes = np.column_stack([(left(times + step * unit) - value) / 1e-6 for unit in np.eye(len(times))])
+        slopes = (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
         move = bounded_step(slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most))
         for shrink in range(6):
             trial = np.clip(times + move * 0.5**shrink, 0.0, most)
-            following = left(trial)
+            following = left(trial[None])[0]
             if np.linalg.norm(following) < np.linalg.norm(value):
                 break
         else:

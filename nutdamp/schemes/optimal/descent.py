@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
+from nutdamp.physics.taylor import Forcing
 from nutdamp.schemes.optimal import refinement
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
 Indices = NDArray[np.int_]
+Complex = NDArray[np.complex128]
 
 SIDES = 32
 """Sides of the polygon within which H may end off its target, where it may."""
@@ -54,6 +56,13 @@ class Sequences:
         return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
+class _Forces(NamedTuple):
+    """External torques, see `batch.Bodies`."""
+
+    constant: Vector
+    forcing: Forcing
+
+
 class Task:
     """Task of ``channels`` at ``costs`` per second, see `EndEquations`; H may end ``off`` N m s off target.
 
@@ -77,9 +86,11 @@ class Task:
         self.least = float(np.min(costs * self.unit))
         self.pace = min(1.0 / abs(body.spin), body.inertial_period)
         dynamics, start = make_dynamics(body), body.initial
-        self._forced = dynamics.constant, dynamics.forcing
-        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
+        self._forced = _Forces(dynamics.constant, dynamics.forcing)
+        self._coasting = _Forces(np.zeros(3), dynamics.forcing._replace(turning=()))
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
+        forcing = dynamics.forcing
+        self._free = not dynamics.constant.any() and not forcing.turning and forcing.growth == 0.0
         self._target, self._across = body.target_axis, refinement.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
@@ -93,8 +104,22 @@ class Task:
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
         work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
+        flown = self._together if self._free or (kicks and self._coasting.forcing.growth == 0.0) else self._in_turn
+        momentum, turn = flown(which, x, kicks)
+        inertial = attitude.rotate(turn.T, momentum.T)
+        shift = inertial @ self._across.T
+        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
+        if self.loose:
+            shift = shift - self.off * x[:, -2:]
+        spin = momentum[2] - self.body.inertia.C * self.spin
+        return np.asarray(np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum)
+
+    def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
+        """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
+        count, n = which.shape
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
+        forces = self._coasting if kicks else self._forced
+        bodies = batch.Bodies(moments, forces.constant, forces.forcing)
         now = np.zeros(count)
         for pulse in range(n):
             begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
@@ -107,14 +132,71 @@ class Task:
                 batch.advance(batch.MotionStretch(bodies, now, rates, turn), begin - now)
                 batch.advance(batch.MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
-        momentum = rates * moments
-        inertial = attitude.rotate(turn.T, momentum.T)
-        shift = inertial @ self._across.T
-        shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
-        if self.loose:
-            shift = shift - self.off * x[:, -2:]
-        every = np.column_stack([momentum[:2].T, shift, self.body.inertia.C * (rates[2] - self.spin)])
-        return np.asarray(every[:, self.chosen] / self.momentum)
+        return rates * moments, turn
+
+    def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
+        """`_in_turn` of a body without external torque, all stretches at once.
+
+        In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns about
+        H and its own axis (see `montecarlo.closed_form`): so the motion at all edges is known first, and then all turns
+        are. A quaternion is a pair of complex numbers, w + iz and x + iy.
+        """
+        count, n = which.shape
+        (A, _, C), rates, turn = self._start
+        parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
+        impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
+        if kicks:
+            starts = (starts[:, :, None] + widths[:, :, None] * ((np.arange(kicks) + 0.5) / kicks)).reshape(count, -1)
+            widths = np.zeros_like(starts)
+        coasts = np.diff(starts, axis=1, prepend=0.0)
+        coasts[:, 1:] -= widths[:, :-1]
+        axial = C * rates[2] + np.cumsum(impulses[:, :, 2], axis=1)
+        before, pace = axial - impulses[:, :, 2], 1.0 / C - 1.0 / A
+        turned, within = pace * before * coasts, pace * (before + 0.5 * impulses[:, :, 2]) * widths
+        phase = np.cumsum(turned + within, axis=1)
+        begun = np.exp(1j * (phase - within))  # as each pulse begins
+        added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
+        if not kicks and self.torques[:, 2].any():
+            added, _ = self._pulsed(which, np.zeros_like(added), before, widths)
+            added = added * np.exp(1j * within)
+        elif not kicks:
+            added = added * np.exp(0.5j * within) * np.sinc(within / (2.0 * np.pi))
+        after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
+        across = (after - added * begun) / begun  # in body axes as each pulse begins: H turns back in a coast
+        size = np.sqrt(across.real**2 + across.imag**2 + before**2)
+        cosine, sine = batch.cos_sin(0.5 / A * size * coasts)
+        sine /= np.where(size > 0.0, size, 1.0)
+        half = np.exp(0.5j * turned)
+        first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
+        if not kicks:
+            pulsed = self._pulsed(which, across, before, widths)[1]
+            first, second = (
+                np.stack(pair, axis=2).reshape(count, -1) for pair in zip((first, second), pulsed, strict=True)
+            )
+        first, second = _product(first, second)
+        momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
+        spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
+        return np.array([momentum.real, momentum.imag, axial[:, -1]]), np.array(spun)
+
+    def _pulsed(
+        self, which: Indices, across: Complex, before: Vector, widths: Vector
+    ) -> tuple[Complex, tuple[Complex, Complex]]:
+        """H across axis 3 (b, n) in body axes after pulses, each alone, and the turn of each.
+
+        ``across`` and ``before``: H across and along axis 3 as they begin.
+        """
+        count = which.size
+        moments = np.repeat(self._start[0][:, None], count, axis=1)
+        rates = np.array([across.real.ravel(), across.imag.ravel(), before.ravel()]) / moments
+        turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
+        bodies = batch.Bodies(moments, *self._coasting)
+        stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)
+        batch.advance(stretch, widths.ravel())
+        after, first, second = (
+            (real + 1j * imaginary).reshape(which.shape)
+            for real, imaginary in ((rates[0], rates[1]), (turns[0], turns[3]), (turns[1], turns[2]))
+        )
+        return after * self._start[0][0], (first, second)
 
     def slopes(self, which: Indices, x: Vector, scale: Vector, here: Vector, kicks: int) -> Vector:
         """Slopes of the misses, ``here`` now, by the unknowns in units of ``scale`` (b, …): (b, equations, …)."""
@@ -154,6 +236,18 @@ class Task:
             matrix = np.vstack([np.hstack([matrix, np.zeros((len(matrix), 2))]), sides])
             levels.append(np.full((count, SIDES), -math.cos(math.pi / SIDES)))
         return matrix, np.hstack(levels)
+
+
+def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
+    """Product (b,) of quaternions (b, n) in their order, each a pair of complex numbers as in `Task`."""
+    while (count := first.shape[1]) > 1:
+        last = count & ~1
+        u, v, w, z = first[:, :last:2], second[:, :last:2], first[:, 1::2], second[:, 1::2]
+        first, second = (
+            np.concatenate([product, rest[:, last:]], axis=1)
+            for product, rest in ((u * w - v * z.conj(), first), (u * z + v * w.conj(), second))
+        )
+    return first[:, 0], second[:, 0]
 
 
 SHARES = np.array([0.5, 0.2, 0.05, 0.01])

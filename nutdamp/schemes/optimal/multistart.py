@@ -282,8 +282,8 @@ def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
     given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
-    near = [moments for moments, cost in zip(ideal, best.cost, strict=True) if cost <= NEAR * best.cost[0]]
-    flown = _on_the_true_motion(task, [*near, *given]) or _on_the_true_motion(task, ideal)
+    near = int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0  # the cheapest come first
+    flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(task, ideal[near:])
     spare = [len(_needed(task, moments).which) < len(moments.which) for moments in flown]
     lean = [moments for moments, more in zip(flown, spare, strict=True) if not more]
     lean += _on_the_true_motion(task, [moments for moments, more in zip(flown, spare, strict=True) if more])

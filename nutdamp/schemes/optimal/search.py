@@ -230,7 +230,8 @@ class _LeastCostSearch(Problem):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
-        if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
+        needless = self.options.least == "time" and not self.astray(best)  # to keep H takes no less time
+        if self.looser and not needless and not work.exhausted() and not self.proved(best, EQUAL):
             kept = _LeastCostSearch(self.spacecraft, replace(self.options, free_axis=False, shift=None))
             still = kept.whole_or_shorter(kept.program().solve())
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)

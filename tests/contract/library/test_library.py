@@ -319,6 +319,7 @@ def test_their_files_are_sound(run_py: dict[str, Any]) -> None:
     names = {*run_py["BASES"], *(process.name for process in run_py["PROCESSES"])}
     for process in run_py["PROCESSES"]:
         assert process.against in names
+    for process in (*run_py["PROCESSES"], *run_py["JOBS"]):
         files = {part for part in process.arguments if part.endswith(".yaml")}
         assert all(Path(part).is_file() for part in files - {"four.yaml", "sixteen.yaml", "dispersed.yaml"})
 
