@@ -19,14 +19,14 @@ from nutdamp.flight.dynamics import Dynamics, Path, shed
 from nutdamp.flight.propellant import Supply, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop
+from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 
 GRID = 64
 """Moments per nutation period at which a continuous signal is examined for a firing in between."""
 
-LONGEST = 4096
+LONGEST = 1024
 """Moments looked at together, at most."""
 
 MOST = 20_000_000
