@@ -344,7 +344,7 @@ def disperse(
 
 def disperse_loop(
     spacecraft: Spacecraft,
-    samples: int = 20_000,
+    samples: int | None = None,
     *,
     until: float | None = None,
     seed: int = 1,
@@ -355,7 +355,7 @@ def disperse_loop(
 ) -> LoopDispersion:
     """Fly the closed loop of the file in dispersed cases to ``until`` s, as ``nutdamp disperse --loop`` does.
 
-    The other parameters are those of `disperse`. Raises Infeasible where firings come too late to damp.
+    ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
 
     Examples
     --------
@@ -366,9 +366,9 @@ def disperse_loop(
     from nutdamp.files.samples import streamed
     from nutdamp.views.loop_cases import LoopCasesWriter
 
-    body, count = _expected(spacecraft), units.count("samples", samples)
     end = None if until is None else units.end_of_flight(until)
-    study = dispersion.loop_study(body, end, seed=units.seed(seed))
+    study = dispersion.loop_study(_expected(spacecraft), end, seed=units.seed(seed))
+    count = study.enough if samples is None else units.count("samples", samples)
     looks = study.expect_affordable(count)
     if study.alone:
         what = f"{study.alone}: the cases fly one by one, and look at about {looks:,} samples"

@@ -30,7 +30,12 @@ FIGURES = ("overview", "cases", "momentum")
 @spacecraft_argument
 @flown_options("Disperse")
 @goal_options
-@click.option("--samples", type=Count(), default=SAMPLES, show_default=True, help="Dispersed cases to fly.")
+@click.option(
+    "--samples",
+    type=Count(),
+    show_default=f"{SAMPLES}; of --loop what shows the share required, 2000 or more",
+    help="Dispersed cases to fly.",
+)
 @click.option(
     "--seed", type=click.IntRange(0, LARGEST_SEED), default=1, show_default=True, help="Same seed, same draws, always."
 )
@@ -48,7 +53,7 @@ FIGURES = ("overview", "cases", "momentum")
 @quiet_option
 def command(
     job: Job,
-    samples: int,
+    samples: int | None,
     seed: int,
     threads: int | None,
     looped: bool,
@@ -90,11 +95,11 @@ def command(
         if plan is None:
             flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
         else:
-            flown = study = api.disperse(plan, samples, threads=threads, remark=job.remark, **hooks)
+            flown = study = api.disperse(plan, samples or SAMPLES, threads=threads, remark=job.remark, **hooks)
             brief += [partial(dispersion_brief, study.core, scheme=plan.scheme)] * (not verbose)
     job.deliver(flown, *brief, unsaved=[flown.unsaved], worst=worst)
-    if stopped.number is not None and flown.core.done < samples:
-        say(f"interrupted: {flown.core.done} of {samples} cases are done")
+    if stopped.number is not None and flown.core.done < flown.core.requested:
+        say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
         sys.exit(128 + stopped.number)
     leave(missed=flown.meets_requirement is False)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
@@ -18,14 +19,14 @@ from nutdamp.flight.dynamics import Dynamics, Path, shed
 from nutdamp.flight.propellant import Supply, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop
+from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 
 GRID = 64
 """Moments per nutation period at which a continuous signal is examined for a firing in between."""
 
-LONGEST = 4096
+LONGEST = 1024
 """Moments looked at together, at most."""
 
 MOST = 20_000_000
@@ -151,15 +152,37 @@ class Watch:
         return np.asarray(falls | begins)
 
 
+@dataclass(frozen=True)
+class Joined:
+    """Path of ``parts`` one after the other, each from the time (s) beside it on."""
+
+    parts: list[tuple[float, Path]]
+    steps: int = 0
+
+    def motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
+        owner = np.searchsorted([start for start, _ in self.parts], times, side="right") - 1
+        rates, quaternion = np.empty((len(times), 3)), np.empty((len(times), 4))
+        for index, (_, path) in enumerate(self.parts):
+            rows = np.maximum(owner, 0) == index
+            if rows.any():
+                rates[rows], quaternion[rows] = path.motion(times[rows])
+        return rates, quaternion
+
+
 class Coast(Watch):
-    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples."""
+    """Motion of one body from ``state`` at ``since`` s on without firing, and its samples.
+
+    ``parts``: the motion since the last firing, as far as it had to be integrated.
+    """
 
     def __init__(self, law: Law, signal: Signal, dynamics: Dynamics, state: SpinState, since: float) -> None:
         super().__init__(law, since)
         self.signal, self.dynamics = signal, dynamics
         self.path: Path | None = None
+        self.parts: list[tuple[float, Path]] = []
         self.state, self.since = state, since
-        self._from = self._until = since
+        self._until = since
         self._number = 0 if self.sensor.rate is None else int(self.first(np.float64(since)))
 
     def look(self, until: float, *, active: bool) -> Seen | None:
@@ -181,8 +204,7 @@ class Coast(Watch):
             self._number, end = last + 1, max(float(times[-1]), begins)
         self._go_to(end)
         self.reach = self.doubled
-        assert self.path is not None
-        rates, _ = self.path.motion(times)
+        rates, _ = self._motion(times)
         values = self.signal.shown(rates)
         if numbers is not None:
             values = self.signal.sampled(numbers, values)
@@ -195,19 +217,30 @@ class Coast(Watch):
         """Has a path that reaches from the last moment looked at to ``end`` s."""
         if self.path is None or not self.dynamics.free:
             state = self.state if self.path is None else self.at(self._until)
-            self._from = self._until
-            self.path, _ = self.dynamics.path(state, self._from, end, most=taylor.MOST_STEPS)
+            self.path, _ = self.dynamics.path(state, self._until, end, most=taylor.MOST_STEPS)
+            self.parts.append((self._until, self.path))
         self._until = end
+
+    def _motion(self, times: Vector) -> tuple[Vector, Vector]:
+        """Rates (n, 3) rad/s and quaternions (n, 4) at ``times`` (n,) s that the path reaches."""
+        begins, path = self.parts[-1]
+        return (path if self.dynamics.free or times[0] >= begins else Joined(self.parts)).motion(times)
 
     def at(self, time: float) -> SpinState:
         """State at ``time`` s, which has been seen or lies within a nutation period after that."""
-        if time == self.since or self.path is None:
+        if time == self.since:
             return self.state
-        if time > self._until and not self.dynamics.free:
+        if self.path is None or (time > self._until and not self.dynamics.free):
             self._go_to(time)
-        rates, quaternion = self.path.motion(np.array([time]))
+        rates, quaternion = self._motion(np.array([time]))
         first, second, third = rates[0].tolist()
         return SpinState(complex(first, second), third, quaternion[0])
+
+    def later(self, time: float) -> Coast:
+        """The coast from ``time`` s on, of which nothing was looked at before."""
+        coast = Coast(self.law, self.signal, self.dynamics, self.at(time), time)
+        coast.parts = self.parts
+        return coast
 
     def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
         if self.sensor.rate is not None:
@@ -237,8 +270,7 @@ class Coast(Watch):
 
     def _wait_at(self, now: float, actuator: Actuator) -> Firing | None:
         time = now - self.signal.sensor.delay
-        assert self.path is not None
-        rates, _ = self.path.motion(np.array([time]))
+        rates, _ = self._motion(np.array([time]))
         z = self.estimator.feed(np.array([time]), self.signal.shown(rates), rates[:, 2])
         return self.law.firing(actuator, complex(self.estimator.on_board(z, rates[:, 2])[0]), float(rates[0, 2]))
 
@@ -457,25 +489,26 @@ class Pilot:
 
     def _idle_until(self, seen: Seen) -> float | None:
         """Earliest time at which the sensor can show the start threshold, less the look-ahead; None where soon."""
-        law, sensor = self.law, self.loop.sensor
+        law = self.law
         if not self.free:
             return None
-        now, spin = float(seen.times[-1]), float(seen.spin[-1])
-        share = 0.5 if sensor.kind == ACCELEROMETER else 1.0
-        reach = (share * law.size(law.loop.start, spin) - self._margin) / max(map(abs, sensor.scales))
+        now, growth, (margin, over) = float(seen.times[-1]), self.truth.growth, self._margins
+        reach = (law.size(law.loop.start, float(seen.spin[-1])) - margin) / over
         if reach <= seen.size:
             return None
-        growth = self.truth.growth
         # tan θ grows by e^{κt}, and |ω| by no more.
         waits = math.log(reach / seen.size) / growth if growth > 0.0 < seen.size else math.inf
-        later = min(now + waits, self.until) - max(law.period, WAVES * sensor.low_pass) - law.period / GRID
+        settles = law.loop.settle + max(law.period, WAVES * self.loop.sensor.low_pass)
+        later = min(now + waits, self.until) - settles - law.period / GRID
         return later if later > now + law.period else None
 
     @cached_property
-    def _margin(self) -> float:
-        """Largest overestimate of |z| by the sensor, rad/s."""
-        estimator = Estimator(self.law, self.loop.sensor, 0.0)
-        return estimator.offset + NO_NOISE * estimator.doubt
+    def _margins(self) -> tuple[float, float]:
+        """Largest overestimate of |z| by the sensor: rad/s, and a factor."""
+        law, sensor = self.law, self.loop.sensor
+        estimator = Estimator(law, sensor, 0.0)
+        over = estimator.overestimate(self.truth, law.size(law.loop.start, self.truth.spin))
+        return estimator.offset + NO_NOISE * estimator.doubt, over * max(map(abs, sensor.scales))
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:

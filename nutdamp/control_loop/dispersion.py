@@ -37,12 +37,12 @@ from nutdamp.montecarlo.inputs import (
     list_inputs,
     of_sensor,
 )
-from nutdamp.montecarlo.statistics import Exact, Worst, angle
+from nutdamp.montecarlo.statistics import Exact, Worst, angle, cases_to_show
 from nutdamp.montecarlo.study import KEPT_WORST, Counted, Dispersed
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor, Thruster
-from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector
+from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Tolerance
@@ -291,6 +291,12 @@ What is not known is not a number: the first two of a loop that never falls quie
 PORTION = 512
 """Cases that are flown together."""
 
+CASES = (2_000, 20_000)
+"""Least and largest number of cases flown where nothing else is said."""
+
+MORE = 1.6
+"""Factor on the fewest cases that show a share by which one of them may fail: 5.6 over 3.7, as Poisson's limits are."""
+
 MOST_SAMPLES = 20_000_000_000
 """Largest number of samples of a study, by those of its nominal case."""
 
@@ -376,6 +382,12 @@ class LoopStudy:
     def nominal_case(self) -> list[Case]:
         """File itself, with the noise of the seed, as a case."""
         return [Case(self.spacecraft, (self.seed,))]
+
+    @property
+    def enough(self) -> int:
+        """Cases flown where nothing else is said: a share required is shown even where one of them fails."""
+        shown = cases_to_show(required_share(self.spacecraft.requirement))
+        return min(max(math.ceil(MORE * shown), CASES[0]), CASES[1])
 
     def expect_affordable(self, samples: int) -> int:
         """Number of samples of so many cases, by the nominal one; raises BadRequest where there are too many."""

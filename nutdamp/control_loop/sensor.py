@@ -38,6 +38,11 @@ FILTERED = 600.0
 HARMONIC = 7
 """Samples a nutation period from which on the sine of twice its rate can be distinguished from the others."""
 
+FITTED, UNFITTED = 1.4, 2.0
+"""Factors of the sine fitted to a period on a sine of any rate: at most 4/π where the period is one of whole samples,
+which leaves a tenth for those that are not; and where twice the rate is not fitted too, or a filter is reckoned with.
+"""
+
 SETTLED = 5.0
 """Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
 
@@ -266,6 +271,17 @@ class Estimator:
     def offset(self) -> float:
         """Largest common error of |z| in all estimates, rad/s: by bias and steps of the sensor."""
         return self._bias + self._steps
+
+    def overestimate(self, truth: Spacecraft, size: float) -> float:
+        """Largest factor of an estimate on a true |z| of up to ``size`` rad/s of a symmetric body; see `FITTED`."""
+        sensor = self.sensor
+        if sensor.kind != ACCELEROMETER:
+            return 1.0
+        if self.window < HARMONIC or sensor.low_pass > 0.0:
+            return UNFITTED
+        seen, gained = abs(self.seen_gain), math.hypot(*gain(truth.inertia.moments, sensor.position, sensor.axis))
+        square = 2.0 * math.hypot(*sensor.position.tolist()) * size / abs(truth.spin)
+        return FITTED * (gained + square) / seen if seen > 0.0 else math.inf
 
     @property
     def doubts(self) -> Doubt:

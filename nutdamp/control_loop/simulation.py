@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Pilot, Scatter
+from nutdamp.control_loop.controller import GRID, Coast, Course, Fired, Joined, Pilot, Scatter
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.control_loop.stability import dead_band
@@ -160,16 +160,24 @@ class Alone:
             if step is Course.OVER:
                 break
             if isinstance(step, float):
-                coast = self._coast(coast.at(step), step)
+                coast = coast.later(step)
             elif isinstance(step, Pulse):
-                path, begin = self.dynamics.path(state, now, step.thrust[0], most=taylor.MOST_STEPS)
-                self._leg(now, step.thrust[0], path)
+                begin = self._coasted(coast, state, now, step.thrust[0])
                 pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
                 state, now = self._fire(step, begin), step.thrust[1]
                 coast = self._coast(state, now)
-        last = max(pilot.until, now)
-        self._leg(now, last, self.dynamics.path(state, now, last, most=taylor.MOST_STEPS)[0])
+        self._coasted(coast, state, now, max(pilot.until, now))
         return self._run(state)
+
+    def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
+        """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be seen, as it was."""
+        if coast.parts and not self.dynamics.free:
+            there, path = coast.at(end), Joined(coast.parts)
+            self._leg(start, end, path)
+            return there
+        arc, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+        self._leg(start, end, arc)
+        return there
 
     def _coast(self, state: SpinState, since: float) -> Coast:
         return Coast(self.pilot.law, self.signal, self.dynamics, state, since)

@@ -8,7 +8,7 @@ propellant, its use is one more integrated number.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from typing import Any
@@ -33,6 +33,9 @@ EVALUATIONS = 200_000
 Push = tuple[Vector, Vector | None]
 """Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
 
+Numbers = Sequence[float]
+Matrix = Sequence[Numbers]
+
 
 class EulerEquations:
     """Euler's equations of a spacecraft and its attitude; ``evaluations`` of them so far, ``most`` at most.
@@ -48,6 +51,8 @@ class EulerEquations:
         self.inverse: Vector = np.asarray(np.linalg.inv(self.tensor), dtype=np.float64)
         per_kg = shed(spacecraft)
         self.shed = None if per_kg is None else self.axes @ np.diag(per_kg) @ self.axes.T
+        self._constant = self.tensor.tolist(), self.inverse.tolist()
+        self.growth, self.axis = spacecraft.growth, self.axes[:, 2].tolist()
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
@@ -62,15 +67,16 @@ class EulerEquations:
 
     def kicked(self, state: Vector, impulse: Vector, propellant: float = 0.0) -> Vector:
         """State after an ``impulse`` (3,) N m s in principal axes, which uses ``propellant`` kg."""
-        _, inverse = self._body(state[7:] + 0.5 * propellant)
-        return np.concatenate([state[:3] + inverse @ (self.axes @ impulse), state[3:7], state[7:] + propellant])
+        _, inverse = self._body((state[7:] + 0.5 * propellant).tolist())
+        kick = np.array(inverse) @ (self.axes @ impulse)
+        return np.concatenate([state[:3] + kick, state[3:7], state[7:] + propellant])
 
-    def _body(self, used: Vector) -> tuple[Vector, Vector]:
+    def _body(self, used: Numbers) -> tuple[Matrix, Matrix]:
         """Tensor and its inverse once ``used`` kg, (1,), are gone; (0,) where they stay."""
         if self.shed is None:
-            return self.tensor, self.inverse
-        tensor: Vector = self.tensor - used[0] * self.shed
-        return tensor, np.asarray(np.linalg.inv(tensor), dtype=np.float64)
+            return self._constant
+        tensor = self.tensor - used[0] * self.shed
+        return tensor.tolist(), np.linalg.inv(tensor).tolist()
 
     def solved(
         self,
@@ -94,49 +100,76 @@ class EulerEquations:
 
     def _derivative(
         self, start: float, pushes: tuple[Push, ...], burn: tuple[float, float]
-    ) -> Callable[[float, Vector], Vector]:
-        constant = np.asarray(sum((torque for torque, _ in pushes), np.zeros(3)))
-        slope = np.asarray(sum((slope for _, slope in pushes if slope is not None), np.zeros(3)))
+    ) -> Callable[[float, Vector], list[float]]:
+        constant, slope = np.zeros(3), np.zeros(3)
+        for torque, rise in pushes:
+            constant = constant + torque
+            slope = slope if rise is None else slope + rise
+        pushed, rising = ((self.axes @ part).tolist() for part in (constant, slope))
+        disturbances = [
+            (disturbance.rate, disturbance.transverse, disturbance.axial)
+            for disturbance in self.spacecraft.disturbances
+        ]
+        principal = self.axes.tolist()
 
-        def derivative(t: float, y: Vector) -> Vector:
+        # Plain numbers: an evaluation takes a tenth of what it takes with arrays of three.
+        def derivative(t: float, y: Vector) -> list[float]:
             self.evaluations += 1
             if self.evaluations > self.most:
                 raise Infeasible(f"the motion takes more than {self.most} evaluations of Euler's equations")
-            body, q = y[:3], y[3:7]
-            tensor, inverse = self._body(y[7:])
-            momentum = tensor @ body
-            drive = self._sink(momentum)
-            torque = self.axes @ (constant + slope * (t - start) + self._disturbed(t))
-            spin = inverse @ (torque + drive - np.cross(body, momentum))
-            # Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
-            slip = np.cross(drive, momentum) / max(float(momentum @ momentum), 1e-300)
-            turning = 0.5 * attitude.multiply(q, np.concatenate([[0.0], body + slip]))
-            flow = [burn[0] + burn[1] * (t - start)]
-            return np.concatenate([spin, turning, flow[: len(y) - 7]])
+            first, second, third, w, x, v, z, *used = y.tolist()
+            rates, since = (first, second, third), t - start
+            tensor, inverse = self._body(used)
+            momentum = _times(tensor, rates)
+            drive, slip = self._sink(momentum)
+            torque = [push + rise * since for push, rise in zip(pushed, rising, strict=True)]
+            for rate, transverse, axial in disturbances:
+                turned = transverse * complex(math.cos(rate * t), math.sin(rate * t))
+                acting = _times(principal, (turned.real, turned.imag, axial))
+                torque = [both + part for both, part in zip(torque, acting, strict=True)]
+            against = _cross(rates, momentum)
+            spin = _times(inverse, [torque[i] + drive[i] - against[i] for i in range(3)])
+            p, q, r = first + slip[0], second + slip[1], third + slip[2]
+            turning = (
+                0.5 * (-x * p - v * q - z * r),
+                0.5 * (w * p + v * r - z * q),
+                0.5 * (w * q + z * p - x * r),
+                0.5 * (w * r + x * q - v * p),
+            )
+            return [*spin, *turning, burn[0] + burn[1] * since] if used else [*spin, *turning]
 
         return derivative
 
-    def _disturbed(self, t: float) -> Vector:
-        """Torque (3,) N m of the disturbances at ``t`` s, principal axes."""
-        total = np.zeros(3)
-        for disturbance in self.spacecraft.disturbances:
-            turned = disturbance.transverse * complex(math.cos(disturbance.rate * t), math.sin(disturbance.rate * t))
-            total += (turned.real, turned.imag, disturbance.axial)
-        return total
-
-    def _sink(self, momentum: Vector) -> Vector:
-        """Contribution of energy dissipation to dH/dt in the body, (3,) N m in the axes of the file.
+    def _sink(self, momentum: Numbers) -> tuple[Numbers, Numbers]:
+        """Contribution of energy dissipation to dH/dt in the body, N m, and to its turning, rad/s, axes of the file.
 
         It turns axis 3 away from H (towards it for an oblate body) at κ sin θ cos θ and leaves H where it is in space.
         So in the body H is turned at that rate towards the plane square to axis 3: along the part of -axis 3 square to
-        H.
+        H. Nothing inside a body can turn H in space, so the body slips against it at the rate that undoes this.
         """
-        axis, size = self.axes[:, 2], float(np.linalg.norm(momentum))
-        if self.spacecraft.growth == 0.0 or size == 0.0:
-            return np.zeros(3)
-        direction = momentum / size
-        across = direction * (direction @ axis) - axis  # of length sin θ
-        return np.asarray(self.spacecraft.growth * size * (direction @ axis) * across)
+        squared = sum(part * part for part in momentum)
+        if self.growth == 0.0 or squared == 0.0:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        size = math.sqrt(squared)
+        cosine = sum(part * along for part, along in zip(momentum, self.axis, strict=True)) / size
+        drive = [
+            self.growth * cosine * (cosine * part - size * along)
+            for part, along in zip(momentum, self.axis, strict=True)
+        ]
+        return drive, [part / squared for part in _cross(drive, momentum)]
+
+
+def _times(matrix: Matrix, vector: Numbers) -> Numbers:
+    """Product of a matrix (3, 3) with a vector (3,)."""
+    x, y, z = vector
+    return [row[0] * x + row[1] * y + row[2] * z for row in matrix]
+
+
+def _cross(one: Numbers, other: Numbers) -> Numbers:
+    """Cross product of vectors (3,)."""
+    a, b, c = one
+    x, y, z = other
+    return (b * z - c * y, c * x - a * z, a * y - b * x)
 
 
 def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tuple[Vector, Vector]:

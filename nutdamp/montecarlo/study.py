@@ -262,9 +262,10 @@ class Study:
 
 
 class Counted:
-    """Number ``met`` of the ``done`` cases of a ``study`` that comply."""
+    """Number ``met`` of the ``done`` cases of a ``study`` that comply; ``requested`` are to be flown."""
 
     study: Any
+    requested: int
     done: int
     met: int
 

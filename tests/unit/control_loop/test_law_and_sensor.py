@@ -16,7 +16,7 @@ from support.loops import fired_by, fires, four, transverse_size
 
 from nutdamp.control_loop.controller import Watch
 from nutdamp.control_loop.law import ComplexArray, Firing, Law
-from nutdamp.control_loop.sensor import Estimator, Signal, gain, is_blind, lag
+from nutdamp.control_loop.sensor import HARMONIC, Estimator, Signal, gain, is_blind, lag
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, ONE_PULSE, Loop, Sensor
@@ -214,6 +214,23 @@ def test_accelerometer_gives_the_rate_by_the_sine_of_a_period(moments: tuple[flo
         known = ~np.isnan(shown)
         assert times[known][0] == pytest.approx(craft.body_period, abs=0.05)
         assert np.abs(shown[known] - true[known]).max() < 1e-3 * np.abs(true).max()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_accelerometer_overestimates_a_body_that_the_law_does_not_know_by_no_more_than_said(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    known = np.array([100.0, 100.0, draw.choice([40.0, 80.0, 150.0])])
+    A, C = known[0] * draw.uniform(0.7, 1.4), known[2] * draw.uniform(0.8, 1.2)
+    on_board, truth = body(tuple(known), degrees=3.0), body((A, A, min(C, 1.95 * A)), degrees=draw.uniform(0.1, 10.0))
+    place, along = draw.normal(size=3), draw.normal(size=3)
+    sensor = Sensor(ACCELEROMETER, 20.0, position=place, axis=along / np.linalg.norm(along))
+    law = Law(on_board, Loop(sensor, start=0.01))
+    estimator, times = Estimator(law, sensor, 0.0), np.arange(800) / 20.0
+    rates = make_dynamics(truth).path(truth.initial, 0.0, 40.0, most=9999)[0].motion(times)[0]
+    shown = np.abs(estimator.feed(times, Signal(truth, sensor, 1).shown(rates), rates[:, 2]))
+    size = abs(complex(*truth.omega0[:2]))
+    assert estimator.window >= HARMONIC
+    assert np.nanmax(shown) <= estimator.overestimate(truth, size) * size
 
 
 def test_estimates_do_not_depend_on_the_pieces_in_which_samples_come() -> None:

@@ -21,6 +21,7 @@ from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.montecarlo.statistics import binomial_interval
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Sensor
@@ -282,6 +283,34 @@ def test_noisy_loops_fall_quiet_within_the_dead_band(name: str) -> None:
 @pytest.mark.parametrize("name", [*QUIET][:6])
 def test_ten_thousand_noisy_loops_fall_quiet_within_the_dead_band(name: str) -> None:
     check_dead_band(name, 10_000)
+
+
+# An accelerometer's sine is fitted at the rate at which the looking begins: at another spin, as the nutation grows.
+@pytest.mark.parametrize(("sensor", "alike"), [("noise, bias, steps", 1e-9), ("accelerometer", 5e-3)])
+def test_loops_fire_alike_whether_they_look_while_nothing_can_show_or_not(
+    sensor: str, alike: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = replace(fired_by(1.0, loop=fires(NOISY[sensor], settle=1.0)), dissipation=60.0, dispersions=STARTS)
+    assert body.loop is not None
+    asleep = results_of(body, 20, 400.0)
+    looked = [fly(body, body.loop, 400.0).looked_at]
+    monkeypatch.setattr("nutdamp.control_loop.controller.Pilot._idle_until", lambda *_: None)
+    awake = results_of(body, 20, 400.0)
+    looked.append(fly(body, body.loop, 400.0).looked_at)
+    assert asleep.values == pytest.approx(awake.values, rel=alike, abs=1e-3 * alike, nan_ok=True)
+    assert np.array_equal(asleep.of("firings"), awake.of("firings"))
+    assert 1.5 * looked[0] < looked[1]
+    assert asleep.of("firings").mean() > 3.0
+
+
+def test_as_many_cases_are_flown_as_show_the_share_required_where_one_of_them_fails() -> None:
+    for share, least in ((0.9, 2000), (0.997, 2000), (0.999, 5000), (0.99999, 20_000)):
+        body = replace(
+            fired_by(1.0, loop=fires(GYRO)), dispersions=STARTS, requirement=Requirement(1.0, probability=share)
+        )
+        cases = loop_study(body).enough
+        assert least <= cases < 2 * least
+        assert cases == 20_000 or binomial_interval(cases - 1, cases)[0] >= share
 
 
 @pytest.mark.weekly
