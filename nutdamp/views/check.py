@@ -27,7 +27,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.units import bar
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.plan_json import aspects_json, spacecraft_json
+from nutdamp.views.plan_json import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared
@@ -365,6 +365,7 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
         **({} if spacecraft.tank is None else {"tank": tank_table(spacecraft.tank).json()}),
         "spin_axis": _spin_axis_json(spacecraft),
         **aspects_json(at_start(spacecraft)),
+        "sun": None if spacecraft.sun is None else direction_json(spacecraft, spacecraft.sun),
         "sun_pulses": _sun_pulses_json(spacecraft),
         "disturbances": disturbance_table(spacecraft).json(),
         **({} if spacecraft.loop is None else {"loop": _margins(spacecraft).json()}),

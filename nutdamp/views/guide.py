@@ -208,7 +208,10 @@ def units_topic() -> Topic:
 
 PAGES = (
     ("To begin", ("tutorial", "reading", "glossary")),
-    ("How to", ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "fit", "report", "library")),
+    (
+        "How to",
+        ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "campaign", "fit", "report", "library"),
+    ),
     ("Reference", ("commands", "file", "csv", "json", "notes", "units")),
     ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
     ("The project", ("contributing", "speed", "changes")),
