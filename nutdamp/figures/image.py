@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from nutdamp.errors import BadRequest
 from nutdamp.figures import style
+from nutdamp.figures.labels import panels
 from nutdamp.figures.style import INK, PAPER
 
 if TYPE_CHECKING:
@@ -87,8 +88,13 @@ def svg(figure: Figure) -> str:
     Text and frames take the colour of the text around it, so that it suits light and dark pages. Its ids begin with a
     digest of its content: several may be in one page.
     """
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
+    for patch in (figure.patch, *(axes.patch for axes in panels(figure))):
+        patch.set(facecolor="none", edgecolor="none")
+    # Not by `savefig`, which draws the figure twice.
+    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})  # type: ignore[no-untyped-call]
     text = stream.getvalue()
     text = text[text.index("<svg") :]
     # The style of matplotlib for all elements would hold for the whole page; its metadata are no part of the picture.

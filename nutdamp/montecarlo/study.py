@@ -203,6 +203,19 @@ class Study:
         draws, _ = self.source().block(case // BLOCK)
         return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
 
+    def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
+        """Deviations of ``cases`` (from 0, ascending), by input."""
+        source, parts = self.source(), list[dict[str, Array | float]]()
+        blocks = cases // BLOCK
+        for block in np.unique(blocks).tolist():
+            rows = cases[blocks == block] % BLOCK
+            draws, _ = source.block(block)
+            parts.append({name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()})
+        return {
+            name: draw if isinstance(draw, float) else np.concatenate([part[name] for part in parts])
+            for name, draw in parts[0].items()
+        }
+
     def ends_of(self, draws: Draws) -> Ends:
         """End state of one case with these deviations; none: of the estimate itself."""
         return self.flies(self.model.cases({name: np.atleast_1d(draw) for name, draw in draws.items()}))

@@ -92,7 +92,9 @@ def _untitled(figure: Figure) -> str:
     title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
     if title is None:
         return image.svg(figure)
-    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine("none")  # which would move the panels to where the title was
     renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
     top = POINTS * (figure.get_figheight() - title.get_window_extent(renderer).y0 / figure.dpi)

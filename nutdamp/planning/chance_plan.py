@@ -163,8 +163,8 @@ STEP = 1e-30
 MARGINS = (1.0, 1.3, 0.75, 0.5)
 """Over the sigmas of the probability required: margins that are tried first, until enough cases comply."""
 
-CLOSE = 0.985
-"""Severity of the last case that must comply from which a margin is small enough."""
+CLOSE = 0.983, 0.998
+"""Severities of the last case that must comply with a margin that is no larger than need be, nor by luck."""
 
 LESSER = (1.0, 0.8, 0.6)
 """Multiples of the largest feasible margin, where that is not enough."""
@@ -181,9 +181,10 @@ TRYING = 101
 ROUNDS = 4
 """Times that the margin is adapted."""
 
-TRIES, AIMED, NEAREST, FACTOR = 4, 0.995, 0.1, 0.8
+TRIES, AIMED, NEAREST, FACTOR, STEEP = 4, 0.99, 0.1, 0.8, 0.15
 """Margins tried once enough cases comply with one; the level aimed at; how near the next one comes to those before, of
-their distance; and its share of the least one, where no lower one is known."""
+their distance; and where no lower one is known, its least share of the least one, and the fall of the level by a
+sigma of margin."""
 
 ROUNDING = 1e-9
 """Of a number of cases."""
@@ -356,7 +357,7 @@ class _MarginSearch:
             for variant, plan, results in self.tried(margin):
                 seen[margin] = results.met_fraction or 0.0, level(results)
                 yield variant, plan
-            if CLOSE <= seen[margin][1] <= 1.0:
+            if CLOSE[0] <= seen[margin][1] <= CLOSE[1]:
                 return
 
     def _first(self) -> list[float]:
@@ -376,7 +377,7 @@ class _MarginSearch:
         most = max((margin for margin in seen if margin < least), default=0.0)
         over, under = seen[most][1] if most else math.inf, seen[least][1]
         if math.isinf(over):
-            return max(FACTOR * least, 0.5 * (most + least))
+            return max(FACTOR * least, 0.5 * (most + least), least - (AIMED - under) / STEEP)
         share = min(max((over - AIMED) / (over - under), NEAREST), 1.0 - NEAREST)
         return most + share * (least - most)
 

@@ -7,7 +7,6 @@ and, where `optimal` is among the schemes, its earliest ends, for errors of the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
@@ -19,78 +18,18 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.errors import Infeasible
-from nutdamp.montecarlo.statistics import ROWS, vectors
-from nutdamp.montecarlo.study import EARLY, SAMPLES, SEED, Results, run, study_of, threads_here
-from nutdamp.planning import chance_plan
+from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
+from nutdamp.planning import chance_plan, trimming
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
-from nutdamp.planning.screening import AS_GOOD, Cases, PlanCandidate, cases_of, entered, equal_from, fly_all
+from nutdamp.planning.screening import AS_GOOD, PlanCandidate, entered, equal_from, fly_all
+from nutdamp.planning.trimming import Fresh, fresh_of
 from nutdamp.schemes.catalogue import Options
-from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
-from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
-from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
-from nutdamp.spacecraft.schedule import channel_pulse
-
-SHORTEST = 0.8
-"""Least share of on-times when they are shortened: together, and then each alone once more."""
-
-HALVINGS, FINER = 7, 3
-"""Steps in which all on-times are shortened together, and then each alone."""
-
-FEW = 8
-"""Pulses up to which each is shortened alone."""
-
-TRIMS, RESERVE = 4, 0.5
-"""Trimmed plans that are flown, and by how many sigmas of their number fewer cases are predicted to fail than may."""
-
-
-def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
-    """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
-
-    Plans on ticks, of command blocks, or with pulses of no channel stay as they are.
-    """
-    channels = {channel.name: channel for channel in plan.spacecraft.channels}
-    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks)
-    if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
-        return plan
-    everywhere = list(range(len(plan.pulses)))
-    best = _shortened(plan, everywhere, HALVINGS, complies)
-    for index in everywhere if len(everywhere) <= FEW else ():
-        best = _shortened(best, [index], FINER, complies)
-    return best
-
-
-def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[Plan], bool]) -> Plan:
-    """Pulses with the indices ``which`` shortened alike, by bisection."""
-    low, high, best = SHORTEST, 1.0, plan
-    for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        shorter = _scaled(plan, [middle if index in which else 1.0 for index in range(len(plan.pulses))])
-        if shorter is not None and complies(shorter):
-            best, high = shorter, middle
-        else:
-            low = middle
-    return best
-
-
-def _scaled(plan: Plan, ratios: Sequence[float]) -> Plan | None:
-    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement."""
-    body = plan.spacecraft
-    channels = {channel.name: channel for channel in body.channels}
-    pulses = tuple(
-        pulse if ratio == 1.0 else channel_pulse(channels[pulse.channel], pulse.t, ratio * pulse.on_time)
-        for pulse, ratio in zip(plan.pulses, ratios, strict=True)
-    )
-    with suppress(Infeasible):
-        scaled = planning.judged(body, plan.scheme, replace(plan.pulses, pulses=pulses), plan.options)
-        if scaled.feasible and scaled.meets_requirement is not False and keeps_limits(body, scaled.pulses):
-            return scaled
-    return None
-
+from nutdamp.spacecraft.model import Spacecraft, required_share
 
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 """Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
@@ -98,27 +37,11 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)
 """Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
-FRESH = 211
-"""Seed of cases that nothing was chosen by."""
-
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
 
 CHECKED = 6
 """Plans with which just enough cases seem to comply that are tried in such cases, one after the other."""
-
-
-class Fresh(NamedTuple):
-    """Result in ``cases`` of a fresh seed, with the 95 % ``interval`` of the share that complies."""
-
-    cases: Cases
-    interval: tuple[float, float]
-    results: Results | None = None
-
-    @property
-    def met(self) -> float:
-        """Share of the cases that complies."""
-        return self.cases.complying or 0.0
 
 
 class Cost(NamedTuple):
@@ -288,117 +211,14 @@ def _flown(
 
 def _trimmed(ranks: RobustComparison) -> RobustComparison:
     """Comparison with the robust plan's on-times as short as the required share allows, in fresh cases too."""
-    chosen, required = ranks.chosen, ranks.probability
-    if chosen is None or chosen.met is None or chosen.met < required or ranks.lucky or ranks.fresh is None:
+    chosen = ranks.chosen
+    if chosen is None or chosen.met is None or chosen.met < ranks.probability or ranks.lucky or ranks.fresh is None:
         return ranks
-    best, predicted = _Flown(chosen, ranks.fresh), False
-    while not predicted:  # again from nearer by
-        shorter, predicted = _shorter(best, f"{chosen.variant}, trimmed", ranks)
-        if shorter is None:
-            break
-        best = shorter
+    best = trimming.shortest(chosen, ranks.fresh)
     if best.candidate is chosen:
         return ranks
     candidates = best.candidate, *ranks.candidates
     return replace(ranks, chosen=best.candidate, candidates=candidates, ground=Ground.COST, fresh=best.fresh)
-
-
-def _shorter(long: _Flown, variant: str, ranks: RobustComparison) -> tuple[_Flown | None, bool]:
-    """Plan with shorter on-times, None where nothing is gained, and whether its flight was as predicted.
-
-    Ends of cases are predicted to move with the nominal one, and where they are not known flown for each try; where too
-    few cases comply in flight, on-times are taken between both plans, as far as the ends between theirs allow.
-    """
-    plan, samples, required = long.candidate.plan, ranks.samples, ranks.probability
-
-    def flown(shorter: Plan) -> _Flown | None:
-        with suppress(Infeasible):
-            candidate = entered(shorter, variant, study_of(shorter.spacecraft, shorter.pulses), samples)
-            fly_all([candidate], samples, 0.0)
-            fresh = _fresh(candidate, samples)
-            return None if fresh is None else _Flown(candidate, fresh)
-        return None
-
-    def enough(short: _Flown | None) -> bool:
-        return short is not None and min(short.candidate.met or 0.0, short.fresh.met) >= required
-
-    nominal = _nominal(plan) if long.known else None
-    if nominal is None:
-        best = trimmed(plan, lambda shorter: enough(flown(shorter)))
-    else:
-        best = trimmed(plan, lambda shorter: long.complies((_nominal(shorter) - nominal,) * 2))
-    share = 1.0
-    for tries in range(TRIMS):
-        shorter = _between(plan, best, share)
-        if shorter is None or shorter.pulses.cost > plan.pulses.cost * (1.0 - SAME_COST):
-            break
-        short = flown(shorter)
-        if short is None or enough(short):
-            return short, tries == 0
-        if not short.known:
-            break
-        share *= long.share(short)
-    return None, True
-
-
-@dataclass(frozen=True)
-class _Flown:
-    """A candidate and its result in fresh cases."""
-
-    candidate: PlanCandidate
-    fresh: Fresh
-
-    @property
-    def known(self) -> bool:
-        """True if the end vectors of all cases are known, and decide on compliance alone."""
-        body, fresh = self.candidate.plan.spacecraft, self.fresh.results
-        alone = not body.keep and body.tank is None and body.goal.spin is None
-        return alone and self.candidate.results is not None and fresh is not None and fresh.done <= EARLY
-
-    @property
-    def ends(self) -> list[Vector]:
-        """End vectors (10, n) of the cases of both draws, see `statistics.vectors`."""
-        every = (self.candidate.results, self.fresh.results)
-        return [results.early[:, : results.done] for results in every if results is not None]
-
-    def complies(self, moved: Sequence[Vector]) -> bool:
-        """True if with the ends of each draw ``moved`` by so much the required share of it complies."""
-        body = self.candidate.plan.spacecraft
-        aim = 2 if requirements.aim(body) is Part.SHIFT else 5
-        for ends, by in zip(self.ends, moved, strict=True):
-            there = ends + by
-            chord = np.sqrt((there[aim : aim + 3] ** 2).sum(axis=0))
-            left = Left(np.arctan(np.hypot(there[0], there[1])), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)), 0.0)
-            may = (1.0 - required_share(body.requirement)) * there.shape[1]
-            if np.count_nonzero(requirements.severity(body, left) > 1.0) > may - RESERVE * math.sqrt(may):
-                return False
-        return True
-
-    def share(self, other: _Flown) -> float:
-        """Largest share of the way to the ends of another plan with which enough cases comply."""
-        ways = [there - here for here, there in zip(self.ends, other.ends, strict=True)]
-        low, high = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.complies([middle * way for way in ways]) else (low, middle)
-        return low
-
-
-def _between(long: Plan, short: Plan, share: float) -> Plan | None:
-    """Plan with on-times so far from those of one plan to those of another; None where there is none."""
-    if share == 1.0 or short is long:
-        return short
-    ratios = [
-        1.0 + share * (less.on_time / more.on_time - 1.0) for more, less in zip(long.pulses, short.pulses, strict=True)
-    ]
-    return _scaled(long, ratios)
-
-
-def _nominal(plan: Plan) -> Vector:
-    """End vectors (10, 1) of a plan with nominal values, see `statistics.vectors`."""
-    study, ends = study_of(plan.spacecraft, plan.pulses), np.empty((ROWS, 1))
-    vectors(study.model, study.ends_of({}), ends)
-    return ends
 
 
 def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> RobustComparison:
@@ -410,7 +230,13 @@ def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> Ro
     comparison, samples, required = ranks.comparison, ranks.samples, ranks.probability
     refused: list[PlanCandidate] = []
     while (chosen := ranks.chosen) is not None:
-        ranks = replace(ranks, fresh=_fresh(chosen, samples))
+        if not chosen.cases.decided and chosen not in refused:  # it came after one that was refused
+            flyable = [chosen]
+            fly_all(flyable, samples, 0.0)
+            refused += [] if flyable else [chosen]
+            ranks = ranked(comparison, candidates, samples, required, refused=refused)
+            continue
+        ranks = replace(ranks, fresh=fresh_of(chosen, samples))
         if not ranks.lucky or chosen in refused or len(refused) == CHECKED:
             break
         refused.append(chosen)
@@ -418,18 +244,6 @@ def _checked(ranks: RobustComparison, candidates: Sequence[PlanCandidate]) -> Ro
     if chosen is None or ranks.met is None or ranks.met >= required:
         return ranks
     return replace(ranks, tightening=tightening(chosen.plan, required))
-
-
-def _fresh(chosen: PlanCandidate, samples: int) -> Fresh | None:
-    """Chosen plan in fresh cases; None where nothing is required of it."""
-    if chosen.met is None:
-        return None
-    study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH)
-    try:
-        results = run(Results(study, samples), threads=threads_here())
-    except Infeasible:  # a case among them takes too long to fly
-        return None
-    return Fresh(cases_of(results), results.interval, results)
 
 
 def ranked(

@@ -146,7 +146,9 @@ class Task:
         parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
-            starts = (starts[:, :, None] + widths[:, :, None] * ((np.arange(kicks) + 0.5) / kicks)).reshape(count, -1)
+            starts = (starts[:, :, None] + widths[:, :, None] * ((np.arange(kicks) + 0.5) / kicks)).reshape(
+                count, n * kicks
+            )
             widths = np.zeros_like(starts)
         coasts = np.diff(starts, axis=1, prepend=0.0)
         coasts[:, 1:] -= widths[:, :-1]
@@ -171,7 +173,7 @@ class Task:
         if not kicks:
             pulsed = self._pulsed(which, across, before, widths)[1]
             first, second = (
-                np.stack(pair, axis=2).reshape(count, -1) for pair in zip((first, second), pulsed, strict=True)
+                np.stack(pair, axis=2).reshape(count, 2 * n) for pair in zip((first, second), pulsed, strict=True)
             )
         first, second = _product(first, second)
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])

@@ -230,14 +230,22 @@ class _LeastCostSearch(Problem):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
-        needless = self.options.least == "time" and not self.astray(best)  # to keep H takes no less time
-        if self.looser and not needless and not work.exhausted() and not self.proved(best, EQUAL):
-            kept = _LeastCostSearch(self.spacecraft, replace(self.options, free_axis=False, shift=None))
-            still = kept.whole_or_shorter(kept.program().solve())
+        if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
+            still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+
+    def keeping(self, best: Schedule | None) -> Schedule | None:
+        """The cheapest schedule found that keeps H, or reaches the target; None where it would not replace the best."""
+        kept = _LeastCostSearch(self.spacecraft, replace(self.options, free_axis=False, shift=None))
+        first = kept.program().solve()
+        if best is not None and not self.astray(best):  # to keep H takes no less time
+            dear = first.unmet <= UNMET and first.cost > self.price(best) * (1.0 + SAVED)
+            if dear or self.options.least == "time":
+                return None
+        return kept.whole_or_shorter(first)
 
     def without(self, overtaxed: dict[str, float]) -> _LeastCostSearch:
         """The search without channels whose pulses are too short for their share.

@@ -1,0 +1,247 @@
+"""On-times of a plan shortened as far as enough dispersed cases comply, in cases of a fresh seed too.
+
+Which cases comply with shorter on-times is predicted: their flown ends move by the slopes of the closed form. What
+comes out is flown; where too few cases comply then, fewer are predicted to the next time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+
+from nutdamp.errors import Infeasible
+from nutdamp.montecarlo.cases import DispersedModel
+from nutdamp.montecarlo.closed_form import ClosedForm
+from nutdamp.montecarlo.statistics import ROWS, vectors
+from nutdamp.montecarlo.study import EARLY, Results, run, study_of, threads_here
+from nutdamp.planning import plan as planning
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.screening import Cases, PlanCandidate, cases_of, entered, fly_all
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import keeps_limits
+from nutdamp.spacecraft.model import Vector
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+
+FRESH = 211
+"""Seed of cases that nothing was chosen by."""
+
+SHORTEST = 0.8
+"""Least share of on-times when they are shortened: together, and then each alone once more."""
+
+HALVINGS, FINER = 7, 5
+"""Steps in which all on-times are shortened together, and then each alone."""
+
+FEW = 8
+"""Pulses up to which each is shortened alone."""
+
+PASSES, NEARLY = 3, 2.0
+"""Times that on-times are shortened, and standard deviations of complying cases to spare up to which once will do."""
+
+NEAR, SMALL = 0.5, 0.02
+"""Severity from which a case may come to fail, and the share of on-times of difference quotients."""
+
+TRIMS, RESERVE = 4, 0.2
+"""Plans that are flown in each pass, and the standard deviations by which fewer cases than may are predicted to fail.
+"""
+
+
+class Fresh(NamedTuple):
+    """Result in ``cases`` of a fresh seed, with the 95 % ``interval`` of the share that complies."""
+
+    cases: Cases
+    interval: tuple[float, float]
+    results: Results | None = None
+
+    @property
+    def met(self) -> float:
+        """Share of the cases that complies."""
+        return self.cases.complying or 0.0
+
+
+def fresh_of(chosen: PlanCandidate, samples: int) -> Fresh | None:
+    """Chosen plan in fresh cases; None where nothing is required of it."""
+    if chosen.met is None:
+        return None
+    study = study_of(chosen.plan.spacecraft, chosen.plan.pulses, seed=FRESH)
+    try:
+        results = run(Results(study, samples), threads=threads_here())
+    except Infeasible:  # a case among them takes too long to fly
+        return None
+    return Fresh(cases_of(results), results.interval, results)
+
+
+def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
+    """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
+
+    Plans on ticks, of command blocks, or with pulses of no channel stay as they are.
+    """
+    channels = {channel.name: channel for channel in plan.spacecraft.channels}
+    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks)
+    if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
+        return plan
+    everywhere = list(range(len(plan.pulses)))
+    best = _shortened(plan, everywhere, HALVINGS, complies)
+    for index in everywhere if len(everywhere) <= FEW else ():
+        best = _shortened(best, [index], FINER, complies)
+    return best
+
+
+def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[Plan], bool]) -> Plan:
+    """Pulses with the indices ``which`` shortened alike, by bisection."""
+    low, high, best = SHORTEST, 1.0, plan
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        shorter = _scaled(plan, [middle if index in which else 1.0 for index in range(len(plan.pulses))])
+        if shorter is not None and complies(shorter):
+            best, high = shorter, middle
+        else:
+            low = middle
+    return best
+
+
+def _scaled(plan: Plan, ratios: Sequence[float]) -> Plan | None:
+    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement."""
+    body = plan.spacecraft
+    with suppress(Infeasible):
+        scaled = planning.judged(body, plan.scheme, _longer(plan, ratios), plan.options)
+        if scaled.feasible and scaled.meets_requirement is not False and keeps_limits(body, scaled.pulses):
+            return scaled
+    return None
+
+
+def _longer(plan: Plan, ratios: Sequence[float]) -> Schedule:
+    """Schedule of a plan with on-times times ``ratios``."""
+    channels = {channel.name: channel for channel in plan.spacecraft.channels}
+    pulses = tuple(
+        pulse if ratio == 1.0 else channel_pulse(channels[pulse.channel], pulse.t, ratio * pulse.on_time)
+        for pulse, ratio in zip(plan.pulses, ratios, strict=True)
+    )
+    return replace(plan.pulses, pulses=pulses)
+
+
+@dataclass(frozen=True)
+class FlownPlan:
+    """A candidate and its result in fresh cases."""
+
+    candidate: PlanCandidate
+    fresh: Fresh
+
+    @property
+    def plan(self) -> Plan:
+        """The plan flown."""
+        return self.candidate.plan
+
+    @property
+    def enough(self) -> bool:
+        """True if enough cases comply in both draws."""
+        return min(self.candidate.met or 0.0, self.fresh.met) >= self.candidate.cases.probability
+
+    @property
+    def known(self) -> bool:
+        """True if the end vectors of all cases are known, and decide on compliance alone."""
+        body, fresh = self.plan.spacecraft, self.fresh.results
+        alone = not body.keep and body.tank is None and body.goal.spin is None
+        return alone and self.candidate.results is not None and fresh is not None and fresh.done <= EARLY
+
+    @property
+    def may_fail(self) -> float:
+        """Number of cases of each draw that may fail."""
+        return (1.0 - self.candidate.cases.probability) * self.candidate.cases.samples
+
+    @cached_property
+    def failing(self) -> list[int]:
+        """Number of cases of each draw that fail."""
+        return [
+            round((1.0 - met) * self.candidate.cases.samples) for met in (self.candidate.met or 0.0, self.fresh.met)
+        ]
+
+    @cached_property
+    def _slopes(self) -> list[tuple[Vector, Vector]]:
+        """Ends (10, n) of the cases of both draws that are not far from failing, and their slopes (k, 10, n).
+
+        By what share each pulse is on longer, in the closed form, of which the nutation is exact too.
+        """
+        ratios = 1.0 - SMALL * np.eye(len(self.plan.pulses))
+        schedules = [self.plan.pulses, *(_longer(self.plan, row.tolist()) for row in ratios)]
+        slopes = []
+        for flown in (self.candidate.results, self.fresh.results):
+            assert flown is not None
+            ends = flown.early[:, : flown.done]
+            severity = self._severity(ends)
+            near = np.flatnonzero(severity >= min(NEAR, severity.max()))
+            draws = flown.study.draws_of_all(near)
+            there = np.empty((len(schedules), ROWS, len(near)))
+            for schedule, out in zip(schedules, there, strict=True):
+                model = DispersedModel(self.plan.spacecraft, schedule)
+                vectors(model, ClosedForm(model)(model.cases(draws)), out)
+            slopes.append((np.vstack([there[0, :2], ends[2:, near]]), (there[0] - there[1:]) / SMALL))
+        return slopes
+
+    def predicted(self, plan: Plan, fewer: float) -> bool:
+        """True if enough cases of each draw are predicted to comply with a plan of other on-times.
+
+        ``fewer`` cases than may are predicted to fail, unless as many do now.
+        """
+        pairs = zip(plan.pulses, self.plan.pulses, strict=True)
+        more = np.array([short.on_time / long.on_time - 1.0 for short, long in pairs])
+        for (ends, slopes), failing in zip(self._slopes, self.failing, strict=True):
+            severity = self._severity(ends + np.tensordot(more, slopes, 1))
+            if np.count_nonzero(severity > 1.0) > max(self.may_fail - fewer, min(failing, self.may_fail)):
+                return False
+        return True
+
+    def _severity(self, ends: Vector) -> Vector:
+        """Severity (n,) of cases by their end vectors (10, n)."""
+        body = self.plan.spacecraft
+        aim = 2 if requirements.aim(body) is Part.SHIFT else 5
+        chord = np.sqrt((ends[aim : aim + 3] ** 2).sum(axis=0))
+        left = Left(np.arctan(np.hypot(ends[0], ends[1])), 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)), 0.0)
+        return np.asarray(requirements.severity(body, left))
+
+
+def shortest(chosen: PlanCandidate, fresh: Fresh) -> FlownPlan:
+    """The plan of a candidate with on-times as short as the required share allows, in fresh cases too, flown."""
+    best, variant = FlownPlan(chosen, fresh), f"{chosen.variant}, trimmed"
+    for _ in range(PASSES):
+        shorter, tries = _shorter(best, variant)
+        if shorter is None:
+            break
+        best = shorter
+        if tries == 0 and best.may_fail - max(best.failing) <= NEARLY * math.sqrt(best.may_fail):
+            break
+    return best
+
+
+def _shorter(long: FlownPlan, variant: str) -> tuple[FlownPlan | None, int]:
+    """Plan with shorter on-times, None where nothing is gained, and how many were flown in vain before."""
+
+    def flown(shorter: Plan) -> FlownPlan | None:
+        samples = long.candidate.cases.samples
+        with suppress(Infeasible):
+            candidate = entered(shorter, variant, study_of(shorter.spacecraft, shorter.pulses), samples)
+            fly_all([candidate], samples, 0.0)
+            fresh = fresh_of(candidate, samples)
+            return None if fresh is None else FlownPlan(candidate, fresh)
+        return None
+
+    def complies(shorter: Plan) -> bool:
+        short = flown(shorter)
+        return short is not None and short.enough
+
+    fewer = RESERVE * math.sqrt(long.may_fail)
+    for tries in range(TRIMS):
+        best = trimmed(long.plan, partial(long.predicted, fewer=fewer) if long.known else complies)
+        if best is long.plan or best.pulses.cost > long.plan.pulses.cost * (1.0 - SAME_COST):
+            break
+        short = flown(best)
+        if short is None or short.enough:
+            return short, tries
+        fewer += max(short.failing) - long.may_fail + 1.0
+    return None, 0
