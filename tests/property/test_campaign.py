@@ -1,4 +1,4 @@
-"""A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before was carried on to."""
+"""A campaign: ACE follows the Sun by a turn a week, each planned from the file that the one before led to."""
 
 from __future__ import annotations
 
