@@ -155,8 +155,12 @@ class _LeastCostSearch(Problem):
         begin, body = self.spacecraft.limits.earliest, self.within(early.end)
         if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
             return self.with_bounds(early)
+        search = _LeastCostSearch(body, self.options).sooner()
+        other = continuous.within(search, early.end) if search.spacecraft.horizon == early.end else None
+        if other is not None:  # no program leads to a schedule that ends before
+            return search.with_bounds(self.preferred([early, other]))
         try:
-            return self.preferred([early, _LeastCostSearch(body, self.options).sooner().schedule()])
+            return self.preferred([early, search.schedule()])
         except Infeasible:
             return self.with_bounds(early)
 
