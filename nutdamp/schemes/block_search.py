@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -73,6 +74,9 @@ DOUBTFUL = 1.5
 DOUBTS = 100
 """Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
 
+ALIKE = 4
+"""Sequences that may come with the same blocks, over those that are wanted."""
+
 CORRECTED = 4
 """Flights whose neighbours are looked at where none complies."""
 
@@ -125,11 +129,11 @@ class BlockSearch:
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
             sequences += firsts
         self.most = math.inf
-        unsure = by_blocks(sequence for sequence in sequences if sequence.share <= DOUBTFUL)
-        self.doubtful = sorted(unsure.values(), key=lambda sequence: sequence.rank[1:])
+        unsure = sorted((each for each in sequences if each.share <= DOUBTFUL), key=lambda each: each.rank[1:])
+        self.doubtful = list(by_blocks(unsure[: ALIKE * DOUBTS]).values())
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
-        ranked = list(by_blocks(sorted(sequences, key=lambda sequence: sequence.rank)).values())
+        ranked = [next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)]
         clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
         first = by_blocks((*ranked[: FLOWN // 2], *clear, *each))
@@ -141,8 +145,8 @@ class BlockSearch:
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = by_blocks(sequence for sequence in sequences if sequence.rank[0] <= 0.0)
-        cheapest = sorted(complying.values(), key=lambda sequence: sequence.rank)
+        complying = sorted((sequence for sequence in sequences if sequence.rank[0] <= 0.0), key=_rank)
+        cheapest = list(by_blocks(complying[: ALIKE * DOUBTS]).values())
         for sequence in self.flights.fired(cheapest[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 break
@@ -250,21 +254,31 @@ class BlockSearch:
         What surely ends worse than the best ones found is left out: see `_short_by`.
         """
         start = self.model.start
-        waits = self._waits(start, self.earliest, WAITS if abs(start.phasor) > 0.0 else 1)
+        waits = self._waits(start, self.earliest, WAITS // self._free if abs(start.phasor) > 0.0 else 1)
         short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds()]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
-        within = SURELY
+        within = surely = DOUBTFUL if self._damps else SURELY
         while True:
             trials = (
                 (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
                 for channel, every, lacks in short
                 if np.any(lacks <= within)
             )
-            sequences = sorted(self.behind([START], start, trials), key=lambda sequence: sequence.rank)
-            enough = SURELY * max(sequences[0].rank[0], 1.0) if sequences else math.inf
+            sequences = sorted(self.behind([START], start, trials), key=_rank)
+            enough = surely * max(sequences[0].rank[0], 1.0) if sequences else math.inf
             if enough <= within or within >= most or work.exhausted():
                 return sequences
             within = min(enough, 10.0 * within, most)
+
+    @property
+    def _damps(self) -> bool:
+        """True where blocks are to lower the nutation alone."""
+        return self.body.goal.axis is None and self.body.goal.spin is None
+
+    @property
+    def _free(self) -> int:
+        """Divisor of the waits that are tried: more than 1 where any heading will do, and delays alone meet phases."""
+        return 3 if self._damps and Part.SHIFT not in self._most else 1
 
     def _kinds(self) -> Iterator[tuple[Channel, int]]:
         """Channels and intervals that pulses may have."""
@@ -278,7 +292,7 @@ class BlockSearch:
         the sum of their kicks at most.
         """
         widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
-        if self.body.goal.spin is None and self.body.goal.axis is None:
+        if self._damps:
             return self._undamped(state, channel, every)
         if self.body.goal.spin is not None:
             gained = channel.axial * acts(channel, widths).on_time * counts / self.model.inertia.C
@@ -310,7 +324,7 @@ class BlockSearch:
 
     def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and of few pulses."""
-        waits = self._waits(state, least, LATER_WAITS)
+        waits = self._waits(state, least, LATER_WAITS // self._free)
         for channel, every in self._kinds():
             lacks, counts = self._short_by(state, channel, every), self._counts(state, every)
             if not lacks.size:
@@ -318,7 +332,7 @@ class BlockSearch:
             widths = commandable_widths(self.commands, channel)
             spent = np.multiply.outer(acts(channel, widths).on_time, counts).ravel()
             gentle = np.tile(counts <= FEW, len(widths))
-            damping = np.where(gentle, self._undamped(state, channel, every), np.inf)
+            damping = np.where(gentle, lacks if self._damps else self._undamped(state, channel, every), np.inf)
             nearest = np.concatenate([_least(_in_order(lacks, spent), CLOSEST), _least(lacks, CLOSEST)], axis=1)
             some = evenly(np.flatnonzero(gentle), CLOSEST if len(lacks) > 1 else FEW * CLOSEST)
             for index in (nearest, _least(damping, CLOSEST), some[None]):
@@ -457,7 +471,7 @@ class BlockSearch:
             trials = [(self._named[last.channel], self._around(before, last))]
             sequences += self.behind([before], state, trials, off=off)
         other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
-        ranked = by_blocks(sorted(other, key=lambda sequence: sequence.rank))
+        ranked = by_blocks(sorted(other, key=_rank))
         clear = sorted(ranked.values(), key=lambda sequence: sequence.share)[: FLOWN // 2]
         chosen = (*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values()))
         return [self._in_form(sequence) for sequence in by_blocks(chosen).values()]
@@ -482,6 +496,9 @@ class BlockSearch:
         parts = np.broadcast_arrays(waits[:, None, None], widths[:, None], counts)
         wait, width, count = (part.reshape(-1, 1) for part in parts)
         return Trial(wait, delays, width, count, last.every)
+
+
+_rank, _blocks = operator.attrgetter("rank"), operator.attrgetter("blocks")
 
 
 def _following(blocks: Sequence[Block]) -> int:
@@ -511,14 +528,14 @@ def _in_order(shares: Array, cost: Array) -> Array:
 
 def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSequence]:
     """Sequences that leave least, and a front of miss against cost: ``most`` of each."""
-    ranked = of_each_kind(sorted(sequences, key=lambda sequence: sequence.rank), "width", "count", "every")
-    return list(by_blocks((*ranked[:most], *_front(ranked)[:most])).values())
+    ranked = of_each_kind(sorted(sequences, key=_rank), "width", "count", "every")
+    return list(by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values())
 
 
-def _front(ranked: Iterable[BlockSequence]) -> list[BlockSequence]:
-    """Of sequences in order of their rank those that cost distinctly less than all before them."""
+def _front(ranked: Iterable[BlockSequence], share: float = CHEAPER) -> list[BlockSequence]:
+    """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all before them."""
     front = list[BlockSequence]()
     for sequence in ranked:
-        if not front or sequence.rank[1] < CHEAPER * front[-1].rank[1]:
+        if not front or sequence.rank[1] < share * front[-1].rank[1]:
             front.append(sequence)
     return front
