@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
@@ -161,14 +160,23 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
         sums = np.concatenate([[0], np.cumsum(out)])
         for width in (samples for samples in WINDOWS if samples < len(rows)):
             counts = sums[width:] - sums[:-width]
-            elsewhere = np.maximum(sums[-1] - counts, 1.0) / (len(rows) - width)
-            chances = len(rows) * bdtrc(counts - 1, width, np.minimum(elsewhere, 1.0))
-            at = int(np.argmin(np.where(counts > 0, chances, np.inf)))
-            if counts[at] > 0 and chances[at] < least:
-                least = float(chances[at])
+            # The more, the less likely: elsewhere are fewer then.
+            at = int(np.argmax(counts))
+            elsewhere = max(float(sums[-1] - counts[at]), 1.0) / (len(rows) - width)
+            chance = len(rows) * _tail(int(counts[at]), width, min(elsewhere, 1.0))
+            if counts[at] > 0 and chance < least:
+                least = chance
                 those = model.times[rows][at : at + width][out[at : at + width]]
                 burst = signal, float(those[0]), float(those[-1]), int(counts[at])
     return burst
+
+
+def _tail(count: int, width: int, share: float) -> float:
+    """Probability that ``count`` or more of ``width`` samples are outliers, each by a ``share``."""
+    return math.fsum(
+        math.comb(width, number) * share**number * (1.0 - share) ** (width - number)
+        for number in range(count, width + 1)
+    )
 
 
 def _rows(fitted: Fit, signal: int) -> Vector:

@@ -1,6 +1,6 @@
 """Estimates of a spacecraft from telemetry: robust least squares, outliers left out, the model as wide as shown.
 
-Outliers are found under a loss that grows linearly beyond a few sigma (scipy's soft_l1) and left out of the last fits,
+Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits,
 so that they cost no efficiency. Noise is estimated.
 """
 
@@ -173,12 +173,18 @@ class Fit:
 
     def white(self, signal: int) -> bool:
         """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
-        from scipy.special import chdtri
-
         count = int((self.used & (self.model.signal == signal)).sum())
         correlations = self.whiteness(signal, 20)
         lags = np.arange(1, len(correlations) + 1)
-        return bool(count * (count + 2) * np.sum(correlations**2 / (count - lags)) < chdtri(len(correlations), 0.001))
+        return chi_square_tail(len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))) > 0.001
+
+
+def chi_square_tail(count: int, value: float) -> float:
+    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value`` above 0."""
+    half = max(0.5 * value, 1e-300)
+    powers = [0.5 * (count % 2) + index for index in range(count // 2)]
+    series = math.fsum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
+    return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)
 
 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
@@ -347,7 +353,7 @@ def _settled(model: Model, values: Vector) -> Fit:
 
 def estimated(model: Model, values: Vector, noise: Vector) -> Fit:
     """The fit of a record that has no samples yet: ``values`` as they are, with the covariance that they would have."""
-    slopes, count = jacobian(model, values, range(len(values))), len(model.measured)
+    slopes, count = jacobian(model, values, range(len(values)), one_sided=True), len(model.measured)
     covariance = covariance_of(model, slopes / noise[model.signal, None])
     return Fit(model, values, covariance, noise, np.ones(count, dtype=bool), np.zeros(count), slopes)
 

@@ -15,7 +15,7 @@ import numpy as np
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import step
 from nutdamp.estimation.fit import KEPT, Fit
-from nutdamp.estimation.model import Body, Matrix, Values, Vector
+from nutdamp.estimation.model import OF_SENSORS, Body, Matrix, Values, Vector
 from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_spin, shows_turn, thrust_prior
 from nutdamp.physics import attitude, triaxial
 from nutdamp.physics.triaxial import arc_cones
@@ -203,9 +203,12 @@ def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, 
 
 
 def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
-    """Derivatives (k, p) of what a function makes of the parameters, by central differences."""
-    columns = []
+    """Derivatives (k, p) of what a function makes of body and motion, by central differences."""
+    columns: list[Vector] = []
     for parameter in fitted.model.parameters:
+        if parameter.name.startswith(OF_SENSORS):
+            columns.append(np.zeros_like(columns[0]))  # the motion comes first of the parameters
+            continue
         ends = [
             function(fitted.named | {parameter.name: fitted.named[parameter.name] + sign * parameter.step})
             for sign in (1.0, -1.0)

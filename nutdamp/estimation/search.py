@@ -11,8 +11,7 @@ normal noise as far as the motion is linear over the errors.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Literal
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,13 @@ ROUNDING = 1e-7
 """Noise that a signal has at least, as a share of its largest value: no telemetry has more digits."""
 
 EVALUATIONS, TRIAL = 60, 40
-"""Jacobians of one least-squares search, at most: of the last ones, and of one from a start, which may lead nowhere."""
+"""Trials of one least-squares search, at most: of the last ones, and of one from a start, which may lead nowhere."""
+
+GRADIENT, STEP = 1e-8, 1e-10
+"""Slope of a cost that is least, and relative change of it, and of the values, from which on a search is over."""
+
+DAMPINGS = 10
+"""Steps, at most, in which the length of a step is found."""
 
 
 def least(model: Model) -> Vector:
@@ -133,8 +138,6 @@ def search(
 
     Those reached so far where the budget of work is spent.
     """
-    from scipy.optimize import least_squares
-
     units, weights = units_of(model), 1.0 / noise[model.signal[rows]]
     bound, nominal = model.prior[0] * units, model.prior[1]
 
@@ -145,37 +148,104 @@ def search(
             return np.full(int(rows.sum()) + len(nominal), math.inf)
         return np.concatenate([left, bound @ scaled - nominal])
 
-    reached = values / units
-
-    def derivatives(scaled: Vector) -> Matrix:
-        nonlocal reached
-        reached = scaled.copy()
+    def derivatives(scaled: Vector) -> Matrix | None:
         if work.exhausted():
-            raise _SpentError
+            return None
         slopes = jacobian(model, scaled * units, range(len(units)), one_sided=True)[rows] * units
         return np.concatenate([-slopes * weights[:, None], bound])
 
-    # Steps as long as the derivatives allow lead astray far from the minimum.
-    loss: Literal["soft_l1", "linear"] = "soft_l1" if robust else "linear"
-    try:
-        least_cost = least_squares(
-            errors,
-            values / units,
-            derivatives,
-            loss=loss,
-            max_nfev=EVALUATIONS if near else TRIAL,
-            x_scale="jac" if near else 1.0,
-            xtol=1e-10,
-            ftol=1e-10,
-        )
-    except _SpentError:
-        squares = errors(reached) ** 2
-        return reached * units, float(np.sum(np.sqrt(1.0 + squares) - 1.0 if robust else 0.5 * squares))
-    return least_cost.x * units, float(least_cost.cost)
+    scaled, cost = _minimum(errors, derivatives, values / units, robust=robust, near=near)
+    return scaled * units, cost
 
 
-class _SpentError(Exception):
-    """The budget of work is spent amid a search."""
+def _minimum(
+    errors: Callable[[Vector], Vector],
+    derivatives: Callable[[Vector], Matrix | None],
+    x: Vector,
+    *,
+    robust: bool,
+    near: bool,
+) -> tuple[Vector, float]:
+    """Least Σ r²/2, or Σ (√(1 + r²) - 1) where ``robust``, of ``errors`` r from ``x`` on, and its place.
+
+    Steps of Gauss and Newton within a trust region (Moré 1978), an ellipsoid along the ``derivatives``; not so far
+    from the minimum, where steps as long as these allow lead astray. It ends where there are no derivatives.
+    """
+    left = errors(x)
+    cost, damping, spans = _cost(left, robust), 0.0, np.zeros(len(x))
+    radius, trials = 0.0, 1
+    while trials < (EVALUATIONS if near else TRIAL) and math.isfinite(cost):
+        slopes = derivatives(x)
+        if slopes is None:
+            break
+        root = np.sqrt(1.0 + left * left) if robust else np.ones(len(left))
+        curved = np.sqrt(np.maximum(root**-3.0, np.finfo(float).eps))  # of the loss; root**-1 is its slope
+        slopes *= curved[:, None]
+        both = np.column_stack([slopes, left / root / curved])
+        triangle = np.asarray(np.linalg.qr(both, mode="r"), dtype=np.float64)
+        spans = np.maximum(spans, np.linalg.norm(slopes, axis=0)) if near else np.ones(len(x))
+        spans[spans == 0.0] = 1.0
+        if np.abs(triangle[:, :-1].T @ triangle[:, -1]).max() < GRADIENT:
+            break
+        radius = radius or float(np.linalg.norm(x * spans)) or 1.0
+        turned, sizes, axes = np.linalg.svd(triangle[:, :-1] / spans, full_matrices=False)
+        along = turned.T @ triangle[:, -1]
+        gain = -1.0
+        while gain <= 0.0 and trials < (EVALUATIONS if near else TRIAL):
+            damping = _damping(sizes, along, radius, damping)
+            share = _share(sizes, along, damping)
+            step, length = -(axes.T @ share) / spans, float(np.linalg.norm(share))
+            trial = errors(x + step)
+            trials += 1
+            expected = float(along @ (sizes * share) - 0.5 * np.sum((sizes * share) ** 2))
+            gain = cost - _cost(trial, robust)
+            if not math.isfinite(gain):
+                radius, gain = 0.25 * length, -1.0
+                continue
+            ratio = gain / expected if expected > 0.0 else 0.0
+            before = radius
+            if ratio < 0.25:
+                radius = 0.25 * length
+            elif ratio > 0.75 and length > 0.95 * radius:
+                radius *= 2.0
+            damping *= before / radius if radius > 0.0 else 0.0
+            tiny = float(np.linalg.norm(step)) < STEP * (STEP + float(np.linalg.norm(x)))
+            if tiny or (gain < STEP * cost and ratio > 0.25):
+                return (x + step, cost - gain) if gain > 0.0 else (x, cost)
+        if gain > 0.0:
+            x, left, cost = x + step, trial, cost - gain
+    return x, cost
+
+
+def _cost(left: Vector, robust: bool) -> float:
+    squares = left * left
+    return float(np.sum(np.sqrt(1.0 + squares) - 1.0 if robust else 0.5 * squares))
+
+
+def _share(sizes: Vector, along: Vector, damping: float) -> Vector:
+    """Step against a gradient, along the singular vectors of sizes ``sizes``; none where these are nothing."""
+    least = np.finfo(float).eps * sizes[0] * len(sizes)
+    return np.where(sizes > least, sizes, 0.0) * along / np.where(sizes > least, sizes * sizes + damping, 1.0)
+
+
+def _damping(sizes: Vector, along: Vector, radius: float, damping: float) -> float:
+    """Damping by which a step is as long as the ``radius``, to a hundredth; 0 where it is shorter. By Newton."""
+    length = float(np.linalg.norm(_share(sizes, along, 0.0)))
+    if length <= radius:
+        return 0.0
+    low, high = 0.0, float(np.linalg.norm(sizes * along)) / radius
+    for _ in range(DAMPINGS):
+        if not low < damping < high:
+            damping = max(1e-3 * high, math.sqrt(low * high))
+        share = _share(sizes, along, damping)
+        length = float(np.linalg.norm(share))
+        excess = length - radius
+        slope = -float(np.sum(share * share / (sizes * sizes + damping))) / length
+        low, high = (low, damping) if excess < 0.0 else (damping, high)
+        if abs(excess) < 0.01 * radius:
+            break
+        damping -= length / radius * excess / slope
+    return damping
 
 
 def covariance_of(model: Model, scaled: Matrix) -> Matrix:
