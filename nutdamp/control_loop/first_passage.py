@@ -161,6 +161,10 @@ CURVED = 12.0
 """Sigmas within which a size is so small that noise across it counts."""
 
 
+DEGREES = 240
+"""Terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger."""
+
+
 class Odds:
     """First passage: probability of an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows.
 
@@ -175,7 +179,8 @@ class Odds:
         near = limit + reach * np.linspace(-1.0, 1.0, FINE)
         shown = np.union1d(wide, near[near > wide[0]])
         sigma = max(seen.sigma, 1e-9 * limit, 1e-300)
-        turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+        phases = PHASES if offset > 0.0 else 1
+        turns = np.exp(2j * np.pi * np.arange(phases) / phases)
         sizes = np.abs(shown[:, None] * turns + seen.offset)
         chance = _exceeds(limit / sigma, sizes / sigma)
         chance = 1.0 - chance if below else chance
@@ -198,20 +203,32 @@ def _clustered(fresh: float, apart: Vector) -> Any:
     Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
     walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
     """
-    from scipy.special import ndtr
-
     if fresh > 0.5:
         return 1.0
     half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
-    below = ndtr(half)
+    below = _normal(half)
     return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
 
 
-def _exceeds(limit: float, shown: Vector) -> Vector:
-    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice)."""
-    from scipy.special import chndtr, ndtr
+def _normal(values: Vector) -> Vector:
+    """Probability that a standard normal number is below each of the ``values``."""
+    scaled = (values.ravel() / -math.sqrt(2.0)).tolist()
+    return 0.5 * np.array([math.erfc(value) for value in scaled]).reshape(values.shape)
 
-    chances, near = np.asarray(ndtr(shown - limit)), shown < CURVED
+
+def _exceeds(limit: float, shown: Vector) -> Vector:
+    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice).
+
+    |shown + n|² is χ² of 2 + 2k degrees of freedom, k by Poisson with the mean shown²/2.
+    """
+    chances, near = _normal(shown - limit), shown < CURVED
     if limit < 3.0 * CURVED and near.any():
-        chances[near] = 1.0 - chndtr(limit * limit, 2.0, shown[near] ** 2)
+        mean, half = 0.5 * shown[near] ** 2, 0.5 * limit * limit
+        share, more = np.exp(-mean), math.exp(-half)
+        total, tail = share * more, more
+        for number in range(1, DEGREES):
+            share, more = share * (mean / number), more * half / number
+            tail += more
+            total += share * tail
+        chances[near] = total
     return np.clip(chances, 0.0, 1.0)

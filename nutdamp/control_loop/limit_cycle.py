@@ -302,18 +302,19 @@ class Map:
         downs = awake & (np.abs(seen) <= self.stop)
         firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
         at.active[rows] = awake[:, -1]
-        for index, row in enumerate(rows.tolist()):
-            last = int(firsts[index])
-            if self._fires(at, row, seen[index], (fires & awake)[:, index, :last]):
-                continue
-            if last < count:
-                at.active[row] = False
-                self._rest(at, row)
-            passed = min(last + 1, count)
-            at.z[row] *= np.exp(self.turn * step * passed)
-            at.number[row] += passed
-            at.white[row] = white[index, passed : passed + white.shape[1] - count]
-            at.carried[:, row], at.fresh[row] = waits[:, index, passed - 1], False
+        fires &= awake & (np.arange(count) < firsts[:, None])
+        passes = np.ones(len(rows), dtype=bool)
+        for index in np.flatnonzero(fires.any(axis=(0, 2))).tolist():
+            passes[index] = not self._fires(at, int(rows[index]), seen[index], fires[:, index])
+        for row in rows[passes & (firsts < count)].tolist():
+            at.active[row] = False
+            self._rest(at, row)
+        places, going = np.flatnonzero(passes), rows[passes]
+        passed = np.minimum(firsts[places] + 1, count)
+        at.z[going] *= np.exp(self.turn * step * passed)
+        at.number[going] += passed
+        at.white[going] = white[places[:, None], passed[:, None] + np.arange(white.shape[1] - count)]
+        at.carried[:, going], at.fresh[going] = waits[:, places, passed - 1], False
 
     def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
         """First firing at one of the moments at which a channel triggers, if any."""
