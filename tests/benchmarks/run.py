@@ -77,6 +77,7 @@ NUTDAMP = ("-m", "nutdamp")
 DISPERSE = (*NUTDAMP, "disperse", "dispersed.yaml", "--scheme", "two-pulse", "--samples")
 
 CASES = Path(__file__).parents[1] / "cases"
+CONFIGS = Path(__file__).parents[2] / "configs"
 SINK = ("--set", "dissipation={time_constant: 500 s}")
 
 
@@ -153,6 +154,13 @@ JOBS = (
     Job("report", (*NUTDAMP, "report", "-o", "report.html"), 28.0),
     Job("disperse, 2e4 cases", (*DISPERSE, "2e4"), 7.0),
     Job("disperse, 1e6 cases", (*DISPERSE, "1e6"), 50.0),
+    Job("plan, ACE by blocks", (*NUTDAMP, "plan", str(CONFIGS / "ace.yaml")), 14.0),
+    Job("disperse --loop", (*NUTDAMP, "disperse", "--loop", str(CONFIGS / "upper-stage.yaml")), 80.0),
+    Job("verify --loop", (*NUTDAMP, "verify", "--loop", str(CONFIGS / "upper-stage.yaml")), 80.0),
+    Job("loop", (*NUTDAMP, "loop", str(CONFIGS / "upper-stage.yaml")), 3.0),
+    Job("budget", (*NUTDAMP, "budget", str(CONFIGS / "upper-stage.yaml")), 5.5),
+    Job("check", (*NUTDAMP, "check", str(CONFIGS / "magnus-a03.yaml")), 2.2),
+    Job("verify", (*NUTDAMP, "verify"), 9.0),
 )
 
 
