@@ -115,6 +115,9 @@ def test_a_case_is_the_same_alone(plain: Results) -> None:
     study, values = plain.study, values_of(plain)
     for case in (0, BLOCK - 1, BLOCK, MANY - 1, int(plain.worst.cases[0])):
         assert study.outputs_of(study.draws_of(case)) == pytest.approx(values[:, case], rel=1e-12, abs=1e-14)
+        assert {
+            name: float(np.ravel(draw)[0]) for name, draw in study.draws_of_all(np.array([case])).items()
+        } == study.draws_of(case)
 
 
 def test_the_worst_miss_the_requirement_most(plain: Results) -> None:
