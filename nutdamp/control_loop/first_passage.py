@@ -182,7 +182,7 @@ class Odds:
         phases = PHASES if offset > 0.0 else 1
         turns = np.exp(2j * np.pi * np.arange(phases) / phases)
         sizes = np.abs(shown[:, None] * turns + seen.offset)
-        chance = _exceeds(limit / sigma, sizes / sigma)
+        chance = exceeds(limit / sigma, sizes / sigma)
         chance = 1.0 - chance if below else chance
         chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
         expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
@@ -216,7 +216,7 @@ def _normal(values: Vector) -> Vector:
     return 0.5 * np.array([math.erfc(value) for value in scaled]).reshape(values.shape)
 
 
-def _exceeds(limit: float, shown: Vector) -> Vector:
+def exceeds(limit: float, shown: Vector) -> Vector:
     """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice).
 
     |shown + n|² is χ² of 2 + 2k degrees of freedom, k by Poisson with the mean shown²/2.

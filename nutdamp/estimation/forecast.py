@@ -21,7 +21,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation.fit import Fit, estimated
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import AXIS, SUN_PULSE, Record
-from nutdamp.estimation.results import Carried, Estimate, carried, estimates, posterior, replaced
+from nutdamp.estimation.results import Carried, Estimate, carried, estimates, moving, posterior, replaced
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.study import Results, run
 from nutdamp.physics import attitude
@@ -164,7 +164,7 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
     """The fit of a record of ``length`` s that ends when the record does, with t = 0 at its start; of noise alone."""
     model = fitted.model
     start = model.record.end - length
-    then: Carried = carried(fitted, start)
+    then = Carried(start, (), np.empty(0), np.empty((0, 0)), *moving(fitted, start), None)
     body = replace(replaced(model.spacecraft, then), dispersions=model.spacecraft.dispersions)
     fired = Schedule()
     if probe:

@@ -130,12 +130,18 @@ def carried(fitted: Fit, time: float) -> Carried:
         rates = body.axes @ state.rates
         return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in factors.values())])
 
-    slopes = derivatives(fitted, inputs)
-    body, state = model.at(fitted.named, time)
-    tilt = None
+    slopes, tilt = derivatives(fitted, inputs), None
     if fitted.index("attitude_1") is not None:
         tilt = math.sqrt(0.5 * float(np.trace(_axis_covariance(fitted, time))))
-    elif fitted.index("attitude_3") is None:
+    covariance = slopes @ fitted.covariance @ slopes.T
+    return Carried(time, names, inputs(fitted.named), covariance, *moving(fitted, time), tilt)
+
+
+def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
+    """The body, and its motion at ``time`` s."""
+    model = fitted.model
+    body, state = model.at(fitted.named, time)
+    if fitted.index("attitude_1") is None and fitted.index("attitude_3") is None:
         # Rates say nothing of where the body points: at t = 0 it is as the file has it.
         first, at_first = model.at(fitted.named, 0.0)
         of_file = attitude.multiply(
@@ -143,7 +149,7 @@ def carried(fitted: Fit, time: float) -> Carried:
         )
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
-    return Carried(time, names, inputs(fitted.named), slopes @ fitted.covariance @ slopes.T, body, state, tilt)
+    return body, state
 
 
 def _calibrated(fitted: Fit, channel: str) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import chndtr
 from support.builders import spinner
 from support.cases import deep, spread
 from support.golden import check_text, refused
@@ -16,7 +17,7 @@ from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
 from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation, Thresholds, budget
-from nutdamp.control_loop.first_passage import Odds, Transfer, transfer
+from nutdamp.control_loop.first_passage import Odds, Transfer, exceeds, transfer
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.limit_cycle import Cycle, Map
 from nutdamp.control_loop.sensor import Estimator, Signal
@@ -370,3 +371,9 @@ def test_the_picture_shows_what_is_held() -> None:
     assert second[:3, 0] * hours == pytest.approx([100.0, 1100.0 - math.log(10.0) / body.growth, 1100.0])
     (alone,) = budget_figure(Budget(replace(body, loop=None), None, ())).axes
     assert len(alone.lines) == 1
+
+
+@pytest.mark.parametrize("limit", [0.1, 1.0, 4.0, 11.0, 20.0, 35.0])
+def test_a_size_with_noise_exceeds_a_limit_by_the_distribution_of_rice(limit: float) -> None:
+    shown = np.linspace(0.0, 11.99, 300)
+    assert exceeds(limit, shown) == pytest.approx(1.0 - chndtr(limit * limit, 2.0, shown**2), abs=1e-14)

@@ -9,15 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.stats import binom, chi2
 from support.builders import spinner
 from support.cases import weekly
 from support.synthetic import gyro_case
 from support.telemetry_kinds import KINDS, telemetry
 
-from nutdamp.estimation.fit import Fit, fit
-from nutdamp.estimation.model import Vector
+from nutdamp.estimation.fit import Fit, chi_square_tail, fit
+from nutdamp.estimation.model import Model, Vector
 from nutdamp.estimation.parameters import GYROS, moments, prior, quantisation
+from nutdamp.estimation.search import residuals, search, units_of
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
@@ -144,3 +146,32 @@ def test_records_with_sun_pulses_converge_whatever_the_body_is_turned_by(tmp_pat
     within, ratio, omega = of_kind(tmp_path, seed)
     assert within
     assert max(abs(ratio), abs(omega)) < 4.0
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 20])
+def test_the_tail_of_a_sum_of_squares_is_that_of_chi_square(count: int) -> None:
+    for value in (1e-9, 0.1, 3.0, 40.0, 300.0):
+        assert chi_square_tail(count, value) == pytest.approx(chi2.sf(value, count), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("seed", "robust", "near"), [(1, True, True), (4, True, False), (7, False, True), (10, False, False)]
+)
+def test_a_search_ends_where_least_squares_of_scipy_do(seed: int, robust: bool, near: bool) -> None:
+    case = gyro_case(seed)
+    model = Model(case.spacecraft, case.record)
+    units, every = units_of(model), np.ones(len(model.measured), dtype=bool)
+    begin = fit(case.spacecraft, case.record)
+    named = {each.name: each.file for each in model.parameters} | begin.named
+    start = np.array([named[each.name] for each in model.parameters])
+    start += 3.0 * np.random.default_rng(seed).normal(size=len(start)) * np.where(units < math.inf, 1e-2 * units, 0.0)
+    bound, nominal = model.prior[0] * units, model.prior[1]
+
+    def errors(scaled: Vector) -> Vector:
+        left = residuals(model, scaled * units) / begin.noise[model.signal]
+        return np.concatenate([left, bound @ scaled - nominal])
+
+    values, cost = search(model, start, begin.noise, every, robust=robust, near=near)
+    other = least_squares(errors, start / units, loss="soft_l1" if robust else "linear", xtol=1e-10, ftol=1e-10)
+    assert cost <= other.cost * (1.0 + 1e-6)
+    assert errors(values / units) @ errors(values / units) < errors(start / units) @ errors(start / units)
