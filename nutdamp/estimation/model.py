@@ -32,7 +32,7 @@ from nutdamp.estimation.parameters import (
     parameters,
     prior,
 )
-from nutdamp.flight.dynamics import Arc, Dynamics, Path, Push, make_dynamics
+from nutdamp.flight.dynamics import Arc, Dynamics, FreeCoast, Path, Push, make_dynamics
 from nutdamp.flight.propagation import Flight, flown
 from nutdamp.physics import attitude, energy_sink, sky, triaxial
 from nutdamp.physics.taylor import Forcing
@@ -329,22 +329,7 @@ def _coast(body: Body) -> Path:
     """The motion without pulses; of three moments that without dissipation."""
     if body.symmetric:
         return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth)
-    return _Polhode(body.moments, body.state)
-
-
-@dataclass(frozen=True)
-class _Polhode:
-    """Coast of a body of three different moments from ``state`` at ``start`` s."""
-
-    moments: tuple[float, float, float]
-    state: SpinState
-    start: float = 0.0
-    steps: int = 0
-
-    def motion(self, times: Vector) -> tuple[Vector, Vector]:
-        since, rates = times - self.start, self.state.rates
-        turned = triaxial.free_attitude(self.moments, rates, self.state.quaternion, since)
-        return triaxial.free_rates(self.moments, rates, since), turned
+    return FreeCoast(body.moments, 0.0, body.state)
 
 
 class _Closed(Dynamics):
@@ -358,7 +343,7 @@ class _Closed(Dynamics):
         if acts or end == start or self.moments[0] == self.moments[1]:
             return super()._path(state, start, end, push, most)
         work.spend(POLHODE)
-        coast = _Polhode(self.moments, state, start)
+        coast = FreeCoast(self.moments, start, state)
         rates, quaternion = coast.motion(np.array([end]))
         return coast, SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
 
