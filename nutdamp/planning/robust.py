@@ -145,8 +145,7 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         varied.append(partial(_alignments, body, base.scheme, options))
         varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            margins.append(partial(chance_plan.plans, body, options))
-            varied.append(partial(_early, body, options))
+            margins += [partial(_early, body, options), partial(chance_plan.plans, body, options)]
     return [*planned, *margins, *varied]
 
 
@@ -188,7 +187,7 @@ def compare(
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
             if margins:
                 ranks = _flown(comparison, entries, samples, probability)
-                if ranks.meets_requirement and not ranks.lucky:  # no variant of a scheme costs less
+                if ranks.meets_requirement and not ranks.lucky:  # other variants cost more, but for few
                     return _trimmed(ranks)
     return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
 

@@ -44,8 +44,8 @@ ALL_BLOCKS, ALL_FIRSTS = 400, 300
 AROUND = (0, 1)
 """Steps of the delay that are looked at, from the one below the best delay."""
 
-WAITS, LATER_WAITS = 24, 12
-"""Sun pulses that may pass before a first and before a later block, so that its nutation meets the one before."""
+WAITS = 24
+"""Sun pulses that may pass before a block, so that its nutation meets the one before."""
 
 MOST_WIDTHS = 24
 """Widths that are looked at for a second and a third block, where more can be commanded."""
@@ -324,7 +324,7 @@ class BlockSearch:
 
     def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and of few pulses."""
-        waits = self._waits(state, least, LATER_WAITS // self._free)
+        waits = self._waits(state, least, WAITS // self._free)
         for channel, every in self._kinds():
             lacks, counts = self._short_by(state, channel, every), self._counts(state, every)
             if not lacks.size:
@@ -378,7 +378,7 @@ class BlockSearch:
         """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by delay."""
         for channel, every in self._kinds():
             widths = commandable_widths(self.commands, channel)
-            parts = np.meshgrid(self._waits(state, least, LATER_WAITS), widths, self._all_counts)
+            parts = np.meshgrid(self._waits(state, least, WAITS), widths, self._all_counts)
             wait, width, count = (part.reshape(-1, 1) for part in parts)
             yield channel, Trial(wait, self._delays, width, count, every)
 
