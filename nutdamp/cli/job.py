@@ -16,7 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.options import CARRIED_AT, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
+from nutdamp.cli.options import END, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
 from nutdamp.cli.screen import say, show, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import Options
@@ -108,7 +108,7 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
 
 def carry_options(when: str) -> Callable[[Command], Command]:
     """``-o FILE --at TIME``: the spacecraft file carried on, by default to ``when``."""
-    which = click.option("--at", type=CARRIED_AT, help=f"Its t = 0; default {when}.")
+    which = click.option("--at", type=END, help=f"Its t = 0; default {when}.")
     where = click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file carried on.")
     return lambda command: where(which(command))
 

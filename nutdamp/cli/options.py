@@ -141,7 +141,6 @@ class UnitType(ParamType[float]):
         return self.kind.upper()
 
 
-CARRIED_AT = UnitType("time", units.end_of_flight, "expected a time from t = 0 on")
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
 
 

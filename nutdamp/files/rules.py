@@ -205,6 +205,11 @@ def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     """Faults of a direction, by two angles or by a word."""
     if not facts.has("attitude") and facts.has(*path):
         yield Finding(path, NO_ATTITUDE, True)  # at the key, since its value is judged too
+    yield from _declination(facts, path)
+
+
+def _declination(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+    """Fault of the second of two angles."""
     declination = facts.number("angle", *path, 1)
     if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
         angle = f"{math.degrees(declination):g} deg"
@@ -420,11 +425,7 @@ def _attitude(facts: Facts) -> Iterator[Finding]:
             yield Finding(("attitude", "quaternion"), f"missing; turn from body to frame, scalar first, {cure}")
         if "sun_phase" in by_axis:
             yield from _sun_phase(facts)
-    declination = facts.number("angle", "attitude", "spin_axis", 1)
-    if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
-        angle = f"{math.degrees(declination):g} deg"
-        problem = f"{angle} is no declination; expected an angle from -90 deg to 90 deg"
-        yield Finding(("attitude", "spin_axis", 1), problem)
+    yield from _declination(facts, ("attitude", "spin_axis"))
     quaternion = facts.vector("number", 4, "attitude", "quaternion")
     if quaternion is not None and norm(quaternion) < SMALLEST:
         yield Finding(("attitude", "quaternion"), "zero; expected a rotation, such as [1, 0, 0, 0]")

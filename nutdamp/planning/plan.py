@@ -272,9 +272,10 @@ class Plan(results.Data, results.Tabled):
         """Spacecraft of the file with the state that the flight has ``at`` a time, s, as ``plan -o`` writes it.
 
         Default the end of the last pulse, of a loop that of its run. Raises BadRequest for a spacecraft that was not
-        read from a file, and while a pulse is on.
+        read from a file, while a pulse is on, and for a time that is none.
         """
-        body: Spacecraft = results.view(feasible(self), "carried", self.carried_at if at is None else at)
+        time = self.carried_at if at is None else units.end_of_flight(at)
+        body: Spacecraft = results.view(feasible(self), "carried", time)
         return body
 
     def reaching(self, time: float) -> Flight:

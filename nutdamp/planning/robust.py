@@ -187,7 +187,7 @@ def compare(
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
             if margins:
                 ranks = _flown(comparison, entries, samples, probability)
-                if ranks.meets_requirement and not ranks.lucky:  # other variants cost more, but for few
+                if ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
                     return _trimmed(ranks)
     return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
 

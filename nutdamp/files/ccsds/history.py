@@ -38,13 +38,14 @@ COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}
 """Numbers in a record of each ATTITUDE_TYPE that is read, besides its time."""
 
 _OPTIONAL = {"ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"}
-_METADATA = (
-    *(keyword._replace(required=keyword.name not in _OPTIONAL) for keyword in AEM_METADATA[:2]),
-    Keyword("CENTER_NAME", required=False, text=True),
-    *(keyword._replace(required=keyword.name not in _OPTIONAL) for keyword in AEM_METADATA[2:6]),
-    Keyword("USEABLE_START_TIME", required=False, text=True),
-    Keyword("USEABLE_STOP_TIME", required=False, text=True),
-    *(keyword._replace(required=keyword.name not in _OPTIONAL) for keyword in AEM_METADATA[6:]),
+_BEFORE = {"REF_FRAME_A": ("CENTER_NAME",), "STOP_TIME": ("USEABLE_START_TIME", "USEABLE_STOP_TIME")}
+_METADATA = tuple(
+    row
+    for keyword in AEM_METADATA
+    for row in (
+        *(Keyword(name, required=False, text=True) for name in _BEFORE.get(keyword.name, ())),
+        keyword._replace(required=keyword.name not in _OPTIONAL),
+    )
 )
 """Table 4-3, but for the keywords of Euler angles."""
 

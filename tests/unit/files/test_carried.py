@@ -116,6 +116,9 @@ def test_what_no_file_can_hold_is_refused() -> None:
     empty = Plan(body, "by hand", Schedule(supplied(body, [channel_pulse(body.channels[0], 3.0, 5.0)])))
     with pytest.raises(BadRequest, match="no propellant"):
         empty.carried()
+    for time in (-3.0, float("nan"), float("inf")):
+        with pytest.raises(BadRequest, match="after t = 0"):
+            plan.carried(time)
     replaced: Spacecraft = plan.spacecraft.replace(mass=3.0)
     with pytest.raises(BadRequest, match="no field replaced"):
         nutdamp.plan(replaced, "two-pulse").carried()
