@@ -307,15 +307,15 @@ class _MarginSearch:
         if self.program.forbidden.size > LARGEST:
             raise Infeasible("too many slots")
         flat = self.model.body
-        spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
+        axial = abs(flat.inertia.axial(flat.spin if flat.goal.spin is None else flat.goal.spin))
         self.limits = tuple(
             ChanceLimit(kind, most)
             for part, kind, most in (
-                (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
+                (Part.NUTATION, 0, axial * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
                 (
                     requirements.aim(spacecraft),
                     1,
-                    spin * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
+                    axial * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
                 ),
                 (Part.SPIN, 2, flat.inertia.C * parts.get(Part.SPIN, 0.0)),
             )

@@ -21,12 +21,11 @@ from support.spinners import commanded, flown_by_reference
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm, nodes_for
-from nutdamp.montecarlo.propagated import RealWidths, largest_nutation
+from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
 from nutdamp.spacecraft.model import Disturbance, Inertia
@@ -165,19 +164,6 @@ def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name:
     for case in range(0, CASES, 6):
         one = dispersed.one_of(draws, case)
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
-
-
-def test_largest_nutation_of_many_is_that_of_each() -> None:
-    """Prolate, oblate and intermediate axes, small and large angles, motions over the separatrix, reversed spin."""
-    generator = np.random.default_rng(12)
-    moments = generator.uniform(50.0, 100.0, (3, 400))
-    momentum = generator.normal(size=(3, 400)) * [[30.0], [30.0], [200.0]]
-    momentum[:2, :20] *= 1e-7
-    largest = largest_nutation(moments, tuple(momentum), 1.0)
-    for case in range(400):
-        first, second, third = (float(moment) for moment in moments[:, case])
-        expected = arc_cones((first, second, third), momentum[:, case] / moments[:, case], 1.0)
-        assert largest[case] == pytest.approx(expected.nutation, rel=1e-9, abs=1e-15), case
 
 
 BLOCKS = {
