@@ -64,6 +64,11 @@ class FlownLoops:
     largest: Vector
     aspects: Vector
 
+    def momentum(self, rates: Vector) -> Vector:
+        """Angular momentum (3, n) N m s of the true bodies at ``rates`` (3, n) rad/s, in body axes."""
+        bodies = zip(self.cases, rates.T, strict=True)
+        return np.array([case.truth.inertia.momentum(turning) for case, turning in bodies]).T
+
 
 @dataclass(frozen=True, eq=False)
 class _Group:

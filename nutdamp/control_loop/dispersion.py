@@ -416,15 +416,14 @@ class LoopStudy:
     def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
         """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
-        moments = np.array([case.truth.inertia.moments for case in cases]).T
         before = np.array([case.truth.omega0 for case in cases]).T
-        wheels = np.array([[0.0], [0.0], [1.0]]) * np.array([case.truth.inertia.wheel for case in cases])
-        momentum = tuple(carried(tuple(flown.quaternion), triple(moments * flown.rates + wheels)))
+        start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
+        momentum = tuple(carried(tuple(flown.quaternion), end))
         tilts = np.array([case.tilt for case in cases]).T
         out = np.empty((len(OUTPUTS), len(cases)))
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
-        out[3] = angle(triple(moments * before + wheels), triple(np.array(momentum)))
+        out[3] = angle(start, triple(np.array(momentum)))
         out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
         used = [

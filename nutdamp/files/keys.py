@@ -438,7 +438,7 @@ class SpacecraftFile(Section):
         "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
     )
     dissipation: DissipationSection | None = Field(
-        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s"}
+        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s", "nutation": "grows"}
     )
     requirement: RequirementSection | None = Field("What a plan must reach.", {"nutation": "0.5 deg"})
     limits: LimitsSection | None = Field("Limits that every schedule respects.", {"horizon": "120 s"})

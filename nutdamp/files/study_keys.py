@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 READING = "reading"
 """The kind of the signal of a sensor: an angular rate of a gyro, an acceleration of an accelerometer."""
 
-RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
+RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")

@@ -222,7 +222,8 @@ WITHOUT = "without "
 class Method:
     """Method of flying the schedule: its residual (rad), or the reason why it could not be flown.
 
-    ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
+    ``axis``, ``momentum`` (rad) and ``rate`` are its largest differences from the flown motion; that of the rates is
+    relative to |ω|, or to |H| over the largest moment where a wheel holds the body still.
     ``outside``: an integration that shares nothing with it, and so is to confirm it.
     """
 
@@ -398,6 +399,7 @@ def _method(
 ) -> Method:
     """Largest differences between two motions at ``times`` (n,) s over the ``rows`` compared."""
     moments, wheel = judge.moments_at(times), np.array([0.0, 0.0, judge.spacecraft.inertia.wheel])
+    still = wheel[2] and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
     spin_axis = np.array([0.0, 0.0, 1.0])
     (body, turn), (other_body, other_turn) = motion, reference
     differences = (
@@ -405,7 +407,7 @@ def _method(
         attitude.angle_between(
             attitude.rotate(turn, body * moments + wheel), attitude.rotate(other_turn, other_body * moments + wheel)
         ),
-        np.linalg.norm(body - other_body, axis=1) / np.linalg.norm(other_body, axis=1),
+        np.linalg.norm(body - other_body, axis=1) / np.maximum(np.linalg.norm(other_body, axis=1), still),
     )
     axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
     return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)

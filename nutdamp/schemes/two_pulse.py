@@ -42,6 +42,9 @@ CLOSE_IN_SHORT = 1.1
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
+STILL = 0.1
+"""Angle in rad: channels that turn no further within the horizon stand still in space, as those of a despun body."""
+
 SHORTLIST = 6
 """Candidates that are flown and corrected, at most."""
 
@@ -261,10 +264,14 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
     rate = turning + C / A * spin / math.cos(0.5 * theta)
+    to_go = math.pi - turn
+    if abs(rate) * spacecraft.horizon < STILL:  # the channels stand still in space: they close at any time, or never
+        if abs(cmath.phase(cmath.rect(1.0, to_go))) > STILL:
+            return []
+        to_go, rate = -turn, turning  # until the second opposes ω as the first does
     if rate == 0.0:
         return []
-    sense = math.copysign(1.0, rate)
-    first_wait = ((math.pi - turn) * sense) % (2 * math.pi) / abs(rate)
+    first_wait = to_go * math.copysign(1.0, rate) % (2 * math.pi) / abs(rate)
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
     turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns

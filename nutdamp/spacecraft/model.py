@@ -205,8 +205,8 @@ class Inertia:
 
     @property
     def shape(self) -> str:
-        """``prolate``, ``oblate`` or ``sphere``."""
-        return rigid_body.shape(self.A, self.C)
+        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel, of which A and C alone do not tell."""
+        return "gyrostat" if self.wheel else rigid_body.shape(self.A, self.C)
 
     @property
     def symmetric(self) -> bool:

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support import reference
+from support.cases import spread
 
 from nutdamp.physics import attitude, batch, energy_sink, response, taylor, triaxial
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics.taylor import Forcing
-from support import reference
-from support.cases import spread
 
 Array = NDArray[np.float64]
 
@@ -116,9 +116,7 @@ THREE = [(120.0, 100.0, 80.0), (90.0, 120.0, 160.0), (80.0, 120.0, 100.0)]
     for spin, wheel in [(2.0, 90.0), (0.0, -60.0), (-1.0, 400.0)]
     for growth in (0.0, 0.03)
 ], quick=6)  # fmt: skip
-def test_series_under_a_torque(
-    moments: tuple[float, float, float], spin: float, wheel: float, growth: float
-) -> None:
+def test_series_under_a_torque(moments: tuple[float, float, float], spin: float, wheel: float, growth: float) -> None:
     """One body and many at once, with and without dissipation, on a short stretch and on a long one."""
     rates, torque = reference.vector(0.2, -0.1, spin), reference.vector(5.0, -2.0, 3.0)
     rotation = reference.frame_n(moments, rates, wheel)
