@@ -71,7 +71,8 @@ class Checkpoints:
     def window(self, probability: float) -> Range | None:
         """Shifts (s) of all pulses with which the share ``probability`` of the cases complies, about none.
 
-        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0; None where too few comply without a shift.
+        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0; None where too few comply
+        without a shift.
         """
         schedule = self.study.model.schedule
         half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)
