@@ -220,7 +220,7 @@ class _Hub:
     def _set(self, rates: Vector, unit: float) -> None:
         """Set ``rates`` (3,) rad/s and the rotor's speed of its constant momentum, in a unit of time of ``unit`` s."""
         self._rates.setState(_column(rates * unit))
-        if self._wheel:
+        if self._spun is not None:
             self._spun.setState([[(self._speed - float(rates[2])) * unit]])
 
 
