@@ -65,6 +65,10 @@ KINDS: dict[str, Kind] = {
     "inertia": Kind(
         "a moment of inertia", {"kg m^2": 1.0, "slug ft^2": POUND_FORCE * FOOT, "lbm in^2": POUND * (FOOT / 12.0) ** 2}
     ),
+    "momentum": Kind(
+        "an angular momentum",
+        {"N m s": 1.0, "kg m^2/s": 1.0, "ft lbf s": POUND_FORCE * FOOT, "in lbf s": POUND_FORCE * FOOT / 12.0},
+    ),
     "shed": Kind("a moment of inertia for each kg", {"kg m^2/kg": 1.0, "m^2": 1.0}),
     "travel": Kind("a length for each kg", {"m/kg": 1.0, "mm/kg": 1e-3}),
     "angle": Kind("an angle", {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}),

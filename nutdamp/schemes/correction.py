@@ -234,7 +234,7 @@ class _Movable:
     """
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
-        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
+        pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
         self.channel = channel_of(spacecraft, pulse)
         self.torquer = spacecraft.torquer
@@ -486,7 +486,7 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
     Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
     """
     here = start.here
-    h = here.inertia.C * abs(here.spin)
+    h = abs(here.axial)
     # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
     span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
     best: tuple[float, FlownBuilder] | None = None

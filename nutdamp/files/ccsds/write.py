@@ -72,7 +72,7 @@ def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str
     right_ascension, declination = _on_sphere(third)
     # The first axis after the first two turns is the node; the angle from it to body axis 1 is the third.
     node = cleaned(np.stack([-np.sin(right_ascension), np.cos(right_ascension), 0.0 * declination], axis=-1))
-    momentum = rates @ inertia.tensor
+    momentum = rates @ inertia.tensor + inertia.wheel * inertia.axes[:, 2]
     size, transverse = np.linalg.norm(momentum, axis=-1), np.hypot(momentum[:, 0], momentum[:, 1])
     phase = np.where(transverse > 0.0, np.arctan2(-momentum[:, 1], momentum[:, 0]), 0.0)
     of_momentum = _on_sphere(cleaned(attitude.rotate(quaternion, momentum)))
@@ -81,7 +81,7 @@ def spin_values(inertia: Inertia, rates: Vector, quaternion: Vector) -> dict[str
         "SPIN_ALPHA": np.degrees(right_ascension),
         "SPIN_DELTA": np.degrees(declination),
         "SPIN_ANGLE": np.degrees(np.arctan2(-along[1], along[0])),
-        "SPIN_ANGLE_VEL": np.degrees(inertia.a * rates[:, 2]),
+        "SPIN_ANGLE_VEL": np.degrees(inertia.a * rates[:, 2] - inertia.wheel / inertia.A),
         "NUTATION": np.degrees(np.arctan2(transverse, momentum[:, 2])),
         "NUTATION_PER": FULL * inertia.A / size,
         "NUTATION_PHASE": np.degrees(phase),

@@ -219,7 +219,7 @@ class Problem:
         off = 0.0
         if self.options.shift is not None and equations.shift:
             final = body.spin if body.goal.spin is None else body.goal.spin
-            off = body.inertia.C * abs(final) * math.sin(min(self.options.shift, 0.5 * math.pi))
+            off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
         return Program(body, self.channels, self.costs, aim, off=off)
 
     def within(self, horizon: float) -> Spacecraft:
