@@ -466,8 +466,8 @@ class _LeastCostSearch(Problem):
     def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
         """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
 
-        All that leave up to `DAMPED_ANGLE` leave as little. Where none leaves nothing, as with channels that stand still
-        in space, those that leave a share `NEARLY` of the tightest bound will do.
+        All that leave up to `DAMPED_ANGLE` leave as little. Where none leaves nothing, as channels that stand still
+        in space may not, those that leave a share `NEARLY` of the tightest bound will do.
         """
         there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
         if not there:
