@@ -154,9 +154,9 @@ def _course(course: Conservation) -> str:
 
 
 def _largest(verification: Verification) -> list[str]:
-    """The imperfection that leaves the most nutation alone; empty where none leaves any."""
+    """The imperfection that leaves the most nutation alone; empty where none leaves more than ideal impulses."""
     single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
     most = max(single, key=lambda row: row.nutation, default=None)
-    if most is None or most.nutation <= SHOWN:
+    if most is None or most.nutation - verification.budget[0].nutation <= SHOWN:
         return []
     return [f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."]
