@@ -352,7 +352,7 @@ def topics_screen() -> RenderableType:
         ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
         ("Motion", ", ".join(topic.name for topic in MOTION)),
         ("Equations", "17, K7, 24.4"),
-        ("Words", "any heading of a table, column, name in JSON, symbol, or key of the file, as in: explain tilt"),
+        ("Words", "any heading, column, name in JSON, symbol or key: explain tilt"),
     )
     return Constrain(Group(*parts, _Pairs(others)), WIDEST)
 

@@ -208,7 +208,7 @@ def units_topic() -> Topic:
 
 
 PAGES = (
-    ("To begin", ("tutorial", "reading", "glossary")),
+    ("To begin", ("tutorial", "reading", "cases", "glossary")),
     (
         "How to",
         ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "campaign", "fit", "report", "library"),
