@@ -14,7 +14,7 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import CannotRead
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record
+from nutdamp.estimation.signals import ACCELERATION, AXIS, GYROS, Record
 from nutdamp.files import tabular
 from nutdamp.files.telemetry import read_telemetry
 

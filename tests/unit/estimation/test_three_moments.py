@@ -19,8 +19,8 @@ import nutdamp
 from nutdamp.common import work
 from nutdamp.estimation.fit import Fit, fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.estimation.results import doubts
+from nutdamp.estimation.signals import GYROS, Record
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
