@@ -14,9 +14,7 @@ from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 @click.argument("telemetry", type=FILE, metavar="TELEMETRY.csv")
 @spacecraft_argument
 @click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
-@click.option(
-    "--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg."
-)
+@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.")
 @click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
 @click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")

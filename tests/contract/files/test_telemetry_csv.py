@@ -63,7 +63,7 @@ def test_a_crossing_is_of_the_direction_in_its_row_or_of_the_sun(read: Read) -> 
     times, rows = record.samples((*SEEN, *DIRECTION))
     assert_array_equal(times, [0.0, 1.0])
     assert_allclose(rows[:, :3], [[0.0, 1.0, 0.0], [math.cos(math.pi / 6), 0.0, 0.5]], atol=1e-15)
-    assert_allclose(rows[:, 3:], [[0.0, 0.0, -1.0], sunny.sun], atol=1e-15)
+    assert_allclose(rows[:, 3:], np.array([[0.0, 0.0, -1.0], sunny.sun.tolist()]), atol=1e-15)
     record, _ = read(f"t_s,{crossed}\n0,90,0\n", sunny)
     assert_allclose(record.samples(DIRECTION)[1], [sunny.sun])
 
