@@ -12,7 +12,7 @@ of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -350,17 +350,12 @@ def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
     weights = 0.1 / scales_of(model)[model.signal]
     # Of one direction the attitude is not told about it.
-    held = np.array([0.0 if math.isinf(prior) else 1.0 / prior for prior in map(_of_attitude(model), names)])
+    known = {each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")}
+    held = np.array([known.get(name, 0.0) for name in names])
     matrix = np.concatenate([np.column_stack(columns) * weights[:, None], np.diag(held)])
     target = np.concatenate([(model.measured - at_rest) * weights, -held * [base[name] for name in names]])
     solved = np.linalg.lstsq(matrix, target, rcond=1e-10)[0]
     return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}
-
-
-def _of_attitude(model: Model) -> Callable[[str], float]:
-    """Priors by the names of the parameters of the attitude; those of others count as infinite."""
-    known = {each.name: each.prior for each in model.parameters if each.name.startswith("attitude")}
-    return lambda name: known.get(name, math.inf)
 
 
 WITHIN = 3.0
