@@ -28,7 +28,7 @@ from nutdamp.estimation.signals import (
     SUN_ASPECT,
     Matrix,
     Record,
-    Scene,
+    Sighting,
     Values,
     Vector,
     tilted,
@@ -176,8 +176,8 @@ class Model:
         moments, parts = self._moments(values), []
         for index, (name, samples) in enumerate(zip(self.signals, self.samples, strict=True)):
             rows = np.flatnonzero(self.signal == index)[: len(samples)]
-            scene = Scene(self.spacecraft, values, moments, samples, rates[rows], quaternion[rows])
-            parts.append(KIND[name].predicted(scene))
+            seen = Sighting(self.spacecraft, values, moments, samples, rates[rows], quaternion[rows])
+            parts.append(KIND[name].predicted(seen))
         return np.concatenate(parts)
 
     def _moments(self, values: Values) -> tuple[float, float, float]:

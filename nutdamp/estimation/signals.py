@@ -101,7 +101,7 @@ class Record:
         return self.times[there], table[there]
 
     @property
-    def kinds(self) -> tuple[Kind, ...]:
+    def kinds(self) -> tuple[SignalKind, ...]:
         """Kinds of signals that it has samples of."""
         return tuple(kind for kind in KINDS if len(kind.samples(self)[0]))
 
@@ -137,7 +137,7 @@ def quantisation(values: Vector) -> float:
     return float(gaps.min()) if np.mean(np.abs(multiples - np.rint(multiples)) < 1e-2) > MULTIPLES else 0.0
 
 
-class Scene(NamedTuple):
+class Sighting(NamedTuple):
     """The motion at the samples (n, k) of one signal, in the axes of the file: rates (n, 3), quaternion (n, 4).
 
     ``values`` are those of all parameters, ``moments`` about the principal axes of the file, kg m².
@@ -164,7 +164,7 @@ class Scene(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Kind:
+class SignalKind:
     """Measurement model: ``predicted`` samples of the signals ``columns`` of a record, in ``unit``.
 
     ``parts`` (values compared per sample) are what is ``off``, zero if nothing is, or the samples themselves.
@@ -176,7 +176,7 @@ class Kind:
     name: str
     columns: tuple[str, ...]
     unit: str
-    predicted: Callable[[Scene], Vector]
+    predicted: Callable[[Sighting], Vector]
     nutation: str = ""
     parts: int = 1
     off: bool = False
@@ -193,24 +193,24 @@ class Kind:
         return record.sun_pulses, np.zeros((len(record.sun_pulses), 1))
 
 
-def _gyro(index: int) -> Callable[[Scene], Vector]:
+def _gyro(index: int) -> Callable[[Sighting], Vector]:
     """Rate about one axis of gyros that are turned by a rotation vector across axis 3: ω seen in their axes."""
 
-    def shown(scene: Scene) -> Vector:
-        along = attitude.rotate(tilted(scene.values, "misalignment"), np.eye(3)[index])
-        return np.asarray(scene.rates @ along + scene.values.get(f"bias_{GYROS[index]}", 0.0))
+    def shown(seen: Sighting) -> Vector:
+        along = attitude.rotate(tilted(seen.values, "misalignment"), np.eye(3)[index])
+        return np.asarray(seen.rates @ along + seen.values.get(f"bias_{GYROS[index]}", 0.0))
 
     return shown
 
 
-def _felt(scene: Scene) -> Vector:
+def _felt(seen: Sighting) -> Vector:
     """Acceleration at the accelerometer, m/s²."""
-    spacecraft, moments = scene.spacecraft, np.array(scene.moments)
+    spacecraft, moments = seen.spacecraft, np.array(seen.moments)
     assert spacecraft.loop is not None
-    rates = scene.rates @ spacecraft.inertia.axes
-    sinking = _sinking(moments * rates, scene.values.get("growth", spacecraft.growth))
+    rates = seen.rates @ spacecraft.inertia.axes
+    sinking = _sinking(moments * rates, seen.values.get("growth", spacecraft.growth))
     columns = felt(spacecraft.loop.sensor, moments, rates.T, sinking.T)
-    return np.asarray(columns[0] + scene.values.get("bias_acceleration", 0.0))
+    return np.asarray(columns[0] + seen.values.get("bias_acceleration", 0.0))
 
 
 def _sinking(momentum: Vector, growth: float) -> Vector:
@@ -223,43 +223,43 @@ def _sinking(momentum: Vector, growth: float) -> Vector:
     return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
 
 
-def _axis_off(scene: Scene) -> Vector:
+def _axis_off(seen: Sighting) -> Vector:
     """Components of the spin axis across the measured one."""
-    up = np.array([0.0, 0.0, math.copysign(1.0, scene.spacecraft.spin)])
-    return _off(scene.samples, attitude.rotate(scene.principal, up))
+    up = np.array([0.0, 0.0, math.copysign(1.0, seen.spacecraft.spin)])
+    return _off(seen.samples, attitude.rotate(seen.principal, up))
 
 
-def _turn_off(scene: Scene) -> Vector:
+def _turn_off(seen: Sighting) -> Vector:
     """Angles by which the body is turned about axis 3 from a measured attitude, rad."""
-    of_file = attitude.from_matrix(scene.spacecraft.inertia.axes)
-    measured = attitude.multiply(scene.samples, of_file)
-    apart = attitude.multiply(attitude.conjugate(measured), scene.principal)
+    of_file = attitude.from_matrix(seen.spacecraft.inertia.axes)
+    measured = attitude.multiply(seen.samples, of_file)
+    apart = attitude.multiply(attitude.conjugate(measured), seen.principal)
     return wrapped(2.0 * np.arctan2(apart[:, 3], apart[:, 0]))
 
 
-def _crossing_off(scene: Scene) -> Vector:
+def _crossing_off(seen: Sighting) -> Vector:
     """Components of a known direction, as the body has it, across where it was seen."""
-    there = attitude.rotate(attitude.conjugate(scene.sensors), scene.samples[:, 3:])
-    return _off(scene.samples[:, :3], there)
+    there = attitude.rotate(attitude.conjugate(seen.sensors), seen.samples[:, 3:])
+    return _off(seen.samples[:, :3], there)
 
 
-def _sun_aspect(scene: Scene) -> Vector:
+def _sun_aspect(seen: Sighting) -> Vector:
     """Angle of the Sun from body axis 3, rad."""
-    sun = scene.spacecraft.sun
+    sun = seen.spacecraft.sun
     assert sun is not None
-    x, y, z = attitude.rotate(attitude.conjugate(scene.sensors), sun).T
+    x, y, z = attitude.rotate(attitude.conjugate(seen.sensors), sun).T
     return np.asarray(np.arctan2(np.hypot(x, y), z))
 
 
-def _sun_late(scene: Scene) -> Vector:
+def _sun_late(seen: Sighting) -> Vector:
     """Times by which Sun pulses should have come later than they came, s."""
-    body, sensor = scene.spacecraft, scene.spacecraft.sun_sensor
+    body, sensor = seen.spacecraft, seen.spacecraft.sun_sensor
     assert sensor is not None
     assert body.sun is not None
-    of_body = attitude.multiply(scene.quaternion, attitude.from_matrix(body.inertia.axes))
-    sun = np.broadcast_to(body.sun[:, None], (3, len(scene.rates)))
+    of_body = attitude.multiply(seen.quaternion, attitude.from_matrix(body.inertia.axes))
+    sun = np.broadcast_to(body.sun[:, None], (3, len(seen.rates)))
     sense = math.copysign(1.0, body.spin)
-    ahead, rate = sky.ahead((scene.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
+    ahead, rate = sky.ahead((seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(body.spin)))
 
 
@@ -288,16 +288,17 @@ def tilted(values: Values, kind: str) -> Vector:
 
 
 KINDS = (
-    Kind(GYROS[0], GYROS[:1], "rad/s", _gyro(0), BODY, turn=True),
-    Kind(GYROS[1], GYROS[1:2], "rad/s", _gyro(1), BODY, turn=True),
-    Kind(GYROS[2], GYROS[2:], "rad/s", _gyro(2), spin=True),
-    Kind(ACCELERATION, (ACCELERATION,), "m/s²", _felt, BODY, turn=True),
-    Kind("axis", AXIS, "rad", _axis_off, SPACE, parts=2, off=True, attitude=True, wobble=True, spread=1e-3),
-    Kind("turn", QUATERNION, "rad", _turn_off, off=True, turn=True, spin=True, attitude=True, wobble=True, spread=1e-3),
-    Kind(CROSSING, (*SEEN, *DIRECTION), "rad", _crossing_off, SPACE, parts=2, off=True, turn=True, spin=True,
-         attitude=True, wobble=True, spread=1e-3),
-    Kind(SUN_ASPECT, (SUN_ASPECT,), "rad", _sun_aspect, SPACE, attitude=True, wobble=True),
-    Kind(SUN_PULSE, (), "s", _sun_late, off=True, turn=True, spin=True, attitude=True, spread=0.01),
+    SignalKind(GYROS[0], GYROS[:1], "rad/s", _gyro(0), BODY, turn=True),
+    SignalKind(GYROS[1], GYROS[1:2], "rad/s", _gyro(1), BODY, turn=True),
+    SignalKind(GYROS[2], GYROS[2:], "rad/s", _gyro(2), spin=True),
+    SignalKind(ACCELERATION, (ACCELERATION,), "m/s²", _felt, BODY, turn=True),
+    SignalKind("axis", AXIS, "rad", _axis_off, SPACE, parts=2, off=True, attitude=True, wobble=True, spread=1e-3),
+    SignalKind("turn", QUATERNION, "rad", _turn_off, off=True, turn=True, spin=True, attitude=True, wobble=True,
+               spread=1e-3),
+    SignalKind(CROSSING, (*SEEN, *DIRECTION), "rad", _crossing_off, SPACE, parts=2, off=True, turn=True, spin=True,
+               attitude=True, wobble=True, spread=1e-3),
+    SignalKind(SUN_ASPECT, (SUN_ASPECT,), "rad", _sun_aspect, SPACE, attitude=True, wobble=True),
+    SignalKind(SUN_PULSE, (), "s", _sun_late, off=True, turn=True, spin=True, attitude=True, spread=0.01),
 )  # fmt: skip
 """Measurement models, in the order of a fit."""
 

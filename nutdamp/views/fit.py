@@ -18,7 +18,7 @@ from nutdamp.files.fitted import notes
 from nutdamp.views.decisions import exact_percent, percent
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0
@@ -157,7 +157,7 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("", "comply", "%", lambda row: None if row.met is None else 100.0 * row.met,
                lambda share: f"{share:.4g}", "screen"),
         Column("propellant_kg", "", "", lambda row: row.propellant, where="json"),
-        Column("", "propellant", "g", lambda row: row.propellant and 1e3 * row.propellant, lambda kg: f"{kg:.3g}",
+        Column("", Shared.PROPELLANT, "g", lambda row: row.propellant and 1e3 * row.propellant, lambda kg: f"{kg:.3g}",
                "screen"),
         Column("gain_deg_kg", "", "", gain, where="json"),
         Column("", "gain", "deg/g", lambda row: (rate := gain(row)) and 1e-3 * rate, lambda rate: f"{rate:.2g}",
