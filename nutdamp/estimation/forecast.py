@@ -211,7 +211,7 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
 def _samples(model: Model, quaternion: Vector) -> dict[str, Vector]:
     """Signals (n,) of a record of attitudes (n, 4), as often there as in the record of the model."""
     samples, count = dict[str, Vector](), len(quaternion)
-    sense = math.copysign(1.0, model.spacecraft.spin)
+    sense = model.spacecraft.sense
     axis = attitude.rotate(quaternion, sense * model.spacecraft.inertia.axes[:, 2])
     for kind in model.record.kinds:
         times, rows = kind.samples(model.record)

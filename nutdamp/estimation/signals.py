@@ -121,7 +121,7 @@ def of_quaternions(quaternions: Vector, spacecraft: Spacecraft) -> dict[str, Vec
 
     They are compared apart, for star trackers tell them with different noise.
     """
-    up = math.copysign(1.0, spacecraft.spin) * spacecraft.inertia.axes[:, 2]
+    up = spacecraft.sense * spacecraft.inertia.axes[:, 2]
     axis = attitude.rotate(quaternions, up)
     return dict(zip((*AXIS, *QUATERNION), np.column_stack([axis, quaternions]).T, strict=True))
 
@@ -225,7 +225,7 @@ def _sinking(momentum: Vector, growth: float) -> Vector:
 
 def _axis_off(seen: Sighting) -> Vector:
     """Components of the spin axis across the measured one."""
-    up = np.array([0.0, 0.0, math.copysign(1.0, seen.spacecraft.spin)])
+    up = np.array([0.0, 0.0, seen.spacecraft.sense])
     return _off(seen.samples, attitude.rotate(seen.principal, up))
 
 
@@ -258,7 +258,7 @@ def _sun_late(seen: Sighting) -> Vector:
     assert body.sun is not None
     of_body = attitude.multiply(seen.quaternion, attitude.from_matrix(body.inertia.axes))
     sun = np.broadcast_to(body.sun[:, None], (3, len(seen.rates)))
-    sense = math.copysign(1.0, body.spin)
+    sense = body.sense
     ahead, rate = sky.ahead((seen.rates @ body.inertia.axes).T, of_body.T, sun, sensor.azimuth, sense)
     return np.asarray(wrapped(ahead) / np.where(rate > 0.0, rate, abs(body.spin)))
 

@@ -10,7 +10,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import guide
 from nutdamp.views.guide import Formula, Topic, TopicRows
-from nutdamp.views.spacecraft import beyond_floors
+from nutdamp.views.spacecraft import beyond_floors, turn_floor
 from nutdamp.views.text import quantity
 
 EQUATIONS = ("1", "17", "18", "19")
@@ -68,7 +68,10 @@ def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
     if body.goal.axis is not None:
         turning = quantity(body.turning_impulse, "N m s")
-        yield "C|ω3|β", f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
+        yield (
+            turn_floor(body),
+            f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}",
+        )
 
 
 def _any_of(*schemes: str) -> Callable[[Comparison], bool]:

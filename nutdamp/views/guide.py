@@ -197,8 +197,9 @@ def units_topic() -> Topic:
                     "sampling rates alone, and revolutions are no unit here, since nobody can tell whether they count "
                     "turns or radians.",
                     "A share is a plain number or has %. Screens show degrees, s, N m s, g or kg of propellant, "
-                    "the spin in rpm and rad/s; CSV and JSON name the unit in the column or key, such as t_s, "
-                    "nutation_deg.",
+                    "the spin in rpm and rad/s; with --units us lbm, lbf, ft lbf, ft lbf s, slug ft², ft, in, ft/s and "
+                    "psi. CSV, JSON, pictures and reports are SI all the same, as are bare numbers that are read. CSV "
+                    "and JSON name the unit in the column or key, such as t_s, nutation_deg.",
                 ),
             ),
             TopicPart("See also", ("explain file",)),
