@@ -15,8 +15,9 @@ import numpy as np
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import step
 from nutdamp.estimation.fit import KEPT, Fit
-from nutdamp.estimation.model import OF_SENSORS, Body, Matrix, Values, Vector
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_spin, shows_turn, thrust_prior
+from nutdamp.estimation.model import OF_SENSORS, Body
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, thrust_prior
+from nutdamp.estimation.signals import Matrix, Values, Vector
 from nutdamp.physics import attitude, triaxial
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState
@@ -254,7 +255,7 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
 
     slopes = derivatives(fitted, motion)
     values, sigmas = motion(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
-    if not shows_turn(model.record):
+    if not model.record.shows_turn:
         sigmas[3] = math.inf
     omega = complex(*spacecraft.rates[:2])
     file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
@@ -303,7 +304,7 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
     for (key, label, unit, file, prior), value, sigma in zip(rows, values, sigmas, strict=True):
         if sigma > 0.0:
             yield Estimate(key, label, unit, 1.0, float(value), float(sigma), file, prior)
-    if shows_turn(fitted.model.record) and not shows_spin(fitted.model.record):
+    if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
         yield _rate(fitted)
     if fitted.index("growth") is not None:
         value, sigma = _at(fitted, "growth")
@@ -393,10 +394,11 @@ def doubts(fitted: Fit) -> Iterator[str]:
             f"the transverse moments of inertia differ by {apart:.2g} %, and in the file they are equal: all else is "
             "estimated with what they are; give the tensor"
         )
-    if not shows_turn(fitted.model.record):
+    if not fitted.model.record.shows_turn:
         yield (
-            "the axis alone does not show how the body is turned about it: the phase, and so the firing times of a "
-            "plan, rest on the attitude of the file; omega_1 or omega_2, an acceleration or Sun pulses would show it"
+            f"{' and '.join(fitted.model.signals)} alone does not show how the body is turned about its axis: the "
+            "phase, and so the firing times of a plan, rest on the attitude of the file; omega_1 or omega_2, an "
+            "acceleration, Sun pulses, crossings or quaternions would show it"
         )
     yield from _of_residuals(fitted)
     yield from _of_schedule(fitted)

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import Fit
-from nutdamp.estimation.parameters import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, Carried, correlations, replaced
+from nutdamp.estimation.signals import ACCELERATION
 from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits
 from nutdamp.files.overrides import Setting
 from nutdamp.files.reader import Source
