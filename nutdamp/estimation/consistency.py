@@ -76,7 +76,7 @@ def expect_enough(model: Model) -> None:
             "unknowns; a longer record, or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
-    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin)
+    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin, body.inertia.wheel)
     if not any(KIND[name].nutation == BODY for name in model.signals):
         period = body.inertial_period
     if length < 0.5 * period:

@@ -87,7 +87,7 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
     cone = _cone(model, share)
     if cone is not None and model.record.shows_spin and not model.record.has(GYROS[2]):
         # A direction goes round a sensor once a turn of the body about its axis and of the axis about H.
-        spin -= math.copysign(cone.rate * (1.0 - cone.cosine), spin)
+        spin -= model.spacecraft.sense * cone.rate * (1.0 - cone.cosine)
     if "omega_3" in of_file:
         of_file["omega_3"] = spin
     rate = _peak(model, spin, share)
@@ -105,9 +105,9 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
             values = _linear(model, linear | turned | {RATIO: ratio})
             yield values
             if _seldom(model) and model.record.shows_spin:
-                axial = ratio * spin
+                axial = _axial_rate(model, ratio, spin)
                 size = math.hypot(values["omega_1"], values["omega_2"])
-                less = math.copysign(math.hypot(axial, size), spin) - axial
+                less = math.copysign(math.hypot(axial, size), axial) - axial
                 yield _linear(model, values | {"omega_3": spin - less})
 
 
@@ -209,17 +209,18 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
     """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
     record, body = model.record, model.spacecraft
     expected = body.inertia.nutation_rate(spin)
+    most = abs(spin) if body.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
     count = max(int(share * len(record.times)), min(len(record.times), 16))
     times = record.times[: min(count, LONGEST_SPECTRUM)]
     signals = {name: values[: len(times)] for name, values in record.signals.items()}
     if record.has(*GYROS[:2]):
-        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
+        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, most, -1.0)
     for name in (*GYROS[:2], ACCELERATION):
         if name in signals:
-            turning = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            turning = _strongest(times, signals[name], None, expected, most, 1.0)
             return None if turning is None else math.copysign(turning, expected)
     cone = _cone(model, share)
-    return None if cone is None else spin - math.copysign(cone.rate * cone.cosine, spin)
+    return None if cone is None else spin - body.sense * cone.rate * cone.cosine
 
 
 class _Cone(NamedTuple):
@@ -260,9 +261,9 @@ def _cone(model: Model, share: float) -> _Cone | None:
     first /= np.linalg.norm(first)
     second = np.cross(momentum, first)
     x, y = axis @ first, axis @ second
-    # In the sense of H, with |H|/A = Cω3/(A cos θ).
+    # In the sense of H, with |H|/A = H3/(A cos θ).
     height = float(momentum @ mean)
-    pace = abs(body.spin) / max(height, FLAT)
+    pace = abs(body.axial) / body.inertia.C / max(height, FLAT)
     rate = _strongest(times, x, y, body.inertia.C / body.inertia.A * pace, MOST_TURNED * pace, 1.0)
     if rate is None:
         return None
@@ -273,7 +274,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
 
 def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str, float]:
     """Values by which the axis describes a cone: ω is that of the axis about H, besides what is along the axis."""
-    moments = _moments(model, spin - math.copysign(cone.rate * cone.cosine, spin), spin)
+    moments = _moments(model, spin - model.spacecraft.sense * cone.rate * cone.cosine, spin)
     values = {**values, **moments, **_towards(model, cone.begin)}
     across = cone.rate * (cone.momentum - cone.cosine * cone.begin)
     x, y, _ = attitude.rotate(attitude.conjugate(model.turned(values)), across)
@@ -317,7 +318,10 @@ def _strongest(
 def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
     inertia = model.spacecraft.inertia
-    wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
+    if inertia.wheel == 0.0:
+        wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
+    else:  # of the A at which ω3 - H3/A is the rate
+        wanted = inertia.C * (spin - rate) / float(inertia.axial(spin))
     wanted = min(max(wanted, 0.01), 1.999)
     A, ratio = model.parameter("A"), model.parameter(RATIO)
     assert ratio is not None
@@ -330,7 +334,7 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
 
 def _towards(model: Model, axis: Vector) -> dict[str, float]:
     """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any length."""
-    sense = math.copysign(1.0, model.spacecraft.spin)
+    sense = model.spacecraft.sense
     wanted = sense * attitude.rotate(attitude.conjugate(model.reference.quaternion), axis / np.linalg.norm(axis))
     across = np.cross([0.0, 0.0, 1.0], wanted)
     size = float(np.linalg.norm(across))
@@ -440,8 +444,15 @@ def too_slow(model: Model, values: Vector) -> bool:
 
 def nutation_rate(model: Model, values: Vector) -> float:
     """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
-    ratio = float(values[_range(model)[0]])
-    return (1.0 - ratio if _transverse(model) else ratio) * _spin_of(model, values)
+    spin = _spin_of(model, values)
+    axial = _axial_rate(model, float(values[_range(model)[0]]), spin)
+    return spin - axial if _transverse(model) else axial
+
+
+def _axial_rate(model: Model, ratio: float, spin: float) -> float:
+    """H3/A in rad/s at a ``ratio`` C/A and a ``spin``."""
+    inertia = model.spacecraft.inertia
+    return ratio * (spin + inertia.wheel / inertia.C)
 
 
 def interval(model: Model) -> float:

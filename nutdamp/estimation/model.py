@@ -56,18 +56,30 @@ OF_SENSORS = ("bias", "misalignment", "wobble")
 class Body:
     """The body that parameters describe: its ``state`` at the start of the record in its own principal axes.
 
-    ``moments`` (I1, I2, I3) kg m², ``axes`` (3, 3) its principal axes in those of the file, as columns.
+    ``moments`` (I1, I2, I3) kg m², ``axes`` (3, 3) its principal axes in those of the file, as columns; ``wheel`` is
+    the momentum of a wheel, N m s.
     """
 
     moments: tuple[float, float, float]
     axes: Matrix
     state: SpinState
     growth: float
+    wheel: float = 0.0
 
     @property
     def symmetric(self) -> bool:
         """True where I1 = I2."""
         return self.moments[0] == self.moments[1]
+
+    @property
+    def closed(self) -> bool:
+        """True where a coast is a closed form."""
+        return self.symmetric or (self.growth == 0.0 and self.wheel == 0.0)
+
+    @property
+    def inertia(self) -> Inertia:
+        """Moments, axes and wheel."""
+        return Inertia(self.moments, self.axes, self.wheel)
 
 
 class Model:
@@ -112,7 +124,8 @@ class Model:
     def reference(self) -> SpinState:
         """The motion at the start of the record as the file has it."""
         inertia = self.spacecraft.inertia
-        body = Body(inertia.moments, inertia.axes, self.spacecraft.initial, self.spacecraft.growth)
+        state = self.spacecraft.initial
+        body = Body(inertia.moments, inertia.axes, state, self.spacecraft.growth, inertia.wheel)
         # As if the record began at t = 0; a file's disturbances are too small to turn it much before.
         rates, quaternion = _coast(body).motion(np.array([self.start]))
         return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
@@ -144,7 +157,8 @@ class Model:
             about = np.array([[math.cos(half), -math.sin(half), 0.0], [math.sin(half), math.cos(half), 0.0], [0, 0, 1]])
             moments, axes, rates = (A * (1.0 + size), A * (1.0 - size), C), axes @ about, about.T @ rates
             quaternion = attitude.multiply(quaternion, np.array([math.cos(0.5 * half), 0, 0, math.sin(0.5 * half)]))
-        return Body(moments, axes, SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion), growth)
+        state = SpinState(complex(rates[0], rates[1]), float(rates[2]), quaternion)
+        return Body(moments, axes, state, growth, values.get("wheel", of_file.wheel))
 
     def motion(self, values: Values, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) rad/s and quaternions (n, 4) of the file's axes at rising ``times`` (n,) s."""
@@ -203,12 +217,13 @@ class Model:
     def _rates(self, values: Values, times: Vector) -> Vector:
         """The rates of `motion` alone."""
         body = self.body(values)
-        if self.pulses.pulses or self.spacecraft.disturbances or not (body.symmetric or body.growth == 0.0):
+        if self.pulses.pulses or self.spacecraft.disturbances or not body.closed:
             return self.motion(values, times)[0]
         state, (A, _, C) = body.state, body.moments
         if not body.symmetric:
             return triaxial.free_rates(body.moments, state.rates, times - self.start) @ body.axes.T
-        omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, times - self.start)
+        since = times - self.start
+        omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, since, body.wheel)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
 
     @cached_property
@@ -238,7 +253,7 @@ class Model:
 
     def _path(self, body: Body, fired: Schedule, until: float) -> Path:
         """The motion from the start of the record, from which its times count, to ``until`` s from t = 0."""
-        if not fired.pulses and not self.spacecraft.disturbances and (body.symmetric or body.growth == 0.0):
+        if not fired.pulses and not self.spacecraft.disturbances and body.closed:
             return _coast(body)
         if until < self.start:
             raise Infeasible(
@@ -247,7 +262,7 @@ class Model:
             )
         spacecraft = self._as_spacecraft(body)
         acting = make_dynamics(spacecraft)
-        dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth))
+        dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth, body.wheel))
         pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
         return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
 
@@ -263,7 +278,7 @@ class Model:
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
         return replace(
             self.spacecraft,
-            inertia=Inertia(body.moments, body.axes, self.spacecraft.inertia.wheel),
+            inertia=body.inertia,
             disturbances=tuple(
                 replace(disturbance, transverse=about * disturbance.transverse)
                 for disturbance in self.spacecraft.disturbances
@@ -274,9 +289,9 @@ class Model:
 
 
 def _coast(body: Body) -> Path:
-    """The motion without pulses; of three moments that without dissipation."""
+    """The motion without pulses; of three moments that without dissipation and wheel."""
     if body.symmetric:
-        return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth)
+        return Arc(body.moments[0], body.moments[2], 0.0, body.state, body.growth, body.wheel)
     return FreeCoast(body.moments, 0.0, body.state)
 
 
@@ -314,6 +329,8 @@ def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
         if loop is None or loop.sensor.kind != ACCELEROMETER:
             problem = "expected kind: accelerometer with its position, for the column acceleration_m_s2"
             raise Unsuitable(("loop", "sensor"), problem)
+        if spacecraft.inertia.wheel != 0.0:
+            raise Unsuitable(("wheel",), "with a wheel no accelerometer is modelled: leave acceleration_m_s2 out")
         if is_blind(spacecraft.inertia.moments, loop.sensor.position, loop.sensor.axis):
             raise Unsuitable(("loop", "sensor"), "the accelerometer shows nothing of a nutation where it is")
     if len(record.sun_pulses) and (spacecraft.sun is None or spacecraft.sun_sensor is None):

@@ -88,7 +88,8 @@ def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[flo
     """A and C (kg m²) of the ``values`` of parameters."""
     of_A, of_C = _of_moments(spacecraft)
     ratio = values[RATIO]
-    if of_A[1] > 0.0 and of_C[1] == 0.0:
+    # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does not matter.
+    if of_C[1] == 0.0 and (of_A[1] > 0.0 or spacecraft.inertia.wheel != 0.0):
         return of_C[0] / ratio, of_C[0]
     A = values.get("A", of_A[0])
     return A, ratio * A
@@ -130,16 +131,19 @@ def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[floa
 
 
 def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -> Iterator[Parameter]:
-    given, spin = spacecraft.dispersions, float(spacecraft.omega0[2])
+    given, spin, step = spacecraft.dispersions, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
     yield from moments(spacecraft)
+    if given is not None and given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
+        wheel, sigma = prior_of(given.wheel_momentum, spacecraft.inertia.wheel)
+        yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
-        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, TINY * abs(spin))
+        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step)
     if record.shows_spin:
-        yield Parameter("omega_3", "rad/s", spin, math.inf, TINY * abs(spin))
+        yield Parameter("omega_3", "rad/s", spin, math.inf, step)
     elif given is not None and given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
-        yield Parameter("omega_3", "rad/s", mean, sigma, TINY * abs(spin))
-    if growing and spacecraft.inertia.a != 0.0:
+        yield Parameter("omega_3", "rad/s", mean, sigma, step)
+    if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
         yield Parameter("growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3))
     if any(kind.attitude for kind in record.kinds):
         yield from _attitude(spacecraft, record)

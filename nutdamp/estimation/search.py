@@ -125,8 +125,7 @@ def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: b
 
 def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
-    spin = abs(model.spacecraft.spin)
-    usual = {"rad/s": 1e-2 * spin, "1/s": 0.1 / max(model.record.length, 1e-9)}
+    usual = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
     return np.array(
         [
             parameter.prior if math.isfinite(parameter.prior) else usual.get(parameter.unit, 1e-2)

@@ -308,7 +308,7 @@ def _unit(
 def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> None:
     """A fault where ω3 is so many times the spin of the file as one unit of rates is of another."""
     name = GYROS[2]
-    if name not in signals:
+    if name not in signals or spin == 0.0:
         return
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
