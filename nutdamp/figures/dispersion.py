@@ -174,9 +174,7 @@ def ellipse(points: Vector, share: float) -> Vector:
     sizes = np.sqrt(np.maximum(variances, 0.0))
     along = (points - middle) @ vectors
     away = np.hypot(*np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 0.0).T)
-    turn = np.linspace(0.0, 2.0 * math.pi, 121)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)]) * sizes * float(np.quantile(away, share))
-    return np.asarray(middle + circle @ vectors.T)
+    return np.asarray(middle + geometry.circle() * sizes * float(np.quantile(away, share)) @ vectors.T)
 
 
 def _momentum(axes: Axes, results: Results) -> None:
@@ -210,8 +208,7 @@ def _momentum(axes: Axes, results: Results) -> None:
     axes.plot(*around.T, color=MOMENTUM, linewidth=1.5, label=held)
     shown = [points, around]
     if limit is not None and limit <= FAR * widest:
-        turn = np.linspace(0.0, 2.0 * math.pi, 121)
-        shown.append(limit * np.column_stack([np.cos(turn), np.sin(turn)]))
+        shown.append(limit * geometry.circle())
         axes.plot(*shown[-1].T, **style.LIMIT)
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):

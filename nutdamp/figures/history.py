@@ -46,10 +46,15 @@ CHANGES = 1e-3
 
 def heights(flight: Flight, track: Track) -> list[float]:
     """Height of each panel, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
-    rows = len(geometry.channels_fired(flight))
     spin = track.rates[:, 2]
     changes = float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max())
-    return [1.9, *([0.3 + 0.36 * rows] * bool(rows)), 1.5, *([0.9] * changes)]
+    return [1.9, *firings_height(flight), 1.5, *([0.9] * changes)]
+
+
+def firings_height(flight: Flight) -> list[float]:
+    """Inches of the panel of `firings`, for each row a bar, its number, and room; empty where nothing fires."""
+    rows = len(geometry.channels_fired(flight))
+    return [0.3 + 0.36 * rows] * bool(rows)
 
 
 def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
@@ -88,10 +93,8 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
         axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
         axes.axhline(limit, **style.LIMIT)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
-    _finish(axes, flight, track, "θ, ° (log)")
-    axes.set_yscale("log")
-    axes.set_ylim(low, 2.0 * (most if limit is None else max(most, limit)))
-    style.log_axis(axes.yaxis)
+    _finish(axes, flight, track)
+    style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
     text, colour = _verdict(flight)
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
     axes.set_title(last + text, loc="right", color=colour, **style.NOTE)
@@ -130,7 +133,7 @@ def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.locator_params(axis="y", nbins=3)
 
 
-def _finish(axes: Axes, flight: Flight, track: Track, name: str) -> None:
+def _finish(axes: Axes, flight: Flight, track: Track, name: str = "") -> None:
     """Time axis, bands of the firings, and the quantity."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)

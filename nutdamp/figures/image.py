@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,14 +35,14 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def ending(path: str) -> str:
-    """The format of a picture by the ending of its file, png for standard output.
+def ending(path: str, option: str = "--plot", formats: Sequence[str] = FORMATS) -> str:
+    """The format of a picture by the ending of its file, the first of ``formats`` for standard output.
 
     Raises BadRequest for other endings, MissingExtra without matplotlib.
     """
-    suffix = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
-    if suffix not in FORMATS:
-        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    suffix = formats[0] if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if suffix not in formats:
+        raise BadRequest(f"{option} {path}: the ending says the format; use one of .{', .'.join(formats)}")
     style.require()
     return suffix
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.figures import geometry
-from nutdamp.figures.braille import ticks
+from nutdamp.figures.geometry import ticks
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft.model import Vector
