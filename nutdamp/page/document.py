@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -266,22 +266,18 @@ class Page:
     control: Control
     source: str
     state: str
-    good: bool
-    met: bool | None
     headline: tuple[str, str]
-    verdict: str
-    margins: tuple[RequirementBar, ...]
-    facts: FactList | None
-    warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    motion: tuple[Block, ...]
     contenders: tuple[Contender, ...]
-    sections: tuple[PageSection, ...]
     made_by: str
-
-    def with_sections(self, sections: Iterable[PageSection]) -> Page:
-        """Copy with these sections."""
-        return replace(self, sections=tuple(sections))
+    good: bool = False
+    met: bool | None = None
+    verdict: str = ""
+    margins: tuple[RequirementBar, ...] = ()
+    facts: FactList | None = None
+    warnings: tuple[str, ...] = ()
+    motion: tuple[Block, ...] = ()
+    sections: tuple[PageSection, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -297,9 +293,9 @@ class Page:
         )
 
 
-def sheet(title: str, table: DataTable, *, place: str = "page", dots: tuple[str, ...] = ()) -> Sheet:
-    """A declared table as a `Sheet`."""
-    return Sheet(title, table.headings(place), table.cells(place), table.mark, dots)
+def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
+    """A declared table as a `Sheet` with further fields of its ``look``."""
+    return Sheet(table.title, table.headings(place), table.cells(place), table.mark, **look)
 
 
 SHARES = (Shared.LINEAR, Shared.CASES)

@@ -260,7 +260,7 @@ def plan_html(plan: Plan) -> str | None:
 
     if not plan.feasible:
         return _block(Prose(repr(plan)[1:-1]))
-    return _beside(_block(sheet(f"Pulses of {plan.scheme}", pulse_table(plan.flight, phased=True))), plan)
+    return _beside(_block(sheet(pulse_table(plan.flight, scheme=plan.scheme))), plan)
 
 
 def flight_html(flight: Flight) -> str | None:
@@ -277,7 +277,7 @@ def comparison_html(compared: Comparison) -> str | None:
     from nutdamp.page.document import sheet
 
     table = scheme_table(compared, compared.recommended)
-    return _beside(_block(sheet(table.title, table)), compared.recommended)
+    return _beside(_block(sheet(table)), compared.recommended)
 
 
 def _beside(table: str | None, result: Plan | Flight | None) -> str | None:

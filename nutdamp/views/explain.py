@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -45,10 +44,10 @@ def _notes() -> Iterator[tuple[str, str]]:
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
-    ("glossary", partial(guide.rows, "glossary")),
-    ("column of CSV", partial(guide.rows, "csv")),
-    ("name in JSON", partial(guide.rows, "json")),
-    ("symbol", partial(guide.rows, "symbols")),
+    ("glossary", lambda: page("glossary").rows),
+    ("column of CSV", lambda: page("csv").rows),
+    ("name in JSON", lambda: page("json").rows),
+    ("symbol", lambda: page("symbols").rows),
     ("note", _notes),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""

@@ -57,6 +57,16 @@ class Topic(NamedTuple):
     summary: str
     parts: tuple[TopicPart, ...]
 
+    @property
+    def blocks(self) -> Iterator[Block]:
+        """Blocks of all parts."""
+        return (block for part in self.parts for block in part.blocks)
+
+    @property
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Rows of all lists and tables."""
+        return (row for block in self.blocks if isinstance(block, TopicRows) for row in block.rows)
+
 
 ENTRIES = ("schemes", "motion", "equations")
 """Pages whose sections are topics of their own."""
@@ -78,14 +88,6 @@ def page(name: str) -> Topic:
 def entries(name: str) -> tuple[Topic, ...]:
     """The topics on a page of `ENTRIES`, in order."""
     return tuple(_topic(section, "### ") for section in _sections(_text(name), "## ")[1:])
-
-
-def rows(name: str) -> Iterator[tuple[str, str]]:
-    """The rows of all lists and tables of a page."""
-    for part in page(name).parts:
-        for block in part.blocks:
-            if isinstance(block, TopicRows):
-                yield from block.rows
 
 
 def _text(name: str) -> str:
@@ -282,7 +284,7 @@ def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") ->
 
 def limits() -> tuple[str, ...]:
     """Assumptions and limits, a paragraph each."""
-    return tuple(text for _, text in rows("limits"))
+    return tuple(text for _, text in page("limits").rows)
 
 
 class Equation(NamedTuple):
@@ -324,7 +326,7 @@ class Equation(NamedTuple):
         return Topic(self.number, self.subject, parts)
 
 
-SYMBOLS = dict(rows("symbols"))
+SYMBOLS = dict(page("symbols").rows)
 """Symbols of the sources with their units."""
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))

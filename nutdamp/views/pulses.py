@@ -127,21 +127,22 @@ def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
     return DataTable("Pulses", _dated(body), rows, schedule)
 
 
-def pulse_table(flown: Flight, *, phased: bool = False, least: float = math.inf) -> DataTable:
+def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``phased``: with spin phases, for pages; ``least``: limit of the nutation, rad, for the default screen.
+    ``scheme``: its name, for pages, which have spin phases too; ``least``: limit of the nutation, rad, of the default
+    screen.
     """
     before, after = flown.around_pulses()
     pulses, body = flown.schedule.pulses, flown.spacecraft
-    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if phased else np.zeros(len(pulses))
+    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if scheme else np.zeros(len(pulses))
     rows = [
         PulseRow(index, pulse, body, before, after, phase)
         for index, (pulse, phase) in enumerate(zip(pulses, phases.tolist(), strict=True))
     ]
     left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
-    return DataTable("Pulses", (*_dated(body), left), rows, flown.schedule)
+    return DataTable(f"Pulses of {scheme}", (*_dated(body), left), rows, flown.schedule)
 
 
 def _dated(body: Spacecraft) -> tuple[Column, ...]:

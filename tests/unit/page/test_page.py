@@ -25,8 +25,7 @@ from nutdamp.api import trade
 from nutdamp.figures import style
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.montecarlo.study import Results, run, study_of
-from nutdamp.page.background import CONDITIONS, assumptions
-from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.content import CONDITIONS, Repeat, assumptions, report_page
 from nutdamp.page.document import Prose, Sheet, blocks_of, number_in
 from nutdamp.page.html import block_html, page_html
 from nutdamp.planning.decision import Comparison, compare
