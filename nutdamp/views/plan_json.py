@@ -11,11 +11,12 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.planning.decision import Comparison, Decision, Line, infeasibility
+from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.views.decisions import verdict
 from nutdamp.views.notes import joined, note_json
 from nutdamp.views.pulses import commanded
 
@@ -37,8 +38,13 @@ def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
-def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    """The object of ``plan --json``, without the decision itself."""
+def comparison_json(compared: Comparison) -> dict[str, Any]:
+    """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
+    return decided_json(compared, decide(compared))
+
+
+def decided_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+    """`comparison_json` with a decision that is known already."""
     beside = () if decided is None else decision_notes(decided)
     return {
         **heading(compared.spacecraft),
@@ -47,6 +53,7 @@ def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str,
         "no_pulse_needed": compared.needless,
         "reason": joined(reasons(compared)),
         "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
+        "decision": None if decided is None else decision_json(decided),
     }
 
 
@@ -183,8 +190,8 @@ def residual_json(residual: Residual | None) -> dict[str, float | None]:
     return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
 
 
-def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
-    """The plan, whether it ``met`` the requirement and the ``verdict`` in words, part by part with margins, its end.
+def decision_json(decision: Decision) -> dict[str, Any]:
+    """The plan, whether it ``met`` the requirement and the verdict in words, part by part with margins, its end.
 
     ``cases`` is null where none were flown.
     """
@@ -192,7 +199,7 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
     return {
         "scheme": plan.scheme,
         "met": decision.met,
-        "verdict": verdict,
+        "verdict": verdict(decision),
         "requirement": [_line_json(line) for line in decision.lines],
         "cases": None
         if cases is None

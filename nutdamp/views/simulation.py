@@ -120,7 +120,7 @@ def _range(values: tuple[float, float]) -> str:
     return f"{low.removesuffix(' deg')} to {high}"
 
 
-def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
+def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
     flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
@@ -136,7 +136,7 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
         "differ": [bound.part.value for bound in end_state.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
         **aspects_json(aspects(flight, extremes.until)),
-        "decision": decision_json(simulation.decision, verdict),
+        "decision": decision_json(simulation.decision),
         "until_s": extremes.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,

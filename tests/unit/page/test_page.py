@@ -178,7 +178,7 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
 @pytest.mark.parametrize(("samples", "recommended"), [(0, "four-pulse"), (None, "two-pulse")])
 def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, recommended: str) -> None:
     both = compared_text(example_text(), CLASSIC, samples)
-    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both, None)
+    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both)
     (heads, *rows), *_ = (cells(table) for table in section(shown, "schemes").all("table"))
     names = [head.text for head in heads]
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
