@@ -61,38 +61,29 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-@style.styled
 def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
-    body, model = results.study.model.spacecraft, results.study.model
-    panels = PANELS[name]
+    return _figure(name, results, f"{scheme} by {model_name([results.study.model.schedule])}")
+
+
+def loop_cases_figure(results: LoopResults) -> Figure:
+    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
+    return _figure("cases", results, "closed loop by real pulse widths")
+
+
+@style.styled
+def _figure(name: str, results: Results | LoopResults, how: str) -> Figure:
+    panels, body, share = PANELS[name], results.study.model.spacecraft, results.met_fraction
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
         _cases(axes[:2], results, body)
-    if name != "cases":
+    if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
     style.legend(figure, axes, 2 if name == "momentum" else 8)
-    _head(figure, results, body, f"{scheme} by {model_name([model.schedule])}, {results.done:,} dispersed cases")
-    return figure
-
-
-@style.styled
-def loop_cases_figure(results: LoopResults) -> Figure:
-    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
-    figure = style.sheet(7.4, 3.9)
-    axes = list(figure.subplots(1, 2))
-    _cases(axes, results, results.study.spacecraft)
-    style.legend(figure, axes)
-    how = f"closed loop by real pulse widths, {results.done:,} dispersed cases"
-    _head(figure, results, results.study.spacecraft, how)
-    return figure
-
-
-def _head(figure: Figure, results: Results | LoopResults, body: Spacecraft, text: str) -> None:
-    share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
-    style.heading(figure, body, text + verdict)
+    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases{verdict}")
+    return figure
 
 
 def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft) -> None:

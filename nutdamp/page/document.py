@@ -18,7 +18,7 @@ from rich.text import Text
 
 from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading, Shared
-from nutdamp.views.text import MISSING, sentence
+from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
@@ -64,15 +64,14 @@ class Sheet:
         return tuple(zip(*columns, strict=True))
 
     def _column(self, at: int, heading: Heading) -> list[Cell]:
-        texts = [row[at] for row in self.rows]
+        cells = [Cell(row[at], heading.number) for row in self.rows]
         if heading.name in self.bars:
-            return [Cell(text, heading.number, bar=number_in(text)) for text in texts]
+            return [cell._replace(bar=number_in(cell.text)) for cell in cells]
         if heading.name not in self.dots:
-            return [Cell(text, heading.number) for text in texts]
-        numbers = [number_in(text) for text in texts]
-        most = max((abs(number) for number in numbers if number is not None), default=0.0) or 1.0
-        places = [None if number is None else 100.0 * abs(number) / most for number in numbers]
-        return [Cell(text, heading.number, place) for text, place in zip(texts, places, strict=True)]
+            return cells
+        sizes = [(cell, number_in(cell.text)) for cell in cells]
+        most = max((abs(number) for _, number in sizes if number is not None), default=0.0) or 1.0
+        return [cell._replace(dot=None if number is None else 100.0 * abs(number) / most) for cell, number in sizes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -360,8 +359,6 @@ def plain(cell: object) -> str:
 
 def number_in(text: str) -> float | None:
     """The number in a cell, 0 for "< 1e-9"; None where it is not known or a word."""
-    if text == MISSING:
-        return None
     try:
         value = 0.0 if text.startswith("<") else float(text)
     except ValueError:

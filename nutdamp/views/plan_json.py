@@ -15,7 +15,7 @@ from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeas
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views.decisions import verdict
 from nutdamp.views.notes import joined, note_json
 from nutdamp.views.pulses import commanded
@@ -131,10 +131,15 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
     parts = []
     for part in plan.held:
         if part.bound.required:
-            unit, scale = ("rad_s", 1.0) if part.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            unit, scale = _unit(part.bound)
             left, most = scale * part.left, scale * part.bound.most
             parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
     return parts or None
+
+
+def _unit(bound: Bound) -> tuple[str, float]:
+    """Unit of a part in files, and its factor from SI."""
+    return ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
@@ -220,7 +225,7 @@ def decision_json(decision: Decision) -> dict[str, Any]:
 
 def _line_json(line: Line) -> dict[str, Any]:
     """A part: its limit, its residual with nominal values and in the share of cases required, and the margin."""
-    unit, scale = ("rad_s", 1.0) if line.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+    unit, scale = _unit(line.bound)
     return {
         "part": line.bound.part.value,
         "required": line.bound.required,

@@ -71,7 +71,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
     limits = {"earliest": 1.0, "horizon": 60.0, "gap": 0.2, "tick": 1e-3, "blackout": [[30.0, 31.0]], "most": None}
     assert bench["limits"] == limits
     assert made.workbench is not None
-    assert [(row.key, row.limit) for row in made.workbench.rows] == [
+    assert [(key, limit) for key, _, limit in made.workbench.rows] == [
         ("nutation", "≤ 0.5°"),
         ("momentum_shift", "≤ 0.2°"),
     ]
@@ -80,7 +80,7 @@ def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
 def test_with_a_target_the_axis_error_is_bounded_and_ideal_impulses_have_no_on_time() -> None:
     made = view(TARGET)
     assert made.workbench is not None
-    rows = [(row.key, row.limit) for row in made.workbench.rows]
+    rows = [(key, limit) for key, _, limit in made.workbench.rows]
     assert rows == [("nutation", ""), ("momentum_shift", ""), ("axis_error", "≤ 4°")]
     pulses = json.loads(made.data)["bench"]["pulses"]
     assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {(0.0, None, None)}
