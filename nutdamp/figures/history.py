@@ -93,7 +93,7 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
         axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
         axes.axhline(limit, **style.LIMIT)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
-    _finish(axes, flight, track)
+    _bands(axes, flight, track)
     style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
     text, colour = _verdict(flight)
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
@@ -121,7 +121,9 @@ def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2")
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
     axes.set_ylim(-half, half)
-    _finish(axes, flight, track, "ω1, ω2, °/s")
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω1, ω2, °/s")
+    axes.grid()
 
 
 def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -129,19 +131,19 @@ def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
     spin = np.degrees(track.rates[:, 2])
     axes.plot(track.t, spin, color=MOTION, label="_ω3")
     axes.margins(y=0.12)
-    _finish(axes, flight, track, "ω3, °/s")
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω3, °/s")
+    axes.grid()
     axes.locator_params(axis="y", nbins=3)
 
 
-def _finish(axes: Axes, flight: Flight, track: Track, name: str = "") -> None:
-    """Time axis, bands of the firings, and the quantity."""
+def _bands(axes: Axes, flight: Flight, track: Track) -> None:
+    """Time axis, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
     look: dict[str, Any] = {"facecolor": (PULSE, 0.25), "edgecolor": PULSE, "linewidth": 0.6, "zorder": 0.5}
     for number, block in enumerate(geometry.blocks(flight, until)):
         axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
-    axes.set_ylabel(name)
-    axes.grid()
 
 
 def firings(axes: Axes, flight: Flight, until: float) -> None:
