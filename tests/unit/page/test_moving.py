@@ -277,7 +277,7 @@ def test_the_scripts_are_small(name: str) -> None:
     assert (Path(moving.__file__).parent / name).stat().st_size <= 25_000
 
 
-# --- workbench: what its script computes is tested in a browser ----------------------------------------------------------
+# --- workbench: what its script computes is tested in a browser -------------------------------------------------------
 
 
 @pytest.mark.parametrize(
