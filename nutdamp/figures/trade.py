@@ -109,13 +109,11 @@ def _graduate(axes: Axes) -> None:
 def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float) -> None:
     """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has one mark."""
     shown: list[tuple[float, float, list[int]]] = []
-    all_points = [
-        (index, owner, point.plan.pulses.end, scale * point.cost, point) for index, owner, point in numbered(fronts)
-    ]
+    points = [(index, owner, point.plan.pulses.end, scale * point.cost) for index, owner, point in numbered(fronts)]
     for front, (colour, mark, line) in zip(fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False):
         if not front.points:
             continue
-        own = [(index, end, cost) for index, owner, end, cost, _ in all_points if owner is front]
+        own = [(index, end, cost) for index, owner, end, cost in points if owner is front]
         ends, costs = [end for _, end, _ in own], [cost for _, _, cost in own]
         name = front_name(front, pointing=spacecraft.goal.axis is not None).replace(" deg", "°")
         # A schedule serves for every later end, until a cheaper one does.
@@ -129,7 +127,7 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
                 shown.append((end, cost, [index]))
             else:
                 same[2].append(index)
-    failing = [(end, cost) for _, _, end, cost, point in all_points if fails(point)]
+    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(fronts) if fails(point)]
     if failing:
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
     places = np.array([place[:2] for place in shown])

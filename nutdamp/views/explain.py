@@ -236,7 +236,7 @@ def file_topic(below: str = "") -> Topic:
         return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
     requested = next((key for key in every if key.path == below), None)
     if requested is None:
-        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below, every)}")
+        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below)}")
     return Topic(
         f"{FILE}.{below}",
         "a key of the spacecraft file",
@@ -270,18 +270,11 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
         yield from _key_sections(child, every)
 
 
-def _near(below: str, every: list[KeyGuide]) -> str:
+def _near(below: str) -> str:
     """A key of the same name elsewhere, or one that is spelt alike."""
-    paths = tuple(
-        key.path for key in every if key.parent.partition(".")[0] != "dispersions" or not key.parent.count(".")
-    )
-    last = below.rpartition(".")[2]
-    same = next((path for path in paths if path.rpartition(".")[2] == last), None)
-    return (
-        f"did you mean '{FILE}.{same}'?"
-        if same
-        else meant(f"{FILE}.{below}", tuple(f"{FILE}.{path}" for path in paths), "nutdamp explain file")
-    )
+    paths = tuple(f"{FILE}.{key.path}" for key in _plain_keys())
+    same = (path for path in paths if path.rpartition(".")[2] == below.rpartition(".")[2])
+    return meant(next(same, f"{FILE}.{below}"), paths, "nutdamp explain file")
 
 
 def _what(field: fields.Key) -> str:
