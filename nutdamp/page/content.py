@@ -35,7 +35,6 @@ from nutdamp.page.document import (
     Picture,
     Points,
     Prose,
-    RequirementBar,
     blocks_of,
     facts_of,
     plain,
@@ -132,7 +131,7 @@ def report_page(
                 good=_good(decided),
                 met=decided.met,
                 verdict=decisions.verdict(decided),
-                margins=tuple(map(_margin, glance.requirement_rows(decided))),
+                margins=tuple(glance.requirement_rows(decided)),
                 facts=facts_of("Final state, after the last pulse", glance.ends(decided)),
                 warnings=(*(text(note) for note in remarks if severity(note) == WARNING), *_broken(decided.plan)),
                 motion=(moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
@@ -191,11 +190,6 @@ def _good(decided: Decision) -> bool:
 def _broken(plan: Plan) -> list[str]:
     """The limits that the schedule of a file breaks; schemes never do."""
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
-
-
-def _margin(row: glance.RequirementRow) -> RequirementBar:
-    texts = (row.label, row.nominal, row.dispersed, row.limit, f"margin {row.margin}", row.verdict.plain)
-    return RequirementBar(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
 
 
 def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
     from nutdamp.page.workbench import Workbench
     from nutdamp.spacecraft.model import Vector
+    from nutdamp.views.glance import RequirementRow
 
 
 class Cell(NamedTuple):
@@ -237,14 +238,6 @@ UNCONTROLLED = Control()
 """Configuration control of a page without any entry."""
 
 
-class RequirementBar(NamedTuple):
-    """One requirement as texts and as a bar: shares of its limit, of the nominal value and of the cases, in %."""
-
-    texts: tuple[str, ...]
-    met: bool
-    bar: tuple[float, float]
-
-
 class Contender(NamedTuple):
     """One scheme on the first screen: its texts; ``chosen``: it is the one to fly."""
 
@@ -272,7 +265,7 @@ class Page:
     good: bool = False
     met: bool | None = None
     verdict: str = ""
-    margins: tuple[RequirementBar, ...] = ()
+    margins: tuple[RequirementRow, ...] = ()
     facts: FactList | None = None
     warnings: tuple[str, ...] = ()
     motion: tuple[Block, ...] = ()

@@ -16,7 +16,7 @@ from nutdamp.flight.track import Track
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
 
 MILLISECONDS = 3
@@ -200,7 +200,7 @@ BLOCKS = (
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",
            lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
-    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", lambda row: math.degrees(row.nutation), small_angle,
+    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle,
            "csv page"),
 )  # fmt: skip
 

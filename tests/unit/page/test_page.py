@@ -282,7 +282,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     assert (made.verdict, made.state) == (said, "met" if good else "missed")
     assert made.headline[0] == ("FLY " if good else "NOT ENOUGH: ")
     (margin,) = made.margins
-    assert (margin.met, margin.texts[-1], margin.bar[1] <= 100.0) == (good, "met" if good else "NOT met", good)
+    assert (margin.met, margin.verdict.plain, margin.used[1] <= 1.0) == (good, "met" if good else "NOT met", good)
     part = section(tree(made), "dispersion")
     heads, values, *_ = ([cell.text for cell in row] for row in cells(part.all("table")[0]))
     first = dict(zip(heads, values, strict=True))
