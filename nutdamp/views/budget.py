@@ -38,18 +38,6 @@ def _digits(count: int) -> Callable[[float], str]:
     return lambda value: f"{value:.{count}g}"
 
 
-def _tank(budget: Budget) -> bool:
-    return budget.spacecraft.tank is not None
-
-
-def _required(budget: Budget) -> bool:
-    return budget.meets_requirement is not None
-
-
-def _spin_share(held: HeldNutation) -> float | None:
-    return None if held.slows is None else 100.0 * held.slows * DAY / YEAR
-
-
 FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
     Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), _digits(4), EVERYWHERE),
@@ -65,20 +53,18 @@ HELD = (
     Column("", "cycle", "", _of_cycle(lambda cycle: cycle.cycles),
            lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause", "screen"),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle(lambda cycle: cycle.spin_rate, DAY), where=FILES),
-    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), _digits(3),
-           EVERYWHERE),
-    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), _digits(3),
-           EVERYWHERE),
-    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), _digits(3),
-           EVERYWHERE),
-    Column("", Shared.SPIN, "%/day", _spin_share, _digits(2), "screen"),
+    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), _digits(3), EVERYWHERE),
+    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), _digits(3), EVERYWHERE),
+    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), _digits(3), EVERYWHERE),
+    Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
+           _digits(2), "screen"),
     Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
     Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
-           _digits(4), "screen", _tank),
+           _digits(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
-    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", when=_required,
-           kind=TEXT, met=lambda held: held.meets_requirement),
+    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", kind=TEXT,
+           when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),
     Column("meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
 )  # fmt: skip

@@ -47,8 +47,7 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
         Column("smallest_step_deg", "smallest step", "deg", angle_of("smallest"),
                lambda step: small_angle(step) if step else "any", "screen json"),
-        Column("largest_step_deg", "largest step", "deg", angle_of("largest"), small_angle,
-               "screen json"),
+        Column("largest_step_deg", "largest step", "deg", angle_of("largest"), small_angle, "screen json"),
         Column("damps", "", "", lambda row: row.channel.damps, where="json", kind=YES_NO),
     )  # fmt: skip
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -88,11 +87,9 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
 
 TURNS = (
     Column("name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
-    Column("smallest_turn_deg", "least turn of H", "deg", angle_of("smallest"), small_angle,
-           "screen json"),
+    Column("smallest_turn_deg", "least turn of H", "deg", angle_of("smallest"), small_angle, "screen json"),
     Column("smallest_turn_width_s", "by a pulse of", "", lambda row: row.smallest_width, duration, "screen json"),
-    Column("largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle,
-           "screen json"),
+    Column("largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"),
     Column("largest_turn_width_s", "by a pulse of", "", lambda row: row.largest_width, duration, "screen json"),
 )  # fmt: skip
 

@@ -171,10 +171,6 @@ def _counts(name: str) -> Callable[[BlockRow], int | None]:
     return counted
 
 
-def _delay_angle(row: BlockRow) -> float:
-    return _nine(math.degrees(row.block.delay * abs(row.body.spin)))
-
-
 def _nine(value: float) -> float:
     """A number to nine figures, without the noise of its last digits."""
     return float(f"{value:.9g}")
@@ -193,15 +189,15 @@ BLOCKS = (
            kind=TEXT),
     Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, _six, EVERYWHERE),
     Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
-    Column("delay_deg", Shared.DELAY, "deg", _delay_angle, lambda angle: f"{angle:.2f}", EVERYWHERE),
+    Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
+           lambda angle: f"{angle:.2f}", EVERYWHERE),
     Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
     Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",
            lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
-    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle,
-           "csv page"),
+    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle, "csv page"),
 )  # fmt: skip
 
 

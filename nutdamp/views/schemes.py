@@ -92,10 +92,6 @@ def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
 
-def _milli(value: float) -> str:
-    return f"{value:.3f}"
-
-
 def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     body, least = compared.spacecraft, limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
@@ -121,7 +117,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
     end, impulse = _feasible(lambda plan: plan.pulses.end), _feasible(lambda plan: plan.pulses.total_impulse)
     yield Column("", "end", "s", end, lambda value: f"{value:.4g}", "screen")
-    yield Column("end_s", "end", "s", end, _milli, "full page csv")
+    yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
     yield Column(
         "total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, "full page csv" + " screen" * (not fuelled)
     )
