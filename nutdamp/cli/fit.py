@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Files, Job, quiet_option, screen_options, spacecraft_argument
 from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 
 
@@ -20,7 +20,7 @@ from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
-@verbose_option
+@screen_options
 @quiet_option
 def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.

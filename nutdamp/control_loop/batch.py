@@ -64,6 +64,11 @@ class FlownLoops:
     largest: Vector
     aspects: Vector
 
+    def momentum(self, rates: Vector) -> Vector:
+        """Angular momentum (3, n) N m s of the true bodies at ``rates`` (3, n) rad/s, in body axes."""
+        bodies = zip(self.cases, rates.T, strict=True)
+        return np.array([case.truth.inertia.momentum(turning) for case, turning in bodies]).T
+
 
 @dataclass(frozen=True, eq=False)
 class _Group:
@@ -127,8 +132,8 @@ def fly_alone(
         quaternion[:, row] = attitude.multiply(attitude.conjugate(case.truth.initial.quaternion), end[1][0])
         if run.settled is not None:
             at = run.flight.motion(np.array([run.settled]))[0][0]
-            sense = math.copysign(1.0, case.truth.spin)
-            quiet[row] = arc_cones(case.truth.inertia.moments, at, sense).nutation
+            inertia = case.truth.inertia
+            quiet[row] = arc_cones(inertia.moments, at, case.truth.sense, inertia.wheel).nutation
         largest[row] = largest_since(run)[0]
         if law.spacecraft.keep:
             seen = (aspect for aspect in end_state.aspects(run.flight, run.until) if aspect.keep in law.spacecraft.keep)
@@ -155,7 +160,8 @@ class _Fleet:
         )
         self.noise, self.delays = (np.array(each) for each in zip(*((s.noise, s.delay) for s in sensors), strict=True))
         moments = np.array([case.truth.inertia.moments for case in cases]).T
-        self.bodies = batch.Bodies(moments, np.zeros(3), Forcing(growth=law.growth))
+        wheels = np.array([case.truth.inertia.wheel for case in cases])
+        self.bodies = batch.Bodies(moments, np.zeros(3), Forcing(growth=law.growth, wheel=wheels))
         self.rates = np.array([case.truth.omega0 for case in cases]).T.copy()
         self.quaternion = np.zeros((4, len(cases)))
         self.quaternion[0] = 1.0
@@ -260,14 +266,14 @@ class _Fleet:
         """ω and ω3 (cases, n) of coasts at ``times`` (cases, n) s."""
         first, _, third = self.bodies.moments[:, rows, None]
         x, y, z = self.rates[:, rows, None]
-        return energy_sink.rates_on_arc(
-            first, third, self.bodies.forcing.growth, x + 1j * y, z, times - self.now[rows, None]
-        )
+        forcing, since = self.bodies.forcing, times - self.now[rows, None]
+        wheel = forcing.wheel[rows, None]
+        return energy_sink.rates_on_arc(first, third, forcing.growth, x + 1j * y, z, since, wheel)
 
     def _nutation(self, rows: Rows, growing: Vector | float = 0.0) -> Vector:
         """θ (n,) rad of cases now, and with tan θ grown by e to the power ``growing``."""
-        (first, _, third), (x, y, z) = self.bodies.moments[:, rows], self.rates[:, rows]
-        return np.asarray(np.arctan2(first * np.hypot(x, y) * np.exp(growing), third * np.abs(z)))
+        h1, h2, h3 = self.bodies.some(rows).momentum(self.rates[:, rows])
+        return np.asarray(np.arctan2(np.hypot(h1, h2) * np.exp(growing), np.abs(h3)))
 
     def _go(self, rows: Rows, times: Vector) -> None:
         """Coasts to ``times`` (n,) s."""

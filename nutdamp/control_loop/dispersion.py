@@ -154,6 +154,7 @@ class LoopModel:
         model = self._body.cases(draws)
         moments = np.array([np.broadcast_to(moment, count) for moment in model.moments]).T.tolist()
         rates = np.array([np.broadcast_to(component, count) for component in model.omega0]).T
+        wheels = np.broadcast_to(model.wheel, count).tolist()
         tilts = np.array([np.broadcast_to(component, count) for component in model.tilt]).T
         attitudes = None if body.attitude is None else self._attitudes(tilts)
         torques = {
@@ -167,7 +168,7 @@ class LoopModel:
             key = (seed, number + 1)
             truth = replace(
                 body,
-                inertia=Inertia((moments[row][0], moments[row][1], moments[row][2]), body.inertia.axes),
+                inertia=Inertia((moments[row][0], moments[row][1], moments[row][2]), body.inertia.axes, wheels[row]),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
                 channels=self._channels(draw, {name: torque[row] for name, torque in torques.items()}),
@@ -415,14 +416,14 @@ class LoopStudy:
     def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
         """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
         cases, pilots, body = flown.cases, flown.pilots, self.spacecraft
-        moments = np.array([case.truth.inertia.moments for case in cases]).T
         before = np.array([case.truth.omega0 for case in cases]).T
-        momentum = tuple(carried(tuple(flown.quaternion), triple(moments * flown.rates)))
+        start, end = triple(flown.momentum(before)), triple(flown.momentum(flown.rates))
+        momentum = tuple(carried(tuple(flown.quaternion), end))
         tilts = np.array([case.tilt for case in cases]).T
         out = np.empty((len(OUTPUTS), len(cases)))
         out[0] = [pilot.quiet[0] if pilot.quiet else math.nan for pilot in pilots]
         out[1], out[2] = flown.quiet, flown.largest
-        out[3] = angle(triple(moments * before), triple(np.array(momentum)))
+        out[3] = angle(start, triple(np.array(momentum)))
         out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
         used = [

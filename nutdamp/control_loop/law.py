@@ -5,7 +5,7 @@ change of the observed rate by each firing with the expected one.
 
 The law knows the moments of the body and its momentary spin, and sees the transverse rate ω = ω1 + iω2. With
 I1 ≠ I2 a small ω runs on an ellipse; the quantity that turns evenly is z = g1 ω1 + i g2 ω2 with gj in proportion to
-sqrt(Ij |Ij - I3|), at `Inertia.body_rate` times the spin: the law works on z, which is ω itself where I1 = I2.
+sqrt(Ij |Ij - I3|), at `Inertia.nutation_rate`: the law works on z, which is ω itself where I1 = I2.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from nutdamp.schemes.four_pulse import DEFAULT_SHARE
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
 
 if TYPE_CHECKING:
     from nutdamp.physics.thruster import Valve
@@ -73,11 +73,12 @@ class Law:
 
     def __init__(self, spacecraft: Spacecraft, loop: Loop) -> None:
         inertia = spacecraft.inertia
-        if inertia.body_rate == 0.0:
+        if spacecraft.nutation_rate == 0.0:
             raise Infeasible("in a sphere ω does not rotate in the body: there is no phase to fire by")
         self.spacecraft, self.loop, self.inertia = spacecraft, loop, inertia
         self.windows = Windows(spacecraft, endless=True)
-        self.gauge = _gauge(inertia.moments)
+        self.gauge = _gauge(inertia, spacecraft.spin)
+        self.slope, self._offset = inertia.linear_rate(spacecraft.spin)
         self.period, self.growth = spacecraft.body_period, spacecraft.growth
         self.actuators = tuple(map(self._actuator, at_hand(spacecraft, usable(spacecraft))))
 
@@ -103,20 +104,20 @@ class Law:
 
     def rate(self, spin: Any) -> Any:
         """Rate at which z turns back in the body, rad/s, signed; numbers or arrays."""
-        return self.inertia.body_rate * spin
+        return self.slope * spin + self._offset
 
     def nutation(self, size: Any, spin: Any) -> Array:
-        """Nutation angle θ, rad, by |z| and ω3: tan θ = A|ω|/(C|ω3|), Magnus 1970 (19)."""
-        return np.asarray(np.arctan2(self.inertia.A * np.asarray(size), self.inertia.C * np.abs(spin)))
+        """Nutation angle θ, rad, by |z| and ω3: tan θ = A|ω|/|H3|, Magnus 1970 (19)."""
+        return np.asarray(np.arctan2(self.inertia.A * np.asarray(size), np.abs(self.inertia.axial(spin))))
 
     def size(self, nutation: float, spin: float) -> float:
         """|z|, rad/s, of a nutation angle (rad)."""
-        return self.inertia.C * abs(spin) / self.inertia.A * math.tan(nutation)
+        return abs(float(self.inertia.axial(spin))) / self.inertia.A * math.tan(nutation)
 
     def firing(self, actuator: Actuator, z: complex, spin: float) -> Firing | None:
         """Next firing of a channel against ``z`` now; None where it would not help."""
-        rate = self.inertia.body_rate
-        needed = response.on_time_for(abs(z), abs(actuator.kick), rate, spin, actuator.spin_rate, actuator.longest)
+        rate, slope = float(self.rate(spin)), self.slope * actuator.spin_rate
+        needed = response.on_time_for(abs(z), abs(actuator.kick), rate, slope, actuator.longest)
         on_time = actuator.longest if needed is None else max(needed, actuator.shortest)
         lead, lasts = 0.5 * on_time, on_time
         if actuator.channel.valve is None:
@@ -126,11 +127,11 @@ class Law:
             loaded = actuator.channel.valve.on_time_for(on_time)
             thrust = actuator.channel.valve.thrust(loaded)
             lead, lasts = thrust.centroid, max(loaded, thrust.ramps[-1].end)
-        factor = response.width_factor(rate, spin, actuator.spin_rate, on_time)
+        factor = response.width_factor(rate, slope, on_time)
         acts = actuator.kick * on_time * factor
         if not 0.0 < abs(acts) < 2.0 * abs(z):
             return None
-        wait = rigid_body.phase_to_oppose(z, acts) / (rate * spin)
+        wait = rigid_body.phase_to_oppose(z, acts) / rate
         return Firing(wait - lead if self.loop.predict else wait, on_time, lead, lasts, acts)
 
     def waits(self, actuator: Actuator, z: ComplexArray, spin: Array) -> Array:
@@ -139,7 +140,7 @@ class Law:
         To first order in the torque about axis 3, to the `LEADS` of its valve and between ticks: it tells between which
         moments a channel comes to fire, `firing` then when and for how long.
         """
-        rate, size, push = self.inertia.body_rate * spin, np.abs(z), abs(actuator.kick)
+        rate, size, push = self.rate(spin), np.abs(z), abs(actuator.kick)
         half = np.abs(0.5 * rate)
         sine = half * size / push
         needed = np.where(sine > 1.0, math.inf, np.arcsin(np.minimum(sine, 1.0)) / half)
@@ -147,7 +148,7 @@ class Law:
         acts = push * np.abs(np.sin(half * on_time)) / half
         direction = actuator.kick * np.where(np.sin(half * on_time) < 0.0, -1.0, 1.0)
         if actuator.spin_rate != 0.0:
-            direction = direction * np.exp(1j * self.inertia.body_rate * actuator.spin_rate * on_time * on_time / 6.0)
+            direction = direction * np.exp(1j * self.slope * actuator.spin_rate * on_time * on_time / 6.0)
         wait = np.angle(-z * np.conj(direction)) / rate
         if self.loop.predict:
             wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
@@ -162,12 +163,12 @@ def _leads(valve: Valve | None, shortest: float, longest: float) -> tuple[Array,
     return on_times, np.array([valve.thrust(valve.on_time_for(on_time)).centroid for on_time in on_times.tolist()])
 
 
-def _gauge(moments: tuple[float, float, float]) -> tuple[float, float]:
+def _gauge(inertia: Inertia, spin: float) -> tuple[float, float]:
     """(g1, g2), such that |z| is that of a symmetric body with A and C at the widest point of the small ellipse."""
-    first, second, third = moments
+    first, second, _ = inertia.moments
     if first == second:
         return 1.0, 1.0
-    weights = [math.sqrt(moment * abs(moment - third)) for moment in (first, second)]
+    weights = [math.sqrt(moment * abs(moment * spin - inertia.axial(spin))) for moment in (first, second)]
     most = max(first / weights[0], second / weights[1]) / (0.5 * (first + second))
     return weights[0] * most, weights[1] * most
 
@@ -424,10 +425,15 @@ def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
     given, inertia = spacecraft.dispersions, spacecraft.inertia
     if given is None:
         return 0.0, 0.0
-    pairs = ((given.A, inertia.A), (given.C, inertia.C))
-    moments = [
-        0.0 if dispersion is None else dispersion.size / (1.0 if dispersion.relative else nominal)
-        for dispersion, nominal in pairs
+    axial, along = spacecraft.axial, inertia.C * spacecraft.spin
+    parts = (
+        (given.A, inertia.A, axial),
+        (given.C, inertia.C, along),
+        (given.wheel_momentum, inertia.wheel, inertia.wheel),
+    )
+    changes = [
+        0.0 if off is None else off.size * (momentum if off.relative else momentum / (nominal or 1.0))
+        for off, nominal, momentum in parts
     ]
     scale = 0.0 if given.sensor_scale is None else given.sensor_scale.size
-    return 2.0 * math.hypot(*moments) * inertia.C / (inertia.A * abs(inertia.a)), 2.0 * abs(scale)
+    return 2.0 * math.hypot(*changes) / (inertia.A * abs(spacecraft.nutation_rate)), 2.0 * abs(scale)

@@ -382,7 +382,7 @@ class Map:
     def _slowed(self, last: float, size: float) -> float:
         """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
         before, after = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (last, size))
-        return self.spin * (1.0 - after / before)
+        return float(self.law.inertia.equivalent(self.spin)) * (1.0 - after / before)
 
     def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
         """Factor on the effect of a pulse on z by its width, with the growth in it."""
@@ -390,8 +390,8 @@ class Map:
         if key not in self.shapes:
             ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
             moved = [ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps]
-            rate = self.law.inertia.body_rate
-            self.shapes[key] = shape_factor(rate, self.spin, actuator.spin_rate, moved, 0.0, self.law.growth)
+            rate, slope = float(self.law.rate(self.spin)), self.law.slope * actuator.spin_rate
+            self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
         return self.shapes[key]
 
     def _rest(self, at: Chains, row: int) -> None:

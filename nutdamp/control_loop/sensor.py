@@ -311,7 +311,7 @@ class Estimator:
 
     @property
     def _least_gain(self) -> float:
-        return abs(self.seen_gain) * 2.0 * math.pi / (self.law.period * abs(self.law.inertia.body_rate))
+        return abs(self.seen_gain) * abs(self.law.spacecraft.spin)
 
 
 class _Kept(NamedTuple):

@@ -116,11 +116,11 @@ def fly(
 
 def largest_since(run: LoopRun) -> tuple[float, float]:
     """Largest nutation since a loop first settled, rad, and its time, s; at the end where it never did."""
-    flight = run.flight
+    flight, body = run.flight, run.spacecraft
     if run.settled is None:
         rates = flight.motion(np.array([run.until]))[0][0]
-        return arc_cones(flight.moments, rates, math.copysign(1.0, run.spacecraft.spin)).nutation, run.until
-    track = widest(flight.sampled(ROWS, run.until), np.asarray(flight.moments), run.spacecraft.spin)
+        return arc_cones(flight.moments, rates, body.sense, body.inertia.wheel).nutation, run.until
+    track = widest(flight.sampled(ROWS, run.until), np.asarray(flight.moments), body.sense, body.inertia.wheel)
     later = track.t >= run.settled
     most = float(track.nutation[later].max())
     row = int(np.argmax(later & (track.nutation >= most * (1.0 - 1e-9))))  # not where rounding has its largest

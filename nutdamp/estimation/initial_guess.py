@@ -115,7 +115,7 @@ def once_a_turn(record: Record) -> str:
 def _peak(model: Model, spin: float, share: float) -> float | None:
     """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
     record, body = model.record, model.spacecraft
-    expected = body.inertia.body_rate * spin
+    expected = body.inertia.nutation_rate(spin)
     count = max(int(share * len(record.times)), min(len(record.times), 16))
     times = record.times[: min(count, LONGEST_SPECTRUM)]
     signals = {name: values[: len(times)] for name, values in record.signals.items()}
@@ -224,7 +224,7 @@ def _strongest(
 def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
     inertia = model.spacecraft.inertia
-    wanted = inertia.C / inertia.A - (rate / spin - inertia.body_rate)
+    wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
     wanted = min(max(wanted, 0.01), 1.999)
     A, ratio = model.parameter("A"), model.parameter(RATIO)
     assert ratio is not None

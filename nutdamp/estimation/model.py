@@ -315,7 +315,7 @@ class Model:
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
         return replace(
             self.spacecraft,
-            inertia=Inertia(body.moments, body.axes),
+            inertia=Inertia(body.moments, body.axes, self.spacecraft.inertia.wheel),
             disturbances=tuple(
                 replace(disturbance, transverse=about * disturbance.transverse)
                 for disturbance in self.spacecraft.disturbances

@@ -69,8 +69,8 @@ def drawn(flight: Flight, track: Track) -> Track:
 def quickest(flight: Flight) -> float:
     """The shortest period of the nutation, seen in the body or in space, s."""
     body = flight.spacecraft
-    momentum = np.linalg.norm(body.omega0 * np.asarray(flight.moments))
-    return float(min(body.body_period, 2 * math.pi * min(flight.moments) / float(momentum)))
+    size = float(np.linalg.norm(body.momentum))
+    return float(min(body.body_period, 2 * math.pi * min(flight.moments) / size))
 
 
 def channels_fired(flight: Flight) -> list[str]:
@@ -287,18 +287,19 @@ class DrawnCones(NamedTuple):
 def cones(flight: Flight, rates: Vector, quaternion: Vector) -> DrawnCones:
     """The cones that would roll on each other if the torque ended now: rates (3,) rad/s, quaternion (4,).
 
-    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4).
+    Polhode and herpolhode of the free motion: circles for a symmetric body (Magnus 1970 fig. 4). Without rims where
+    they do not close, and for a body with a wheel and three moments.
     """
     moments = np.asarray(flight.moments)
-    sense = math.copysign(1.0, flight.spacecraft.spin)
-    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, sense]))
+    wheel = flight.spacecraft.inertia.wheel
+    axis = attitude.rotate(quaternion, np.array([0.0, 0.0, flight.spacecraft.sense]))
     turning = attitude.rotate(quaternion, rates)
-    momentum = attitude.rotate(quaternion, moments * rates)
+    momentum = attitude.rotate(quaternion, moments * rates + np.array([0.0, 0.0, wheel]))
     rotation, direction = turning / np.linalg.norm(turning), momentum / np.linalg.norm(momentum)
     if moments[0] == moments[1]:
         space = around(direction, rotation)
         return DrawnCones(axis, direction, rotation, around(axis, rotation), space, space)
-    period = triaxial.nutation_period(flight.moments, rates)
+    period = math.inf if wheel else triaxial.nutation_period(flight.moments, rates)
     if not math.isfinite(period):
         return DrawnCones(axis, direction, rotation, *np.empty((3, 0, 3)))
     times = np.linspace(0.0, period, 4 * RIM)

@@ -20,7 +20,7 @@ from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import touching
 
 
@@ -50,7 +50,7 @@ def later(flight: Flight, time: float) -> Later:
         changed = replace(before.attitude, epoch=None if epoch is None else epoch_after(epoch, time))
     after = replace(
         before,
-        inertia=Inertia((float(moments[0]), float(moments[1]), float(moments[2])), inertia.axes),
+        inertia=replace(inertia, moments=(float(moments[0]), float(moments[1]), float(moments[2]))),
         omega0=rates[0],
         attitude=changed,
         center_of_mass=_center(before, used),

@@ -180,7 +180,7 @@ def rate_edits(tree: Node, later: Later) -> Edits:
     """Rates at t = 0, as the file gives them."""
     inertia, state, rates = later.after.inertia, later.state, later.after.rates
     if tree.get("state") is not None and inertia.symmetric and inertia.aligned:
-        angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(state.omega), state.spin)
+        angle = rigid_body.nutation_angle(inertia.A, inertia.C, abs(state.omega), inertia.equivalent(state.spin))
         phase = math.atan2(state.omega.imag, state.omega.real)
         if angle < NOISE:
             angle = phase = 0.0

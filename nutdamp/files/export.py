@@ -30,11 +30,13 @@ LONGEST_STEP = 0.1
 def basilisk_script(plan: Plan) -> str:
     """The text of the script: data of the body and of each stretch of constant torque, and the code that flies them.
 
-    Raises BadRequest for a body with energy dissipation, or moments that fall, which a rigid hub has not.
+    Raises BadRequest for a body with energy dissipation, a wheel, or moments that fall, which a rigid hub has not.
     """
     body = plan.spacecraft
     if body.dissipation is not None:
         raise BadRequest("a Basilisk script flies a rigid body: leave dissipation out of the spacecraft file")
+    if body.inertia.wheel != 0.0:
+        raise BadRequest("a Basilisk script flies one rigid body: it has no wheel, and the spacecraft file has one")
     if shed(body) is not None:
         problem = "a Basilisk script flies constant moments of inertia: leave tank.inertia_per_kg out of the spacecraft"
         raise BadRequest(f"{problem} file, and plan without it, if the moments may count as constant")

@@ -59,6 +59,14 @@ class OrbitSection(Section):
     center: Name = Field("Body at the origin; default EARTH.", "EARTH", default="EARTH")
 
 
+class WheelSection(Section):
+    """A part that turns otherwise than the body: a momentum wheel, or a despun platform."""
+
+    momentum: Annotated[float, Quantity("momentum")] = Field(
+        "Its constant angular momentum along principal axis 3, signed, N m s, beside the C ω3 of all else.", "40 N m s"
+    )
+
+
 class SunSensorSection(Section):
     """A sensor that gives a pulse in each spin, when the Sun passes it."""
 
@@ -198,7 +206,7 @@ class InertiaSection(Section):
 class StateSection(Section):
     """The motion at t = 0 by spin and nutation angle."""
 
-    spin: Rate = Field("Spin rate about axis 3, signed, rad/s; not zero.", "30 rpm")
+    spin: Rate = Field("Spin rate about axis 3, signed, rad/s; zero only with a wheel.", "30 rpm")
     nutation: Nutation = Field(
         "Nutation angle between angular momentum and spin axis at t = 0, rad, from 0 to below 90 deg.", "5 deg"
     )
@@ -388,6 +396,7 @@ class SpacecraftFile(Section):
     center_of_mass_per_kg: Travel | None = Field(
         "How far each kg of propellant used moves the center of mass, m/kg; default: it stays.", [0, 0, "-1 mm/kg"]
     )
+    wheel: WheelSection | None = Field("A momentum wheel or a despun platform.", {"momentum": "40 N m s"})
     omega0: Rates | None = Field(
         "Body rates [ω1, ω2, ω3] at t = 0, rad/s; or instead state.", [0.12, "2 deg/s", "30 rpm"]
     )
@@ -429,7 +438,7 @@ class SpacecraftFile(Section):
         "Disturbance torques.", [{"name": "leak", "torque": ["20 mN m", 0, 0]}], default=[]
     )
     dissipation: DissipationSection | None = Field(
-        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s"}
+        "Energy dissipation; without it the body is rigid.", {"time_constant": "600 s", "nutation": "grows"}
     )
     requirement: RequirementSection | None = Field("What a plan must reach.", {"nutation": "0.5 deg"})
     limits: LimitsSection | None = Field("Limits that every schedule respects.", {"horizon": "120 s"})

@@ -58,12 +58,12 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     yield from _channels(facts)
     if inertia is None or spin is None:
         return
-    if inertia.body_rate == 0.0:
+    if inertia.nutation_rate(spin) == 0.0:
         problem = "in a sphere ω does not rotate in the body, so that a loop has no phase to fire by; leave loop out"
         yield Finding(("loop",), problem, True)
         return
-    yield from _sampling(facts, abs(inertia.body_rate * spin))
-    yield from _lags(facts, 2.0 * math.pi / abs(inertia.body_rate * spin))
+    yield from _sampling(facts, abs(inertia.nutation_rate(spin)))
+    yield from _lags(facts, 2.0 * math.pi / abs(inertia.nutation_rate(spin)))
     yield from _accelerometer(facts, inertia)
     yield from _seen(facts, inertia, spin)
 
@@ -208,6 +208,10 @@ def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
     position, axis = _mounting(facts, inertia)
     if facts.text(*SENSOR, "kind") != "accelerometer" or position is None or axis is None:
         return
+    if inertia.wheel != 0.0:
+        problem = "accelerometer: with a wheel only gyros are modelled; expected gyro"
+        yield Finding((*SENSOR, "kind"), problem)
+        return
     if math.hypot(*position) > FARTHEST:
         problem = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
         yield Finding((*SENSOR, "position"), problem)
@@ -235,7 +239,7 @@ def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
     start, kind = facts.number("angle", "loop", "start"), facts.text(*SENSOR, "kind")
     if start is None or not 0.0 < start < 0.5 * math.pi or kind not in ("gyro", "accelerometer"):
         return
-    size = inertia.C * abs(spin) / inertia.A * math.tan(start)
+    size = abs(inertia.axial(spin)) / inertia.A * math.tan(start)
     if kind == "accelerometer":
         from nutdamp.control_loop.sensor import gain
 

@@ -164,7 +164,8 @@ def _nutation(facts: Facts) -> float:
     omega0, spin = facts.vector("rate", 3, "omega0"), spin_of(facts)
     if stated is not None or omega0 is None or spin is None or inertia is None:
         return math.inf if stated is None else stated
-    return momentary(inertia.moments, inertia.axes.T @ omega0, math.copysign(1.0, spin)).nutation
+    sense = math.copysign(1.0, inertia.axial(spin))
+    return momentary(inertia.moments, inertia.axes.T @ omega0, sense, inertia.wheel).nutation
 
 
 def _lengths(facts: Facts) -> Iterator[KeyPath]:

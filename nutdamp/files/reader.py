@@ -196,7 +196,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
     """
     contents = read_contents(text, name, settings, warn)
-    inertia = _inertia(contents.inertia)
+    inertia = _inertia(contents.inertia, 0.0 if contents.wheel is None else contents.wheel.momentum)
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
     thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve, center) for entry in contents.thrusters}
@@ -279,17 +279,17 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     return kind(**{**given, **others})
 
 
-def _inertia(section: InertiaSection) -> Inertia:
+def _inertia(section: InertiaSection, wheel: float) -> Inertia:
     if section.tensor is not None:
         moments, axes = principal_axes(symmetric(np.array(section.tensor)))
-        return Inertia(moments, axes)
+        return Inertia(moments, axes, wheel)
     assert section.A is not None
     assert section.C is not None
-    return Inertia((section.A, section.A, section.C))
+    return Inertia((section.A, section.A, section.C), wheel=wheel)
 
 
 def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
-    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/(I3|ω3|), Magnus 1970 (19).
+    """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|, Magnus 1970 (19).
 
     So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
     """
@@ -298,10 +298,11 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
         return rates
     state = contents.state
     assert state is not None
-    first, second, third = inertia.moments
+    first, second, _ = inertia.moments
     way = np.array([math.cos(state.phase), math.sin(state.phase)])
     moment = first if first == second else math.hypot(first * way[0], second * way[1])
-    return np.array([*(third / moment * abs(state.spin) * math.tan(state.nutation) * way), state.spin])
+    size = abs(inertia.axial(state.spin)) / moment * math.tan(state.nutation)
+    return np.array([*(size * way), state.spin])
 
 
 def _travel(per_kg: list[float] | None, axes: Vector) -> Vector | None:
@@ -393,9 +394,9 @@ def _attitude(
     if section.quaternion is not None:
         return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
     assert section.spin_axis is not None
-    along = np.array([0.0, 0.0, math.copysign(1.0, omega0[2])])
+    along = np.array([0.0, 0.0, math.copysign(1.0, inertia.axial(float(omega0[2])))])
     if section.of == "momentum":
-        along = np.asarray(inertia.moments) * omega0
+        along = inertia.momentum(omega0)
     body_axis = inertia.axes @ (along / np.linalg.norm(along))
     axis = attitude.on_sphere(*section.spin_axis)
     side, phase = np.cross([0.0, 0.0, 1.0], axis), section.phase or 0.0

@@ -98,7 +98,7 @@ def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[
         yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
     if facts.has("sun_sensor") and not facts.has("sun"):
         yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
-    if spin is not None:
+    if spin:
         turn = 2.0 * math.pi / abs(spin)
         width = facts.number("time", "commands", "width", "max")
         if width is not None and width >= turn:
@@ -290,7 +290,7 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         if len(keys) > 1:
             yield Finding(("inertia", "tensor"), "given together with A or C; keep either tensor, or A and C", True)
         tensor = tensor_of(facts)
-        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, spin_of(facts))
+        fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, facts)
         if fault is not None:
             yield fault
     elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict) and not _of_tensor(facts):
@@ -345,20 +345,30 @@ def inertia_of(facts: Facts) -> Inertia | None:
     tensor = tensor_of(facts)
     try:
         if tensor is not None:
-            return None if tensor_fault(tensor) else _spinning(Inertia(*principal_axes(symmetric(tensor))))
+            return None if tensor_fault(tensor) else Inertia(*principal_axes(symmetric(tensor)), wheel_of(facts))
         A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
-        return None if A is None or C is None or min(A, C) <= 0.0 or C > 2.0 * A else Inertia((A, A, C))
+        if A is None or C is None or min(A, C) <= 0.0 or C > 2.0 * A:
+            return None
+        return Inertia((A, A, C), wheel=wheel_of(facts))
     except ValueError:
         return None
 
 
-def _spinning(inertia: Inertia) -> Inertia | None:
-    return inertia if math.isfinite(inertia.body_rate) else None
+def wheel_of(facts: Facts) -> float:
+    """Momentum of the wheel, N m s; zero where there is none or it cannot be read."""
+    return facts.number("momentum", "wheel", "momentum") or 0.0
 
 
-def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
-    """The reason why free spin about principal axis 3 is unstable, and the growth at this ``spin``, if known."""
-    moments = principal_axes(symmetric(tensor))[0]
+def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
+    """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is known."""
+    moments, spin, wheel = principal_axes(symmetric(tensor))[0], spin_of(facts), wheel_of(facts)
+    if wheel != 0.0:
+        if spin is None or (grows := rigid_body.growth(moments, spin, wheel)).stable:
+            return None
+        low, high = sorted(moment * spin - moments[2] * spin for moment in moments[:2])
+        growth = f"grows e-fold in {grows.growth_time:.2g} s" if grows.squared_exponent else "is not turned back"
+        cure = f"expected a momentum below {low:.4g} or above {high:.4g} N m s"
+        return Finding(("wheel", "momentum"), f"nutation about the spin axis {growth} with it; {cure}")
     named = sorted(zip(moments, ("I1", "I2", "I3"), strict=True), reverse=True)
     values = ", ".join(f"{name} = {moment:.10g}" for moment, name in named)
     kind, growth = rigid_body.axis_class(moments), ""
@@ -376,9 +386,9 @@ def _spin_axis_fault(tensor: Vector, spin: float | None) -> Finding | None:
 
 
 def spin_of(facts: Facts) -> float | None:
-    """The rate about principal axis 3; None where it is zero or cannot be read."""
+    """The rate about principal axis 3; None where it is zero without a wheel or cannot be read."""
     spin = _spin_of_omega0(facts)[1] if facts.has("omega0") else facts.number("rate", "state", "spin")
-    return spin if spin is not None and abs(spin) >= SMALLEST else None
+    return spin if spin is not None and (abs(spin) >= SMALLEST or wheel_of(facts)) else None
 
 
 def _motion(facts: Facts) -> Iterator[Finding]:
@@ -387,8 +397,19 @@ def _motion(facts: Facts) -> Iterator[Finding]:
     if not facts.has("omega0") and not facts.has("state"):
         yield Finding(("omega0",), "missing; give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}")
     for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
-        if spin is not None and abs(spin) < SMALLEST:
+        if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
             yield Finding(path, "the spin is zero; expected a rate about axis 3; nothing nutates without it")
+    spin, inertia = spin_of(facts), inertia_of(facts)
+    if spin is not None and inertia is not None and inertia.wheel:
+        axial = inertia.axial(spin)
+        if abs(axial) <= CANCELLED * abs(inertia.wheel):
+            problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s: without momentum nothing nutates"
+            yield Finding(("wheel", "momentum"), problem)
+        elif axial * spin < 0.0 and facts.has("sun_sensor"):
+            problem = (
+                "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned then"
+            )
+            yield Finding(("wheel", "momentum"), f"{problem}; leave sun_sensor out")
 
 
 def spin_axis(facts: Facts) -> Vector:
@@ -506,8 +527,11 @@ def _dissipation(facts: Facts) -> Iterator[Finding]:
     if time_constant == 0.0:
         cure = "expected a time above 0, or leave dissipation out for none"
         yield Finding(("dissipation", "time_constant"), f"zero; {cure}")
-    inertia = inertia_of(facts)
-    if inertia is not None and inertia.a == 0.0 and facts.has("dissipation", "nutation"):
+    inertia, named = inertia_of(facts), facts.has("dissipation", "nutation")
+    if time_constant is not None and wheel_of(facts) and not named:
+        problem = "missing; with a wheel the place of the loss decides: give grows or decays"
+        yield Finding(("dissipation", "nutation"), problem)
+    elif inertia is not None and inertia.a == 0.0 and inertia.wheel == 0.0 and named:
         yield Finding(
             ("dissipation", "nutation"), "the nutation of a sphere neither grows nor decays; leave it out", True
         )

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 READING = "reading"
 """The kind of the signal of a sensor: an angular rate of a gyro, an acceleration of an accelerometer."""
 
-RELATIVE = ("inertia", "rate", "force", "ratio", "mass", "pressure")
+RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
@@ -139,6 +139,9 @@ class DispersionsSection(Section):
 
     A: _Moment | None = Field("Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"})
     C: _Moment | None = Field("Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"})
+    wheel_momentum: Annotated[ToleranceSection, _Tolerance("momentum")] | None = Field(
+        "Of the angular momentum of the wheel, N m s or %.", {"normal": "0.5 N m s"}
+    )
     omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
         "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
     )

@@ -33,13 +33,22 @@ class Path(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s; ``growth`` 1/s: `energy_sink`'s κ."""
+    """Coast of a symmetric body in closed form, from ``state`` at ``start`` s.
+
+    ``growth`` 1/s is `energy_sink`'s κ, ``wheel`` h in N m s.
+    """
 
     A: float
     C: float
     start: float
     state: SpinState
     growth: float = 0.0
+    wheel: float = 0.0
+
+    @classmethod
+    def of(cls, inertia: Inertia, state: SpinState, start: float = 0.0) -> Arc:
+        """Coast of a body without dissipation."""
+        return cls(inertia.A, inertia.C, start, state, wheel=inertia.wheel)
 
     @property
     def steps(self) -> int:
@@ -52,20 +61,22 @@ class Arc:
         state = self.state
         if self.growth != 0.0:
             omega, spin, quaternion = energy_sink.arc(
-                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since
+                self.A, self.C, self.growth, state.quaternion, state.omega, state.spin, since, self.wheel
             )
             return np.column_stack([omega.real, omega.imag, spin]), quaternion
-        omega = state.omega * np.exp(-1j * (self.A - self.C) / self.A * state.spin * since)
-        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since)
+        turning = (self.A - self.C) / self.A * state.spin - self.wheel / self.A
+        omega = state.omega * np.exp(-1j * turning * since)
+        quaternion = attitude.arc(self.A, self.C, state.quaternion, state.omega, state.spin, since, self.wheel)
         return np.column_stack([omega.real, omega.imag, np.full(len(since), state.spin)]), quaternion
 
     def end(self, time: float) -> SpinState:
         """State at ``time`` s."""
-        A, C, state, since = self.A, self.C, self.state, time - self.start
+        A, C, state, since, wheel = self.A, self.C, self.state, time - self.start, self.wheel
+        motion = state.quaternion, state.omega, state.spin, since, wheel
         if self.growth != 0.0:
-            return SpinState(*energy_sink.arc_end(A, C, self.growth, state.quaternion, state.omega, state.spin, since))
-        turned = cmath.exp(-1j * (A - C) / A * state.spin * since)
-        quaternion = attitude.arc_end(A, C, state.quaternion, state.omega, state.spin, since)
+            return SpinState(*energy_sink.arc_end(A, C, self.growth, *motion))
+        turned = cmath.exp(-1j * ((A - C) / A * state.spin - wheel / A) * since)
+        quaternion = attitude.arc_end(A, C, *motion)
         return SpinState(state.omega * turned, state.spin, quaternion)
 
 
@@ -193,7 +204,7 @@ class Dynamics:
         work.spend(LEG)
         torques, slope, falling = push
         if end == start or (self.free and not torques and falling is None):
-            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth)
+            arc = Arc(self.moments[0], self.moments[2], start, state, self.forcing.growth, self.forcing.wheel)
             return arc, state if end == start else arc.end(end)
         torque = np.asarray(sum(torques, self.constant))
         long = float(np.linalg.norm(state.rates)) * (end - start) > LONG
@@ -235,6 +246,7 @@ def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
                 (disturbance.transverse, disturbance.rate) for disturbance in disturbances if disturbance.rate != 0.0
             ),
             growth=spacecraft.growth,
+            wheel=spacecraft.inertia.wheel,
         ),
     )
 

@@ -240,7 +240,7 @@ def _axis_and_direction(flown: Flight, keep: Keep, times: Vector) -> tuple[Vecto
     if keep.direction is not None:
         return flown.axis(times), keep.direction
     rates, quaternion = flown.motion(times)
-    momentum = attitude.rotate(quaternion, rates * flown.moments_at(times))
+    momentum = attitude.rotate(quaternion, rates * flown.moments_at(times) + (0.0, 0.0, flown.spacecraft.inertia.wheel))
     momentum /= np.linalg.norm(momentum, axis=-1, keepdims=True)
     return flown.axis(times), momentum
 

@@ -120,27 +120,29 @@ class Flight(Tabled):
     @property
     def residual(self) -> Residual:
         """Cone angles after the last pulse, and where H went."""
-        start, moments = self.spacecraft.initial, self.last_moments
-        before = attitude.rotate(start.quaternion, start.rates * np.asarray(self.moments))
-        target = self.spacecraft.goal.axis
-        body = self.settled.rates * np.asarray(moments)
-        after = attitude.rotate(self.settled.quaternion, body)
-        shift = float(attitude.angle_between(before, after))
-        left = arc_cones(moments, self.settled.rates, self._sense)
+        body, target = self.spacecraft, self.spacecraft.goal.axis
+        after = self.last_momentum
+        shift = float(attitude.angle_between(body.momentum, after))
+        left = arc_cones(self.last_moments, self.settled.rates, body.sense, body.inertia.wheel)
         error = shift if target is None else float(attitude.angle_between(target, after))
         return Residual(left.nutation, left.body, left.space, shift, error, self.model)
 
     @property
     def final(self) -> Final:
         """Final direction of spin axis and angular momentum."""
-        state = self.settled
-        momentum = attitude.rotate(state.quaternion, state.rates * np.asarray(self.last_moments))
+        state, momentum = self.settled, self.last_momentum
         return Final(
-            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self._sense])),
+            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense])),
             momentum=np.asarray(momentum / np.linalg.norm(momentum)),
             spin=state.spin,
             nutation=self.residual.nutation,
         )
+
+    @property
+    def last_momentum(self) -> Vector:
+        """Angular momentum after the last pulse, inertial, (3,) N m s."""
+        inertia = replace(self.spacecraft.inertia, moments=self.last_moments)
+        return attitude.rotate(self.settled.quaternion, inertia.momentum(self.settled.rates))
 
     def moments_at(self, times: Vector) -> Vector:
         """Principal moments (kg m²) at ``times`` (n,) s: (3,), or (n, 3) where they fall with the propellant used."""
@@ -170,7 +172,7 @@ class Flight(Tabled):
 
     def axis(self, times: Vector) -> Vector:
         """Spin axis, inertial unit vectors (n, 3), at ``times`` (n,) s."""
-        return attitude.rotate(self.motion(times)[1], np.array([0.0, 0.0, self._sense]))
+        return attitude.rotate(self.motion(times)[1], np.array([0.0, 0.0, self.spacecraft.sense]))
 
     @property
     def shown_to(self) -> float:
@@ -204,7 +206,8 @@ class Flight(Tabled):
 
     def _joined(self, motions: Iterable[Motion]) -> Track:
         t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
-        return make_track(self.moments_at(t), self.spacecraft.spin, t, body, quaternion, pulse)
+        sense, wheel = self.spacecraft.sense, self.spacecraft.inertia.wheel
+        return make_track(self.moments_at(t), sense, wheel, t, body, quaternion, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
         """Rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
@@ -235,14 +238,8 @@ class Flight(Tabled):
         body = np.concatenate([np.empty((0, 3)), *(rates for _, rates, _ in states)])
         quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
         numbers = completed + np.arange(len(t), dtype=np.int64)
-        moments = self.moments_at(t)
-        track = make_track(moments, self.spacecraft.spin, t, body, quaternion, numbers)
-        return widest(track, moments, self.spacecraft.spin)
-
-    @property
-    def _sense(self) -> float:
-        """Sign of the spin at t = 0: the spin axis stays the same end of the body through a reversal."""
-        return math.copysign(1.0, self.spacecraft.spin)
+        moments, sense, wheel = self.moments_at(t), self.spacecraft.sense, self.spacecraft.inertia.wheel
+        return widest(make_track(moments, sense, wheel, t, body, quaternion, numbers), moments, sense, wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
@@ -290,24 +287,17 @@ def effective_impulses(spacecraft: Spacecraft, schedule: Schedule) -> NDArray[np
 
 def _effective_impulse(spacecraft: Spacecraft, inertia: Inertia, pulse: Pulse, spin: float) -> complex:
     """Effect of ``pulse`` on ω at its centre, N m s, with the ``inertia`` and ω3 (rad/s) before it."""
-    drift = spacecraft.spin_drift
+    drift, impulse = spacecraft.spin_drift, complex(pulse.impulse[0], pulse.impulse[1])
     axial_torque = 0.0 if pulse.torque is None else float(pulse.torque[2])
+    slope = inertia.nutation_slope(spin)
+    change, turn, growth = slope * axial_torque / inertia.C, slope * drift, spacecraft.growth
     if pulse.command is not None and pulse.command.ramps:
         from nutdamp.physics import thruster  # few spacecraft have any
 
-        begin = spin - drift * (pulse.t - pulse.thrust[0])
-        rate, ramps = axial_torque / inertia.C, pulse.command.ramps
-        shape = thruster.shape_factor(inertia.body_rate, begin, rate, ramps, pulse.t, spacecraft.growth, drift)
-        return complex(pulse.impulse[0], pulse.impulse[1]) * shape
-    factor = response.width_factor(
-        inertia.body_rate,
-        spin - 0.5 * drift * pulse.on_time,
-        axial_torque / inertia.C,
-        pulse.on_time,
-        growth=spacecraft.growth,
-        drift=drift,
-    )
-    return complex(pulse.impulse[0], pulse.impulse[1]) * factor
+        rate = inertia.nutation_rate(spin - drift * (pulse.t - pulse.thrust[0]))
+        return impulse * thruster.shape_factor(rate, change, pulse.command.ramps, pulse.t, growth, turn)
+    rate = inertia.nutation_rate(spin - 0.5 * drift * pulse.on_time)
+    return impulse * response.width_factor(rate, change, pulse.on_time, growth, turn)
 
 
 def flown(

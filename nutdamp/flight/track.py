@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.physics import attitude
-from nutdamp.physics.triaxial import arc_cones
+from nutdamp.physics.triaxial import widest_cones
 from nutdamp.spacecraft.model import Inertia
 
 Array = NDArray[np.float64]
@@ -46,7 +46,8 @@ class Track:
 
 def make_track(
     moments: Array,
-    spin0: float,
+    sense: float,
+    wheel: float,
     t: Array,
     rates: Array,
     quaternion: Array,
@@ -54,11 +55,10 @@ def make_track(
 ) -> Track:
     """Everything that follows from rates (n, 3) and attitude (n, 4) for a body with principal ``moments`` (kg m²).
 
-    These are (3,), or (n, 3) where they change. The spin axis is the end of body axis 3 about which the body spins at
-    t = 0, by the sign of ``spin0``. The cone angles are those of each moment; with I1 ≠ I2 they swing, see `widest`.
+    These are (3,), or (n, 3) where they change; ``wheel`` is h in N m s. The spin axis is ``sense``·e3. The cone angles
+    are those of each moment; with I1 ≠ I2 they swing, see `widest`.
     """
-    sense = math.copysign(1.0, spin0)
-    momentum = rates * moments
+    momentum = rates * moments + np.array([0.0, 0.0, wheel])
     nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
     body_cone = np.arctan2(np.hypot(rates[:, 0], rates[:, 1]), sense * rates[:, 2])
     return Track(
@@ -74,13 +74,11 @@ def make_track(
     )
 
 
-def widest(track: Track, moments: Array, spin0: float) -> Track:
+def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
     """Track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
-    sense, rows = math.copysign(1.0, spin0), np.broadcast_to(moments, track.rates.shape).tolist()
-    cones = [arc_cones((row[0], row[1], row[2]), rates, sense) for row, rates in zip(rows, track.rates, strict=True)]
-    nutation, body_cone = np.array(cones, dtype=float).reshape(-1, 2).T
+    nutation, body_cone = widest_cones(np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel)
     return replace(track, nutation=nutation, body_cone=body_cone, space_cone=nutation - body_cone)
 
 

@@ -53,6 +53,7 @@ class EulerEquations:
         self.shed = None if per_kg is None else self.axes @ np.diag(per_kg) @ self.axes.T
         self._constant = self.tensor.tolist(), self.inverse.tolist()
         self.growth, self.axis = spacecraft.growth, self.axes[:, 2].tolist()
+        self.wheel = (spacecraft.inertia.wheel * self.axes[:, 2]).tolist()
         self.evaluations = 0
 
     def state(self, motion: SpinState) -> Vector:
@@ -120,7 +121,7 @@ class EulerEquations:
             first, second, third, w, x, v, z, *used = y.tolist()
             rates, since = (first, second, third), t - start
             tensor, inverse = self._body(used)
-            momentum = _times(tensor, rates)
+            momentum = [part + more for part, more in zip(_times(tensor, rates), self.wheel, strict=True)]
             drive, slip = self._sink(momentum)
             torque = [push + rise * since for push, rise in zip(pushed, rising, strict=True)]
             for rate, transverse, axial in disturbances:
@@ -221,7 +222,8 @@ WITHOUT = "without "
 class Method:
     """Method of flying the schedule: its residual (rad), or the reason why it could not be flown.
 
-    ``axis``, ``momentum`` (rad) and ``rate`` (relative to |ω|) are its largest differences from the flown motion.
+    ``axis``, ``momentum`` (rad) and ``rate`` are its largest differences from the flown motion; that of the rates is
+    relative to |ω|, or to |H| over the largest moment where a wheel holds the body still.
     ``outside``: an integration that shares nothing with it, and so is to confirm it.
     """
 
@@ -343,12 +345,12 @@ def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vect
             np.array([pulse.t for pulse in schedule]),
             propagation.effective_impulses(spacecraft, schedule),
             np.array([pulse.impulse[2] for pulse in schedule]),
+            inertia.wheel,
         )
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    moments = judge.moments_at(times)
-    return _method("impulse sum (17), arcs", moments, arcs.residual, (body, quaternion), reference, between)
+    return _method("impulse sum (17), arcs", judge, times, arcs.residual, (body, quaternion), reference, between)
 
 
 def _by_dop853(judge: Flight, times: Vector, reference: tuple[Vector, Vector]) -> Method:
@@ -376,33 +378,36 @@ def _compared(
 ) -> Method:
     """A method that gives motion only: its residual is read at the first time after the last pulse."""
     last = int(np.searchsorted(times, judge.schedule.end - 1e-9))
-    start = judge.spacecraft.initial
-    before = attitude.rotate(start.quaternion, start.rates * np.asarray(judge.moments))
-    after = attitude.rotate(motion[1][last], motion[0][last] * np.asarray(judge.last_moments))
-    shift = float(attitude.angle_between(before, after))
-    left = arc_cones(judge.last_moments, motion[0][last], math.copysign(1.0, judge.spacecraft.spin))
+    craft = judge.spacecraft
+    inertia = replace(craft.inertia, moments=judge.last_moments)
+    after = attitude.rotate(motion[1][last], inertia.momentum(motion[0][last]))
+    shift = float(attitude.angle_between(craft.momentum, after))
+    left = arc_cones(inertia.moments, motion[0][last], craft.sense, inertia.wheel)
     residual = Residual(left.nutation, left.body, left.space, shift, shift)
-    method = _method(name, judge.moments_at(times), residual, motion, reference, np.ones(len(times), dtype=bool))
+    method = _method(name, judge, times, residual, motion, reference, np.ones(len(times), dtype=bool))
     return replace(method, outside=True)
 
 
 def _method(
     name: str,
-    moments: Vector,
+    judge: Flight,
+    times: Vector,
     residual: Residual,
     motion: tuple[Vector, Vector],
     reference: tuple[Vector, Vector],
     rows: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
 ) -> Method:
-    """Largest differences between two motions over the ``rows`` compared; ``moments`` (3,) or of each row (n, 3)."""
+    """Largest differences between two motions at ``times`` (n,) s over the ``rows`` compared."""
+    moments, wheel = judge.moments_at(times), np.array([0.0, 0.0, judge.spacecraft.inertia.wheel])
+    still = wheel[2] and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
     spin_axis = np.array([0.0, 0.0, 1.0])
     (body, turn), (other_body, other_turn) = motion, reference
     differences = (
         attitude.angle_between(attitude.rotate(turn, spin_axis), attitude.rotate(other_turn, spin_axis)),
         attitude.angle_between(
-            attitude.rotate(turn, body * moments), attitude.rotate(other_turn, other_body * moments)
+            attitude.rotate(turn, body * moments + wheel), attitude.rotate(other_turn, other_body * moments + wheel)
         ),
-        np.linalg.norm(body - other_body, axis=1) / np.linalg.norm(other_body, axis=1),
+        np.linalg.norm(body - other_body, axis=1) / np.maximum(np.linalg.norm(other_body, axis=1), still),
     )
     axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
     return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)
@@ -417,7 +422,8 @@ def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
             continue
         turning, _ = leg.path.motion(np.linspace(leg.start, leg.end, 25))
         moments = flown.moments_at(np.array([leg.start])).ravel()
-        for index, value in enumerate((np.linalg.norm(turning * moments, axis=1), turning**2 @ moments)):
+        size = np.linalg.norm(turning * moments + (0.0, 0.0, flown.spacecraft.inertia.wheel), axis=1)
+        for index, value in enumerate((size, turning**2 @ moments)):
             worst[index] = max(worst[index], float(np.ptp(value) / np.max(value)))
     body = flown.spacecraft
     outside, inside = ("disturbances",) * bool(body.disturbances), ("dissipation",) * (body.growth != 0.0)

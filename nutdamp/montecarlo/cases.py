@@ -207,7 +207,8 @@ class DispersedCases:
     the rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its
     ``thrust`` where a valve is not as the file has it. ``tilt`` is the rotation vector (rad, about body axes 1 and 2)
     by which the attitude at t = 0 is off; ``spent`` the propellant of each pulse, kg, None where that of one is not
-    known; ``drained`` as in `fed.Fed`; ``per_kg`` what each kg takes off the moments, m², None where they stay.
+    known; ``drained`` as in `fed.Fed`; ``per_kg`` what each kg takes off the moments, m², None where they stay;
+    ``wheel`` the momentum h of a wheel, N m s.
     """
 
     moments: Triple
@@ -221,6 +222,7 @@ class DispersedCases:
     spent: tuple[Cases, ...] | None
     drained: Cases = 0.0
     per_kg: Triple | None = None
+    wheel: Cases = 0.0
 
     @property
     def propellant(self) -> Cases | None:
@@ -310,7 +312,7 @@ class DispersedModel:
         body = self.spacecraft
         axis = body.goal.axis
         if axis is None:
-            axis = np.asarray(body.inertia.moments) * body.omega0
+            axis = body.inertia.momentum(body.omega0)
         else:
             axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), np.asarray(axis))
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
@@ -366,6 +368,7 @@ class DispersedModel:
             spent=spent,
             drained=drained,
             per_kg=self._per_kg(draws),
+            wheel=plus(self.spacecraft.inertia.wheel, draws.get("wheel momentum", 0.0)),
         )
 
     def _fired(self, index: int, actuation: _Actuation, nominal: tuple[Triple, Cases, Cases], draws: Draws) -> _Fired:
@@ -542,7 +545,7 @@ def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
     inertial = [np.zeros(3) if cone.direction is None else cone.direction for cone in body.keep]
     directions = np.array([in_body(body, tilt, count, direction) for direction in inertial])
     momentum = next((number for number, cone in enumerate(body.keep) if cone.direction is None), None)
-    return AxisWatch.of(directions.reshape(-1, 3, count), math.copysign(1.0, body.spin), momentum)
+    return AxisWatch.of(directions.reshape(-1, 3, count), body.sense, momentum)
 
 
 def in_body(body: Spacecraft, tilt: Tilt, count: int, direction: Vector) -> NDArray[np.float64]:

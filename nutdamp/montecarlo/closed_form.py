@@ -79,18 +79,19 @@ class ClosedForm:
         ratio = max(abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A)))
         added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
         rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
+        rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(A - off_A, 0.25 * A)
         return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
 
 
 def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
     """End states of cases whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
     # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
-    A, C = cases.A, cases.C
+    A, C, wheel = cases.A, cases.C, cases.wheel
     a, per_A = 1.0 - C / A, 1.0 / A
     sheds = cases.sheds
     x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
     spin = cases.omega0[2]
-    z = C * spin
+    z = plus(C * spin, wheel)
     before = (x, y, z)
     phase: Cases = 0.0
     now: Cases = 0.0
@@ -101,25 +102,26 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
         coast = centre - now
         turn = _turned_on(turn, (x, y, z), coast * per_A)
         if growth == 0.0:
-            phase = phase + a * spin * coast
+            phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
         else:
             effect, turn = _slipped(turn, (x, y, z), growth, coast)
-            phase = phase + a * spin * effect.turned
-            x, y, spin = x * effect.transverse, y * effect.transverse, spin * effect.axial
-            z = C * spin
+            phase = phase + (a * z * effect.turned - wheel * coast) / C
+            x, y, z = x * effect.transverse, y * effect.transverse, z * effect.axial
+            spin = (z - wheel) / C
         if sheds is not None:  # half before the pulse and half after it, the rates as they are
             x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, z = 1.0 - C / A, C * spin
-        along, across, gained = _effective(impulse, a, spin, C, on_time, nodes[number], growth)
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+        rate = plus(a * spin, times(-per_A, wheel))
+        along, across, gained = _effective(impulse, rate, a / C, on_time, nodes[number], growth)
         cosine, sine = cos_sin(phase)
         x = x + along * cosine - across * sine
         y = y + along * sine + across * cosine
         if not (isinstance(gained, float) and gained == 0.0):
             spin = spin + gained / C
-            z = C * spin
+            z = plus(C * spin, wheel)
         if sheds is not None:
             x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
         now = centre
     after = (x, y, z) if turn is None else carried(turn, (x, y, z))
     return Ends(
@@ -178,19 +180,20 @@ def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
 
 
 def _effective(
-    impulse: Triple, a: Cases, spin: Cases, C: Cases, on_time: Cases, nodes: int, growth: float
+    impulse: Triple, rate: Cases, slope: Cases, on_time: Cases, nodes: int, growth: float
 ) -> tuple[Cases, Cases, Cases]:
     """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `rates.width_factor`.
 
     The spin runs through the pulse, and the factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ =
-    a(ω3 + J3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(aω3τ/2) without J3 and κ.
+    (ν + aJ3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate``
+    is ν as it begins, ``slope`` a/C.
     """
     along, across, axial = impulse
     if isinstance(on_time, float) and on_time == 0.0:
         return impulse
     half = 0.5 * on_time
     if isinstance(axial, float) and axial == 0.0:
-        angle = a * spin * half + TINY
+        angle = rate * half + TINY
         if growth == 0.0:
             tangent = np.tan(0.5 * angle)
             factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
@@ -201,13 +204,13 @@ def _effective(
         return _turned(
             along, across, (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale, 0.0
         )
-    gained = axial / C
-    slope, bend = a * (spin + 0.5 * gained) * half, 0.25 * a * gained * half
+    gained = slope * axial
+    swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
     real: Cases = 0.0
     imaginary: Cases = 0.0
     for node, weight in _legendre(nodes):
         # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
-        level, slant = cos_sin(slope * node)
+        level, slant = cos_sin(swing * node)
         grown = np.exp(growth * half * node)
         level, slant = 0.5 * weight * level * (grown + 1.0 / grown), 0.5 * weight * slant * (grown - 1.0 / grown)
         cosine, sine = cos_sin(bend * (1.0 + node * node))

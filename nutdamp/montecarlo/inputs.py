@@ -139,7 +139,7 @@ def of_sensor(spacecraft: Spacecraft) -> Inputs:
 
 
 def _no_size(entry: DispersedInput) -> str:
-    if entry.tolerance in ("A", "C", "omega0") and entry.nominal == 0.0:
+    if entry.tolerance in ("A", "C", "omega0", "wheel_momentum") and entry.nominal == 0.0:
         return "given in % of a value that is zero"
     return "its size is zero"
 
@@ -153,6 +153,8 @@ def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedIn
     for name, nominal, tolerance in moments:
         if tolerance is not None:
             yield _input(name, name, tolerance, nominal, "kg m²")
+    if requested.wheel_momentum is not None:
+        yield _input("wheel momentum", "wheel_momentum", requested.wheel_momentum, spacecraft.inertia.wheel, "N m s")
     for number, (tolerance, rate) in enumerate(zip(requested.omega0, rates.tolist(), strict=True), start=1):
         if tolerance is not None:
             yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")

@@ -22,7 +22,6 @@ from nutdamp.montecarlo.cases import (
     DispersedCases,
     DispersedModel,
     Thrusting,
-    Triple,
     in_body,
     number_of,
     rotated,
@@ -34,7 +33,7 @@ from nutdamp.physics import batch, sky
 from nutdamp.physics.batch import Bodies, MotionStretch
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
-from nutdamp.physics.triaxial import arc_cones
+from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.block_model import fire, pushes
 
 Array = NDArray[np.float64]
@@ -84,8 +83,7 @@ def fly(
             return np.broadcast_to(np.asarray(value, dtype=float), count)[rows]
 
         start = MotionStretch(bodies.some(rows), np.zeros(len(starts[0, rows])), rates[:, rows], quaternion[:, rows])
-        sense = math.copysign(1.0, body.spin)
-        clock = SunPulseClock(start, sun[:, rows], sense, body.sun_sensor.azimuth)
+        clock = SunPulseClock(start, sun[:, rows], math.copysign(1.0, body.spin), body.sun_sensor.azimuth)
         commanded = ((block, number) for block in model.schedule.blocks for number in block.sun_pulses)
         sees_all, before, alike = all(nominal), 0, np.ones(rows.stop - begin, dtype=bool)
         for index, (block, number) in enumerate(commanded):
@@ -173,7 +171,7 @@ class RealWidths:
     def effort(self) -> float:
         """Units of work of a case: its pulses, and where coasts are no arcs, its steps and looks at cones."""
         moments, rates = np.array(self._dynamics.moments)[:, None], self.model.spacecraft.initial.rates
-        arcs = self._bodies(moments).free
+        arcs = self._bodies(moments, 0.0).free
         turned = 0.0 if arcs else float(np.linalg.norm(rates)) * self.model.schedule.end
         looks = turned * sky.ROWS / sky.CIRCLE if self.model.spacecraft.keep else 0.0
         stepping = STEPPED * turned / batch.STRIDE + LOOKED * looks
@@ -184,11 +182,9 @@ class RealWidths:
         count = number_of(cases)
         watch = watch_of(self.model, cases) if self.model.spacecraft.keep else None
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
-        propellant = cases.propellant
+        propellant, bodies = cases.propellant, self._bodies(moments, cases.wheel)
         if self.model.schedule.blocks:
-            settled, turned, _, seen, over = fly(
-                self.model, self._bodies(moments), rates, _upright(count), cases, self._seen, watch
-            )
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, _upright(count), cases, self._seen, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
@@ -197,30 +193,33 @@ class RealWidths:
             pulses = batch.Pulses(starts, np.array(self.model.on_times), impulses, sheds=_sheds(cases, count))
             if self.model.schedule.shaped:
                 pulses = self._ramps(cases, starts, impulses)
-            settled, turned = batch.fly(self._bodies(moments), rates, _upright(count), pulses, watch)
+            settled, turned = batch.fly(bodies, rates, _upright(count), pulses, watch)
             over = np.max(pulses.edges, axis=0, initial=0.0)
         shed = _sheds(cases, count)
-        last = moments if shed is None else moments - shed.sum(axis=0)
+        last = bodies if shed is None else bodies.lighter(shed.sum(axis=0))
         if watch is not None:
-            watch.turn(batch.MotionStretch(self._bodies(last), over, settled, turned))
-        momentum = triple(last * settled)
+            watch.turn(batch.MotionStretch(last, over, settled, turned))
+        momentum, (first, second, _) = triple(last.momentum(settled)), last.moments
         after = carried(tuple(turned), momentum)
-        sense = math.copysign(1.0, self.model.spacecraft.spin)
         return Ends(
             momentum=momentum,
-            before=triple(moments * rates),
+            before=triple(bodies.momentum(rates)),
             after=after,
             pointed=rotated(after, cases.tilt),
             spin=settled[2],
             spin_change=settled[2] - rates[2],
             propellant=propellant,
-            nutation=None if np.array_equal(last[0], last[1]) else largest_nutation(last, momentum, sense),
+            nutation=None if np.array_equal(first, second) else self._largest(last, settled),
             aspects=None if watch is None else watch.angles,
             drained=cases.drained,
         )
 
-    def _bodies(self, moments: Array) -> batch.Bodies:
-        return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing)
+    def _largest(self, bodies: batch.Bodies, rates: Array) -> Array:
+        """Largest nutation (n,), rad, of the free motion from ``rates`` (3, n)."""
+        return widest_cones(bodies.moments, rates, self.model.spacecraft.sense, bodies.forcing.wheel)[0]
+
+    def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
+        return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel))
 
     def _ramps(self, cases: DispersedCases, starts: Array, impulses: Array) -> batch.Pulses:
         """Pulses by the ramps of their thrust, each as a pulse of its own; as in `batch.Pulses`."""
@@ -281,35 +280,6 @@ def _upright(count: int) -> Array:
     upright = np.zeros((4, count))
     upright[0] = 1.0
     return upright
-
-
-def largest_nutation(moments: Array, momentum: Triple, sense: float) -> Array:
-    """Largest angle (n,) in rad between H and the spin axis on the torque-free motions through ``momentum``.
-
-    ``moments`` (3, n) kg m². What u1 (1/I1 - 1/I3) + u2 (1/I2 - 1/I3) is, u the squared components of H, stays
-    (2T - H²/I3), as do the other two sums of its kind: so the components where one of H1, H2 vanishes follow without
-    differences of large numbers. Motions about another axis than the third go one by one, by `arc_cones`.
-    """
-    u1, u2, u3 = (part * part for part in momentum)
-    first, second, third = 1.0 / moments
-    across = u1 * (first - third) + u2 * (second - third)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # Where H2 = 0 there are H1 and H3, and where H1 = 0 there are H2 and H3.
-        ends = [
-            (across / (first - third), u3 + u2 * (first - second) / (first - third)),
-            (across / (second - third), u3 + u1 * (second - first) / (second - third)),
-        ]
-        angles = [np.arctan2(np.sqrt(transverse), np.sqrt(axial)) for transverse, axial in ends]
-        largest = np.maximum(*angles)
-        plain = (first - third) * (second - third) > 0.0
-        for transverse, axial in ends:
-            plain &= (transverse >= 0.0) & (axial > 0.0)
-    plain &= sense * momentum[2] > 0.0
-    for case in np.flatnonzero(~plain):
-        first_, second_, third_ = (float(moment) for moment in moments[:, case])
-        rates = np.array([part[case] for part in momentum]) / moments[:, case]
-        largest[case] = arc_cones((first_, second_, third_), rates, sense).nutation
-    return np.asarray(largest)
 
 
 def _whole(parts: tuple[object, ...], count: int) -> Array:

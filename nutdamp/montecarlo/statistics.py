@@ -137,7 +137,7 @@ ROWS = 10
 def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
     """Write the `OUTPUTS` of cases into ``out`` (5, n); propellant is NaN where unknown."""
     x, y, z = ends.momentum
-    sense = math.copysign(1.0, model.spacecraft.spin)
+    sense = model.spacecraft.sense
     out[0] = np.arctan2(np.sqrt(x * x + y * y), sense * z) if ends.nutation is None else ends.nutation
     out[1] = angle(ends.before, ends.after)
     out[2] = angle(parts_of(model.target), ends.pointed)
@@ -153,7 +153,7 @@ def vectors(model: DispersedModel, ends: Ends, out: NDArray[Any]) -> None:
     nearly, for a good plan, so that they have no derivative themselves. All are in the body axes of t = 0.
     """
     x, y, z = ends.momentum
-    sense = math.copysign(1.0, model.spacecraft.spin)
+    sense = model.spacecraft.sense
     out[0], out[1] = x * sense / z, y * sense / z
     before, after, pointed = (_unit(vector) for vector in (ends.before, ends.after, ends.pointed))
     for row in range(3):

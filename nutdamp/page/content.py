@@ -55,7 +55,7 @@ from nutdamp.views.guide import Formula, Topic
 from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
-from nutdamp.views.spacecraft import beyond_floors
+from nutdamp.views.spacecraft import beyond_floors, turn_floor
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade import apart, beats, front_parts
 from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
@@ -402,7 +402,8 @@ def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
     yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
     if body.goal.axis is not None:
         turning = quantity(body.turning_impulse, "N m s")
-        yield "C|ω3|β", f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
+        words = f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
+        yield turn_floor(body), words
 
 
 def _any_of(*schemes: str) -> Callable[[Comparison], bool]:

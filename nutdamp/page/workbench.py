@@ -47,6 +47,7 @@ def absence(body: Spacecraft, schedule: Schedule) -> str:
     kinds = (
         (not len(schedule), "no pulses"),
         (not body.inertia.symmetric, "I1 ≠ I2"),
+        (body.inertia.wheel != 0.0, "a wheel"),
         (body.growth != 0.0, "energy dissipation"),
         (bool(body.disturbances), "disturbance torques"),
         (bool(body.thrust_laws) or schedule.shaped, ", ".join(body.thrust_laws) or "shaped pulses"),

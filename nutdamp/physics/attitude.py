@@ -87,9 +87,9 @@ def angle_between(first: Array, second: Array) -> Array:
     return np.asarray(np.arctan2(cross, np.sum(first * second, axis=-1)), dtype=np.float64)
 
 
-def angular_momentum(A: float, C: float, omega: complex, spin: float) -> Array:
-    """H = (A ω1, A ω2, C ω3) in body axes, (3,) N m s."""
-    return np.array([A * omega.real, A * omega.imag, C * spin])
+def angular_momentum(A: float, C: float, omega: complex, spin: float, wheel: float = 0.0) -> Array:
+    """H = (A ω1, A ω2, C ω3 + h) in body axes, (3,) N m s; ``wheel`` is h."""
+    return np.array([A * omega.real, A * omega.imag, C * spin + wheel])
 
 
 def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
@@ -108,18 +108,18 @@ def frame_n(A: float, C: float, omega: complex, spin: float) -> Array:
     return from_matrix(np.array([x, np.cross(z, x), z]))
 
 
-def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, times: Array) -> Array:
+def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, times: Array, wheel: float = 0.0) -> Array:
     """Attitude on a torque-free arc of a symmetric body, exact: (n,) s after its start -> (n, 4).
 
-    R(t) = Rot(H t/A) R(0) Rot3(a ω3 t): the body turns about H at |H|/A and about its own axis at a ω3, because
-    ω = H/A + a ω3 e3 for a symmetric body (Poinsot's rolling cones, Magnus 1970 fig. 4).
+    R(t) = Rot(H t/A) R(0) Rot3(ν t): the body turns about H at |H|/A and about its own axis at ν = ω3 - H3/A = aω3 -
+    h/A, because ω = H/A + ν e3 for a symmetric body (Poinsot's rolling cones, Magnus 1970 fig. 4).
     """
-    body = angular_momentum(A, C, omega, spin)
+    body = angular_momentum(A, C, omega, spin, wheel)
     momentum = rotate(quaternion, body)
     size = float(np.linalg.norm(momentum))
     times = np.asarray(times, dtype=float)
     half_about_momentum = 0.5 * size / A * times
-    half_about_axis = 0.5 * (A - C) / A * spin * times
+    half_about_axis = 0.5 * ((A - C) / A * spin - wheel / A) * times
     zero = np.zeros_like(times)
     # A body at rest has no direction of H, but then the angle about it is zero as well.
     direction = momentum / size if size > 0 else momentum
@@ -130,11 +130,13 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
     return multiply(multiply(outer, quaternion), inner)
 
 
-def arc_end(A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float) -> Array:
+def arc_end(
+    A: float, C: float, quaternion: Array, omega: complex, spin: float, time: float, wheel: float = 0.0
+) -> Array:
     """`arc` at one ``time`` in s after its start, (4,): plain numbers, a tenth of the cost of arrays."""
-    h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
+    h1, h2, h3 = A * omega.real, A * omega.imag, C * spin + wheel
     size = math.sqrt(h1 * h1 + h2 * h2 + h3 * h3)
-    half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * (A - C) / A * spin * time
+    half_about_momentum, half_about_axis = 0.5 * size / A * time, 0.5 * ((A - C) / A * spin - wheel / A) * time
     # Turning about H by an angle is turning in the body about H's body components: q (cos, sin h) = (cos, sin Rh) q.
     sine = math.sin(half_about_momentum) / size if size > 0.0 else 0.0
     w, x, y, z = product(quaternion.tolist(), (math.cos(half_about_momentum), sine * h1, sine * h2, sine * h3))

@@ -56,9 +56,8 @@ class Series:
         self.turns = np.empty((LARGEST_ORDER + 1, 4, count))
         self.rates[0, :3], self.rates[0, 3:], self.turns[0] = rates, rates[:2], quaternion
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
-        self.sink = (
-            None if forcing.growth == 0.0 else _DampingSeries(moments, forcing.growth, acceleration, rates, step)
-        )
+        self.sink = None if forcing.growth == 0.0 else _DampingSeries(moments, forcing, acceleration, rates, step)
+        self.wheel = np.stack([-forcing.wheel / first, forcing.wheel / second]) if np.any(forcing.wheel) else None
         # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
         self.even_spin = not self.coupled and self.sink is None and jerk is None
         self.order = 0
@@ -110,6 +109,8 @@ class Series:
             products = np.einsum("kcn,kcn->cn", rates[: k + 1, 1 : 1 + parts], rates[k::-1, 2 : 2 + parts])
         np.multiply(self.coupling[:parts], products, out=following[:parts])
         following[parts:] = 0.0
+        if self.wheel is not None:
+            following[:2] += self.wheel * rates[k, 1::-1]
         if k == 0:
             following += self.acceleration
         elif k == 1 and self.jerk is not None:
@@ -137,20 +138,22 @@ class Series:
 class _DampingSeries:
     """Energy dissipation as series, see `taylor._Sink`: torque on H and slip of the body."""
 
-    def __init__(self, moments: Array, growth: float, acceleration: Array, rates: Array, step: Array) -> None:
-        self.moments, self.growth = moments, growth
+    def __init__(self, moments: Array, forcing: Forcing, acceleration: Array, rates: Array, step: Array) -> None:
+        self.moments, self.growth, self.wheel = moments, forcing.growth, forcing.wheel
         count = len(step)
         self.momentum = np.zeros((LARGEST_ORDER, 3, count))
         self.squares = np.zeros((LARGEST_ORDER, count))  # |H|²
         self.quotient = np.zeros((LARGEST_ORDER, count))  # H3/|H|²
         self.slip = np.zeros((LARGEST_ORDER, 3, count))
         largest = self.moments * (np.abs(rates) + np.abs(acceleration) * step)
+        largest[2] += np.abs(self.wheel)
         self.floor = AT_REST**2 * np.sum(largest * largest, axis=0)
 
     def acceleration(self, rates: Array, k: int) -> Array:
         """Coefficient k of H × s, (3, n) N m; stores that of ``slip`` s. ``rates`` (3, n): coefficient k."""
         momentum, slip = self.momentum, self.slip
         momentum[k] = rates * self.moments
+        momentum[k, 2] += self.wheel if k == 0 else 0.0
         self.squares[k] = np.einsum("kcn,kcn->n", momentum[: k + 1], momentum[k::-1])
         if k == 0:
             self.squares[0] += np.where(self.squares[0] + self.floor > 0.0, self.floor, 1.0)
@@ -188,9 +191,18 @@ class Bodies:
         alone = not self.constant.any() and not self.forcing.turning
         return alone and bool(np.array_equal(self.moments[0], self.moments[1]))
 
+    def momentum(self, rates: Array) -> Array:
+        """Angular momentum (3, n) N m s in body axes at ``rates`` (3, n) rad/s."""
+        momentum = self.moments * rates
+        momentum[2] += self.forcing.wheel
+        return momentum
+
     def some(self, cases: Any) -> Bodies:
         """Subset of ``cases`` (an index of arrays)."""
-        return Bodies(self.moments[:, cases], self.constant, self.forcing)
+        forcing = self.forcing
+        if np.ndim(forcing.wheel):
+            forcing = forcing._replace(wheel=forcing.wheel[cases])
+        return Bodies(self.moments[:, cases], self.constant, forcing)
 
     def lighter(self, by: Array | None) -> Bodies:
         """Copy with moments smaller ``by`` (3, n) kg m²; None: unchanged."""
@@ -430,7 +442,7 @@ def advance(here: MotionStretch, duration: Array) -> None:
     if not duration.any():
         return
     if here.torque is None and bodies.free:
-        _arc(bodies.moments, bodies.forcing.growth, here.rates, here.quaternion, duration)
+        _arc(bodies.moments, bodies.forcing, here.rates, here.quaternion, duration)
         return
     _integrate(here, duration, *_pushed(here))
 
@@ -452,20 +464,20 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
     return 2.0 * scale - 1.0, 2.0 * half * scale
 
 
-def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duration: Array) -> None:
-    """Exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` where ``growth`` is not 0.
+def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, duration: Array) -> None:
+    """Exact arc of symmetric bodies, in place; see `attitude.arc`, and `energy_sink.arc` with dissipation.
 
-    R(t) = R(0) Rot(H(0)/A t) Rot3(aω3 t), with H in body axes: the body turns about H at |H|/A and about its own axis
-    at aω3.
+    R(t) = R(0) Rot(H(0)/A t) Rot3(νt), with H in body axes: the body turns about H at |H|/A and about its own axis
+    at ν = ω3 - H3/A.
     """
     A, _, C = moments
-    x, y = rates[0], rates[1]
-    axial = C / A * rates[2]
+    x, y, growth, wheel = rates[0], rates[1], forcing.growth, forcing.wheel / A
+    axial = C / A * rates[2] + wheel
     size = np.sqrt(x * x + y * y + axial * axial)
     cosine, sine = cos_sin(0.5 * size * duration)
     sine /= np.where(size > 0.0, size, 1.0)
     turned = attitude.product(quaternion, (cosine, sine * x, sine * y, sine * axial))
-    angle = (1.0 - C / A) * rates[2] * duration
+    angle = ((1.0 - C / A) * rates[2] - wheel) * duration
     cosine, sine = cos_sin(0.5 * angle)
     p, a, b, c = turned
     quaternion[0], quaternion[3] = p * cosine - c * sine, c * cosine + p * sine
@@ -475,13 +487,15 @@ def _arc(moments: Array, growth: float, rates: Array, quaternion: Array, duratio
     cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
     rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
     if growth != 0.0:
+        rates[2] += forcing.wheel / C  # dissipation acts on the whole of H3
         _slip(growth, (1.0 - C / A) * rates[2], size, axial, rates, quaternion, duration)
+        rates[2] -= forcing.wheel / C
 
 
 def _slip(
     growth: float, rate: Array, size: Array, axial: Array, rates: Array, quaternion: Array, duration: Array
 ) -> None:
-    """Apply dissipation to the ends of free arcs, in place; ``rate`` is aω3, ``size`` |H|/A, ``axial`` H3/A."""
+    """Apply dissipation to the ends of free arcs, in place; ``rate`` is aH3/C, ``size`` |H|/A, ``axial`` H3/A."""
     moving = np.where(size > 0.0, size, 1.0)
     cosine = np.where(size > 0.0, axial / moving, 1.0)
     h1, h2 = rates[0] / moving, rates[1] / moving
@@ -514,7 +528,7 @@ def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Arr
         last = acceleration + jerk * duration
         strength = np.maximum(strength, np.sqrt(np.sum(last * last, axis=0)))
     strength = strength + sum(abs(size) for size, _ in forcing.turning) / moments.min(axis=0)
-    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0) + np.abs(forcing.wheel) / moments.min(axis=0)
     pace = np.sqrt(np.sum(here.rates * here.rates, axis=0)) + np.sqrt(strength) + fastest + abs(forcing.growth)
     _expect_short(span := float(np.max(pace * duration)))
     steps = max(1, math.ceil(span / STRIDE))
@@ -542,6 +556,7 @@ def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Arr
         acceleration[0] + 1j * acceleration[1],
         acceleration[2],
         tuple((size / A, rate) for size, rate in bodies.forcing.turning),
+        bodies.forcing.wheel / A,
     )
     omega, spin = rates[0] + 1j * rates[1], rates[2]
     _expect_short(float(np.max(drive.pace(omega, spin, duration) * duration)))

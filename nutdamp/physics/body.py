@@ -4,6 +4,9 @@
 (12), (18)-(20), (22) for positive signs; here |ω3| and |a| make them hold for both spin directions. Angles come from
 components by arctan2: arccos loses everything below 1e-8 rad.
 
+A part of constant momentum h along axis 3, the ``wheel`` in N m s, puts H3 = Cω3 + h in the place of Cω3; where it
+is not a parameter, ``spin`` may be H3/C. Then the spin axis is σ·e3 with σ the sign of H3.
+
 "Kreisel-Bewegungen" is cited as K(n): its J_xy is A, its J_z is C, its L is H.
 """
 
@@ -32,13 +35,13 @@ class ConeAngles(NamedTuple):
         return self.nutation - self.body
 
 
-def momentary(moments: ArrayLike, rates: ArrayLike, sense: float) -> ConeAngles:
+def momentary(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
     """Instantaneous cones of any body: angles of H and of ω from the spin axis ``sense``·e3, up to π.
 
     ``moments`` (I1, I2, I3) in kg m², ``rates`` (3,) in rad/s.
     """
     w = np.asarray(rates, dtype=float)
-    first, second, third = (np.asarray(moments, dtype=float) * w).tolist()
+    first, second, third = (np.asarray(moments, dtype=float) * w + (0.0, 0.0, wheel)).tolist()
     across, along = math.hypot(w[0], w[1]), sense * float(w[2])
     return ConeAngles(math.atan2(math.hypot(first, second), sense * third), math.atan2(across, along))
 
@@ -76,9 +79,9 @@ def transverse_rate(A: float, C: float, nutation: float, spin: float) -> float:
     return C * abs(spin) * math.tan(nutation) / A
 
 
-def body_period(A: float, C: float, spin: float) -> float:
-    """Nutation period T_ω seen in the body, s, Magnus 1970 (12): 2π A / |(A - C) ω3|; infinite for a sphere."""
-    rate = abs((A - C) * spin)
+def body_period(A: float, C: float, spin: float, wheel: float = 0.0) -> float:
+    """Nutation period T_ω seen in the body, s, Magnus 1970 (12): 2π A / |(A - C) ω3 - h|; infinite for a sphere."""
+    rate = abs((A - C) * spin - wheel)
     return 2 * math.pi * A / rate if rate > 0 else math.inf
 
 
@@ -129,18 +132,22 @@ def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> Hal
     return HalfPulses(half, half, half_turn(A, C, omega, spin))
 
 
-def turn_between_halves(A: float, C: float, omega: float, spin: float) -> float:
-    """Angle in rad by which ω turns in the body between the two `half_pulses`: σπ(1 - A/C)cos(θ/2)."""
-    theta = nutation_angle(A, C, omega, spin)
-    return math.copysign(math.pi, spin) * (1.0 - A / C) * math.cos(0.5 * theta)
+def turn_between_halves(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> float:
+    """Angle in rad by which ω turns in the body between the two `half_pulses`: π(H3 - Aω3)/|H3| cos(θ/2).
+
+    Without a wheel σπ(1 - A/C)cos(θ/2). ``spin`` is ω3 itself.
+    """
+    axial = C * spin + wheel
+    theta = nutation_angle(A, C, omega, axial / C)
+    return math.copysign(math.pi, axial) * (1.0 - A * spin / axial) * math.cos(0.5 * theta)
 
 
-def mounting_angle(A: float, C: float, omega: float, spin: float) -> float:
+def mounting_angle(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> float:
     """Angle in rad, [0, π), from the first to the second torque axis of two fixed actuators for `half_pulses`.
 
     Each must be able to push both ways; at small angles it is -σπA/C mod π (Magnus 1970 after (22)).
     """
-    return turn_between_halves(A, C, omega, spin) % math.pi
+    return turn_between_halves(A, C, omega, spin, wheel) % math.pi
 
 
 def phase_to_oppose(omega: complex, torque: complex) -> float:
@@ -263,15 +270,20 @@ def axis_class(moments: ArrayLike) -> AxisClass:
     return "maximum" if third > max(first, second) else "intermediate"
 
 
-def growth(moments: ArrayLike, spin: float) -> Stability:
+def growth(moments: ArrayLike, spin: float, wheel: float = 0.0) -> Stability:
     """Growth of a small nutation about axis 3 of a rigid body: e^{pt}, p² = -(I3 - I1)(I3 - I2)ω3²/(I1 I2).
 
     "Kreiseltheorie" 24.4, which prints p² <= 0 for bounded. With p = 0 about an axis of two equal moments ω grows
     linearly (I2 = I3: ω1 stays, dω2/dt = (I3 - I1)/I2 ω3 ω1), with no time of growth of its own: unstable. On a
     sphere, and without spin, nothing couples the two rates: they stay, which is bounded too. Equal moments are those
     of `axis_class`. Spin about the axis of least moment is stable only as long as nothing dissipates energy.
+    With a wheel p² = -(H3 - I1ω3)(H3 - I2ω3)/(I1 I2).
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
+    if wheel != 0.0:
+        axial = third * spin + wheel
+        square = -((axial - first * spin) / first) * ((axial - second * spin) / second)
+        return Stability(square, square < 0.0, 1.0 / math.sqrt(square) if square > 0.0 else math.inf)
     kind = axis_class(moments)
     if spin == 0.0 or kind == "sphere":
         return Stability(0.0, True, math.inf)
@@ -290,11 +302,12 @@ def principal_tilt(axes: ArrayLike) -> float:
     return math.atan2(math.hypot(x, y), abs(z))
 
 
-def nutation_rates(A: float, C: float, omega: float, spin: float) -> NutationRates:
+def nutation_rates(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> NutationRates:
     """Rates of the nutation of a symmetric body in the body, in the despun frame and inertially.
 
     ω turns at K(7), (J_z - J_xy)/J_xy ω_z = -aω3, in the body and at K(10), Cω3/A, in the frame that follows the
     body's transverse motion without spinning: body = despun - ω3. Inertially the axis goes round H at K(13), |H|/A,
     always positive; its K(12) is a small-angle form. ``omega`` is |ω|, ``spin`` ω3 in rad/s.
     """
-    return NutationRates((C - A) / A * spin, C / A * spin, inertial_rate(A, C, omega, spin))
+    axial, inertial = (C * spin + wheel) / A, inertial_rate(A, C, omega, spin + wheel / C)
+    return NutationRates((C - A) / A * spin + wheel / A, axial, inertial)

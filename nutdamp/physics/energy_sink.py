@@ -19,6 +19,9 @@ e^{κt} and N = sqrt(c² + s²E²): sin θ = sE/N, cos θ = c/N, and
 
 which is -asinh(e^{-κt}/tan θ0)/κ less its value at t = 0, in a form that cancels nowhere: t cos θ0 for κ -> 0, t
 for θ0 -> 0, and zero for θ0 = 90°. Either sense of spin: θ runs from 0 to 180°, and h3 carries the sign.
+
+With a wheel of momentum h, H3 = Cω3 + h takes the place of Cω3: dψ/dt = |H|(1/C - 1/A) cos θ - h/C, so that the forms
+above hold for the spin H3/C, and the body turns by -h t/C besides.
 """
 
 from __future__ import annotations
@@ -117,17 +120,19 @@ def time_to_turn(growth: float, cosine: float, sine_squared: float, turned: floa
     return (z - math.log1p(-slowed)) / growth if growth != 0.0 else turned
 
 
-def coast(A: float, C: float, growth: float, omega: complex, spin: float, time: float) -> SinkEffect:
+def coast(
+    A: float, C: float, growth: float, omega: complex, spin: float, time: float, wheel: float = 0.0
+) -> SinkEffect:
     """`course` of a symmetric body from its rates ``omega`` = ω1 + iω2 and ``spin`` at the start, rad/s."""
-    first, second, third = _direction(A, C, omega, spin)
+    first, second, third = _direction(A, C, omega, spin, wheel)
     return course(growth, third, first * first + second * second, time)
 
 
 def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Callable[[Any], tuple[Any, Any]]) -> Any:
     """Quaternion (w, x, y, z) by which the body has slipped from its free arc; it multiplies that from the right.
 
-    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aω3(turned - t) rad,
-    the excess turn about axis 3; ``cos_sin`` gives cosine and sine of an angle, of numbers or arrays.
+    ``first`` and ``second``: components of h in the body at the end of the free arc; ``behind`` = aH3/C(turned - t),
+    rad, the excess turn about axis 3; ``cos_sin`` gives cosine and sine of an angle, of numbers or arrays.
     """
     x, y = effect.sine * second, -effect.sine * first
     cosine, sine = cos_sin(0.5 * behind)
@@ -135,48 +140,55 @@ def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Call
 
 
 def arc(
-    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, times: Array
+    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, times: Array, wheel: float = 0.0
 ) -> tuple[ComplexArray, Array, Array]:
     """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
 
     ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start; ``growth`` is κ in 1/s.
     """
     times = np.asarray(times, dtype=float)
-    first, second, third = _direction(A, C, omega, spin)
+    first, second, third = _direction(A, C, omega, spin, wheel)
     effect = courses(growth, third, first * first + second * second, times)
-    rate = (A - C) / A * spin
-    free, behind = np.exp(-1j * rate * times), rate * (effect.turned - times)
+    offset = wheel / C
+    rate = (A - C) / A * (spin + offset)
+    free, behind = np.exp(-1j * (rate - offset) * times), rate * (effect.turned - times)
     there = complex(first, second) * free
     slipped = slip(effect, there.real, there.imag, behind, lambda angle: (np.cos(angle), np.sin(angle)))
-    turned = attitude.multiply(attitude.arc(A, C, quaternion, omega, spin, times), np.stack(slipped, axis=-1))
-    return omega * free * effect.transverse * np.exp(-1j * behind), spin * effect.axial, turned
+    turned = attitude.multiply(attitude.arc(A, C, quaternion, omega, spin, times, wheel), np.stack(slipped, axis=-1))
+    spins = (spin + offset) * effect.axial - offset
+    return omega * free * effect.transverse * np.exp(-1j * behind), spins, turned
 
 
-def rates_on_arc(A: Any, C: Any, growth: float, omega: Any, spin: Any, times: Array) -> tuple[ComplexArray, Array]:
+def rates_on_arc(
+    A: Any, C: Any, growth: float, omega: Any, spin: Any, times: Array, wheel: Any = 0.0
+) -> tuple[ComplexArray, Array]:
     """ω and ω3 of `arc` alone, for many bodies: ``times`` (cases, n) s from the starts of their arcs, else (cases, 1).
 
     ``omega`` and ``spin`` at the starts, rad/s, and moments, kg m², are by case; ``growth`` may be zero.
     """
-    rate = (A - C) / A * spin
+    offset = wheel / C
+    rate = (A - C) / A * (spin + offset)
     if growth == 0.0:
-        return np.asarray(omega * np.exp(-1j * (rate * times))), np.broadcast_to(spin, times.shape)
-    across, along = A * A * (omega.real**2 + omega.imag**2), C * spin
+        return np.asarray(omega * np.exp(-1j * ((rate - offset) * times))), np.broadcast_to(spin, times.shape)
+    across, along = A * A * (omega.real**2 + omega.imag**2), C * (spin + offset)
     size = np.sqrt(across + along * along) + TINY
     effect = courses(growth, along / size, across / (size * size), times)
-    return np.asarray(omega * np.exp(-1j * (rate * effect.turned)) * effect.transverse), spin * effect.axial
+    turned = rate * effect.turned - offset * times
+    return np.asarray(omega * np.exp(-1j * turned) * effect.transverse), (spin + offset) * effect.axial - offset
 
 
 def arc_end(
-    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, time: float
+    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, time: float, wheel: float = 0.0
 ) -> tuple[complex, float, Array]:
     """`arc` at one ``time`` in s after its start: plain numbers, a tenth of the cost of arrays."""
-    first, second, third = _direction(A, C, omega, spin)
+    first, second, third = _direction(A, C, omega, spin, wheel)
     effect = course(growth, third, first * first + second * second, time)
-    rate = (A - C) / A * spin
-    free, behind = cmath.exp(-1j * rate * time), rate * (effect.turned - time)
+    offset = wheel / C
+    rate = (A - C) / A * (spin + offset)
+    free, behind = cmath.exp(-1j * (rate - offset) * time), rate * (effect.turned - time)
     there = complex(first, second) * free
     p, a, b, c = slip(effect, there.real, there.imag, behind, lambda angle: (math.cos(angle), math.sin(angle)))
-    w, x, y, z = attitude.arc_end(A, C, quaternion, omega, spin, time).tolist()
+    w, x, y, z = attitude.arc_end(A, C, quaternion, omega, spin, time, wheel).tolist()
     turned = np.array(
         [
             w * p - x * a - y * b - z * c,
@@ -185,11 +197,12 @@ def arc_end(
             w * c + x * b - y * a + z * p,
         ]
     )
-    return omega * free * effect.transverse * cmath.exp(-1j * behind), spin * effect.axial, turned
+    spins = (spin + offset) * effect.axial - offset
+    return omega * free * effect.transverse * cmath.exp(-1j * behind), spins, turned
 
 
-def _direction(A: float, C: float, omega: complex, spin: float) -> tuple[float, float, float]:
+def _direction(A: float, C: float, omega: complex, spin: float, wheel: float) -> tuple[float, float, float]:
     """Unit vector h of H in body axes; axis 3 for a body at rest."""
-    h1, h2, h3 = A * omega.real, A * omega.imag, C * spin
+    h1, h2, h3 = attitude.angular_momentum(A, C, omega, spin, wheel).tolist()
     size = math.hypot(h1, h2, h3)
     return (h1 / size, h2 / size, h3 / size) if size > 0.0 else (0.0, 0.0, 1.0)

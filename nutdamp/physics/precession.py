@@ -188,6 +188,8 @@ def arc_efficiency(spin: float, on_time: float) -> float:
 def reach(torque: float, spin: float, longest: float) -> float:
     """Largest turn of H by one pulse of up to ``longest`` s, N m s: 2M/|ω3| in half a spin turn."""
     half = 0.5 * abs(spin)
+    if half == 0.0:
+        return torque * longest
     return torque / half * math.sin(min(half * longest, 0.5 * math.pi))
 
 
@@ -197,6 +199,8 @@ def on_times_to_turn(impulses: Array, torque: float, spin: float) -> Array:
     Not a number beyond 2M/ω3, the largest turn of H by a torque fixed in the body.
     """
     rate = 0.5 * abs(spin)
+    if rate == 0.0:
+        return impulses / torque
     with np.errstate(invalid="ignore"):
         return np.asarray(np.arcsin(rate * impulses / torque) / rate)
 

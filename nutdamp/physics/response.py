@@ -47,12 +47,14 @@ def impulse_sum(
     pulse_times: Array,
     transverse: ComplexArray,
     axial: Array,
+    wheel: float = 0.0,
 ) -> tuple[ComplexArray, Array]:
     """Rates after a sum of impulses, Magnus 1970 (17), exact at any angle for symmetric bodies.
 
     ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
     an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. With
     energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`flight.by_impulses`).
+    A ``wheel`` of momentum h N m s turns ω by h t/A besides.
 
     ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.
     Returns ω (n,) and ω3 (n,) in rad/s; at t = t_v the pulse has been given.
@@ -61,46 +63,44 @@ def impulse_sum(
     spins = spin0 + np.concatenate([[0.0], np.cumsum(axial)]) / C
     knots = np.concatenate([[0.0], pulse_times])
     turned = np.concatenate([[0.0], np.cumsum(spins[:-1] * np.diff(knots))])
-    before = np.exp(1j * a * turned[1:])
+    before = np.exp(1j * (a * turned[1:] - wheel / A * knots[1:]))
     sums = omega0 + np.concatenate([[0.0], np.cumsum(transverse * before)]) / A
     given = np.searchsorted(pulse_times, times, side="right")
     alpha = turned[given] + spins[given] * (times - knots[given])
-    return sums[given] * np.exp(-1j * a * alpha), spins[given]
+    return sums[given] * np.exp(-1j * (a * alpha - wheel / A * times)), spins[given]
 
 
-def width_factor(
-    a: float, spin: float, spin_rate: float, on_time: float, growth: float = 0.0, drift: float = 0.0
-) -> complex:
+def width_factor(rate: float, slope: float, on_time: float, growth: float = 0.0, drift: float = 0.0) -> complex:
     """Factor on the impulse of a rectangular pulse at its centre, for its effect on ω.
 
-    For a constant body torque with axial part, ω3 = spin + spin_rate·(time since start) with spin_rate = M3/C, the
-    pulse acts on ω exactly as an impulse M τ F at its centre, when ω3 jumps there by spin_rate·τ:
-    F = (1/τ) ∫ exp(i a (spin s + spin_rate (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial part this is
-    sinc(a ω3 τ/2), sinc x = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns a ω3 into
-    a ω3 + iκ, by its small-angle part: during the pulse alone, where what is neglected is of order κτ a ω3 τ θ²/12.
-    ``drift`` (rad/s²) is a spin acceleration that goes on after the pulse.
+    The nutation turns in the body at ν = ``rate`` + ``slope``·(time since start), rad/s: aω3 + a M3/C t for a constant
+    body torque with axial part, aω3 - h/A with a wheel. The pulse acts on ω exactly as an impulse M τ F at its centre,
+    when ν jumps there by slope·τ: F = (1/τ) ∫ exp(i (rate s + slope (s + τ/2)²/2)) ds over |s| <= τ/2. Without axial
+    part this is sinc(ντ/2), sinc x = sin x / x. Energy dissipation (``growth`` κ in 1/s, see `energy_sink`) turns ν
+    into ν + iκ, by its small-angle part: during the pulse alone, where what is neglected is of order κτ ντ θ²/12.
+    ``drift`` (rad/s²) is a change of ν that goes on after the pulse.
     """
     half = 0.5 * on_time
     growth = math.copysign(min(abs(growth), energy_sink.FOR_EVER / half), growth) if half > 0.0 else 0.0
-    if spin_rate == 0.0 and drift == 0.0:
-        angle = (a * spin + 1j * growth) * half
+    if slope == 0.0 and drift == 0.0:
+        angle = (rate + 1j * growth) * half
         return cmath.sin(angle) / angle if angle != 0.0 else 1.0 + 0.0j
-    offset = 0.5 * a * spin_rate * half * half
-    slope, bend = a * (spin + (spin_rate + drift) * half) + 1j * growth, 0.5 * a * (spin_rate + drift)
-    turned = (abs(slope) + abs(bend) * half) * half
+    offset = 0.5 * slope * half * half
+    pace, bend = rate + (slope + drift) * half + 1j * growth, 0.5 * (slope + drift)
+    turned = (abs(pace) + abs(bend) * half) * half
     if not turned <= MOST_PANELS * SERIES_REACH:
         return 0.0 + 0.0j
     panels = math.ceil(turned / SERIES_REACH) or 1
     width = half / panels
     if panels >= MANY_PANELS:
         middles = (2 * np.arange(panels) + 1 - panels) * width
-        turns = np.exp(1j * (offset + (slope + bend * middles) * middles))
-        return complex(np.mean(turns * _mean_of_phase(slope + 2 * bend * middles, bend, width)))
+        turns = np.exp(1j * (offset + (pace + bend * middles) * middles))
+        return complex(np.mean(turns * _mean_of_phase(pace + 2 * bend * middles, bend, width)))
     total = 0.0 + 0.0j
     for panel in range(panels):
         middle = (2 * panel + 1 - panels) * width
-        phase = offset + (slope + bend * middle) * middle
-        total += cmath.exp(1j * phase) * _mean_of_phase(slope + 2 * bend * middle, bend, width)
+        phase = offset + (pace + bend * middle) * middle
+        total += cmath.exp(1j * phase) * _mean_of_phase(pace + 2 * bend * middle, bend, width)
     return total / panels
 
 
@@ -122,30 +122,29 @@ def _largest(sizes: float | Array) -> float:
     return sizes if isinstance(sizes, float) else float(sizes.max())
 
 
-def on_time_for(impulse: float, torque: float, a: float, spin: float, spin_rate: float, longest: float) -> float | None:
+def on_time_for(impulse: float, torque: float, rate: float, slope: float, longest: float) -> float | None:
     """On-time in s of the rectangular pulse that acts on ω like ``impulse`` N m s; None if none up to ``longest``.
 
-    ``torque`` is |M1 + iM2| > 0 in N m. Without axial torque τ = (2/(aω3)) asin(aω3 J/(2M)), with the limit J/M
-    for a -> 0 (US patent 4504032 fires by the same formula); a torque that holds longer than half a nutation
-    period works against itself, so 2M/|aω3| is the most that one pulse can do.
+    ``torque`` is |M1 + iM2| > 0 in N m, ``rate`` ν and ``slope`` as in `width_factor`. Without axial torque τ = (2/ν)
+    asin(νJ/(2M)), with the limit J/M for ν -> 0 (US patent 4504032 fires by the same formula); a torque that holds
+    longer than half a nutation period works against itself, so 2M/|ν| is the most that one pulse can do.
     """
-    rate = abs(a * spin)
-    sine = 0.5 * rate * impulse / torque
-    if sine > 1.0 and spin_rate == 0.0:
+    sine = 0.5 * abs(rate) * impulse / torque
+    if sine > 1.0 and slope == 0.0:
         return None
     plain = impulse / torque * (math.asin(min(sine, 1.0)) / sine if sine > 0.0 else 1.0)
-    if spin_rate == 0.0:
+    if slope == 0.0:
         return plain if plain <= longest else None
 
     def excess(on_time: float) -> float:
-        return torque * on_time * abs(width_factor(a, spin, spin_rate, on_time)) - impulse
+        return torque * on_time * abs(width_factor(rate, slope, on_time)) - impulse
 
     # From the pulse without axial torque outwards: the first on-time that does enough lies in the last step.
     low, high = 0.0, min(plain, longest)
     for _ in range(OUTWARDS):
         if excess(high) >= 0.0:
             return _crossing(excess, low, high)
-        if high >= longest or abs(a) * (abs(spin) + 0.5 * abs(spin_rate) * high) * high > 2.0 * math.pi:
+        if high >= longest or (abs(rate) + 0.5 * abs(slope) * high) * high > 2.0 * math.pi:
             return None
         low, high = high, min(1.1 * high, longest)
     return None
@@ -223,7 +222,7 @@ def stepwise_torque(
 
 
 def rotating_torques(
-    times: Array, omega0: complex, spin: float, A: float, C: float, torques: ComplexArray, rates: Array
+    times: Array, omega0: complex, nutation: float, A: float, torques: ComplexArray, rates: Array
 ) -> ComplexArray:
     """Transverse rate ω under torques that turn uniformly in the body, M(t) = Σ M_p exp(i r_p t), with ω3 constant.
 
@@ -232,25 +231,25 @@ def rotating_torques(
     ω(t) = e^{-iaω3t} [ω(0) + (1/A) Σ M_p t e^{iδ_p t/2} sinc(δ_p t/2)], δ_p = aω3 + r_p. r_p = aω3 is (26), r_p = -ω3
     the nearly space-fixed torque of (27), r_p = 0 the constant one of (11).
 
-    ``times`` (n,) s, ``torques`` (p,) N m, ``rates`` (p,) rad/s. Returns (n,) rad/s.
+    ``times`` (n,) s, ``nutation`` aω3 rad/s, with a wheel ω3 - H3/A; ``torques`` (p,) N m, ``rates`` (p,) rad/s.
+    Returns (n,) rad/s.
     """
     times = np.asarray(times, dtype=float)[:, None]
-    nutation = (A - C) / A * spin
     half = 0.5 * (nutation + np.asarray(rates, dtype=float)) * times
     # numpy.sinc(x) is sin(πx)/(πx)
     forced = np.asarray(torques) * times * np.exp(1j * half) * np.sinc(half / math.pi) / A
     return np.asarray((omega0 + forced.sum(axis=1)) * np.exp(-1j * nutation * times[:, 0]))
 
 
-def steady_response(A: float, C: float, spin: float, torque: complex, rate: float = 0.0) -> complex:
+def steady_response(A: float, nutation: float, torque: complex, rate: float = 0.0) -> complex:
     """Part of ω that follows a torque M e^{irt} for ever, at t = 0: -i M/(A(aω3 + r)) in rad/s.
 
     For r = 0 the permanent rotation Magnus 1970 (13), which is the centre of the pole cone of (11) and K(14), (M2 -
     iM1)/((A - C)ω3); for r = -ω3 the forced term of (27), which in the axes of the despun frame is K(15), iM/(Cω3).
     K(14) and K(15) hold without axial torque: the third component of K(15) is 0, and the last line of K(14) must read
-    M = ω_P × ω_z (J_z - J_xy). Infinite at resonance, r = -aω3, and for r = 0 on a sphere.
+    M = ω_P × ω_z (J_z - J_xy). Infinite at resonance, r = -aω3, and for r = 0 on a sphere. ``nutation`` is aω3.
     """
-    detuning = (A - C) / A * spin + rate
+    detuning = nutation + rate
     if detuning == 0.0:
         return complex(math.inf)
     return -1j * torque / (A * detuning)
@@ -272,29 +271,29 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> Perm
     ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
     need no more than `steady_response`.
     """
-    omega = steady_response(A, C, spin, torque)
+    omega = steady_response(A, (A - C) / A * spin, torque)
     rate = math.hypot(abs(omega), spin)
     return PermanentRotation(omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag))
 
 
-def beat(A: float, C: float, spin: float, torque: complex, rate: float) -> tuple[float, float]:
+def beat(A: float, nutation: float, torque: complex, rate: float) -> tuple[float, float]:
     """Largest |ω| (rad/s) that a turning torque adds to rest, and the period (s) of the swelling, Magnus 1970 (27).
 
     ω(t) from rest swells to 2|M|/(A|δ|) and back within 2π/|δ|, δ = aω3 + r; both infinite at resonance.
     """
-    detuning = abs((A - C) / A * spin + rate)
+    detuning = abs(nutation + rate)
     if detuning == 0.0:
         return math.inf, math.inf
     return 2.0 * abs(torque) / (A * detuning), 2.0 * math.pi / detuning
 
 
-def resonant_time(A: float, C: float, omega0: complex, spin: float, torque: complex, nutation: float) -> float:
+def resonant_time(A: float, axial: float, omega0: complex, torque: complex, nutation: float) -> float:
     """Time in s for a resonant torque (r = -aω3) to drive the nutation angle to ``nutation`` rad; Magnus 1970 (25).
-    (25).
 
-    |ω0 + M t/A| = C|ω3| tan θ/A: the later root, since the pole curve may first run inwards; 0 if it is there already.
+    |ω0 + M t/A| = |H3| tan θ/A with H3 = ``axial``, Cω3: the later root, since the pole curve may first run inwards; 0
+    if it is there already.
     """
-    needed = C * abs(spin) * math.tan(nutation) / A
+    needed = abs(axial) * math.tan(nutation) / A
     speed = torque / A
     if abs(omega0) >= needed:
         return 0.0

@@ -102,7 +102,7 @@ class AxisWatch:
         if here.torque is not None or not bodies.free:
             self._steps(here, duration)
         elif bodies.forcing.growth == 0.0:
-            self._arc(bodies.moments, here.rates, here.quaternion, duration)
+            self._arc(here, duration)
         else:
             self._slow(here, duration)
 
@@ -116,11 +116,11 @@ class AxisWatch:
         np.minimum.at(self.least[number], rows, least)  # a case may come twice
         np.maximum.at(self.largest[number], rows, largest)
 
-    def _arc(self, moments: Array, rates: Array, quaternion: Array, duration: Array) -> None:
+    def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
-        momentum, axis = _rotated(quaternion, moments * rates), self._axis(quaternion)
-        size = np.sqrt(np.sum(momentum * momentum, axis=0))
-        momentum, way = momentum / size, size / moments[0] * duration
+        momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
+        axis, size = self._axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
+        momentum, way = momentum / size, size / here.bodies.moments[0] * duration
         theta = _angles(momentum, axis)
         for number, direction in enumerate(self._towards(momentum)):
             begins, beta = _angles(axis, direction), _angles(momentum, direction)
@@ -139,7 +139,7 @@ class AxisWatch:
         """
         turn = CIRCLE * here.bodies.moments[0] / _momentum(here)
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
-        momentum = _rotated(here.quaternion, here.bodies.moments * here.rates)
+        momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
         before, after = (_angles(momentum, self._axis(stretch.quaternion)) for stretch in (here, last))
         betas = np.array([_angles(momentum, direction) for direction in self._towards(momentum)])
@@ -182,7 +182,7 @@ class AxisWatch:
         bodies, quaternion = here.bodies, here.quaternion
         axis, (first, second, _) = self._axis(quaternion), here.rates
         moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
-        momentum = _rotated(quaternion, bodies.moments * here.rates)
+        momentum = _rotated(quaternion, bodies.momentum(here.rates))
         size = np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum /= size
         if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
@@ -221,7 +221,7 @@ def _torque(here: MotionStretch) -> Array:
 
 def _momentum(here: MotionStretch) -> Array:
     """Size (n,) of H, N m s."""
-    return np.asarray(np.sqrt(np.sum((here.bodies.moments * here.rates) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.sum(here.bodies.momentum(here.rates) ** 2, axis=0)))
 
 
 def _cross(first: Array, second: Array) -> Array:
@@ -353,12 +353,11 @@ class SunPulseClock:
     def _pace(self) -> Array:
         """Mean rate (n,) rad/s at which the Sun goes round in the free body.
 
-        The body turns about H at |H|/A, and about its axis at aω3: together, and at small angles, at ω3.
+        The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
         """
-        first, second, C = self.here.bodies.moments
-        A, spin = 0.5 * (first + second), self.here.rates[2]
-        size = np.sqrt(np.sum((self.here.bodies.moments * self.here.rates) ** 2, axis=0))
-        return np.asarray(np.abs(self.sense * size / A + (1.0 - C / A) * spin))
+        first, second, _ = self.here.bodies.moments
+        A, momentum = 0.5 * (first + second), self.here.bodies.momentum(self.here.rates)
+        return np.asarray(np.abs(self.sense * _momentum(self.here) / A + self.here.rates[2] - momentum[2] / A))
 
     def _look_back(self, sun_pulse: MotionStretch, expected: Array, pace: Array) -> None:
         """Recompute in place the Sun pulses that came before the end of the last pulse."""

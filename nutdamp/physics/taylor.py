@@ -53,13 +53,15 @@ class NotConverged(ArithmeticError):
 class Drive:
     """Drive of n symmetric bodies, (n,) each: ``a`` = (A - C)/A, M/A = ``transverse`` in rad/s² and M3/C.
 
-    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, with M/A (n,) at t = 0 and r in rad/s.
+    ``turning``: (M/A, r) of torques M e^{irt} about axis 3, with M/A (n,) at t = 0 and r in rad/s. ``wheel``: h/A
+    in rad/s of a part of constant momentum h along axis 3, which turns ω at aω3 - h/A in the body.
     """
 
     a: Array
     transverse: ComplexArray
     axial: Array
     turning: tuple[tuple[ComplexArray, float], ...] = ()
+    wheel: Array | float = 0.0
 
     def pace(self, omega: ComplexArray, spin: Array, duration: Array) -> Array:
         """Upper bound (n,) in rad/s on all rates during the ``duration`` (n,) s."""
@@ -67,7 +69,7 @@ class Drive:
         strength = np.hypot(np.abs(self.transverse), self.axial)
         strength = strength + sum(np.abs(size) for size, _ in self.turning)
         rate = max((abs(rate) for _, rate in self.turning), default=0.0)
-        turning = np.maximum(1.0, np.abs(self.a)) * fastest + rate
+        turning = np.maximum(1.0, np.abs(self.a)) * fastest + rate + np.abs(self.wheel)
         # Across axis 3 a torque drives ω for as long as it keeps its direction to it: about a turn.
         return np.asarray(np.abs(omega) + turning + np.sqrt(strength))
 
@@ -133,20 +135,20 @@ def _driven_series(drive: Drive, omega: ComplexArray, spin: Array, now: Array, s
     spins = np.stack([spin + gained * number, np.broadcast_to(gained, starts.shape)])
     parts = [(size * np.exp(1j * rate * starts) * step, 1j * rate * step) for size, rate in drive.turning]
     forces = _powers(np.broadcast_to(drive.transverse * step, starts.shape), parts)
-    turning = -1j * drive.a * step
+    turning, wheel = -1j * drive.a * step, 1j * drive.wheel * step
     pace = float(np.max(drive.pace(omega, spin, step * count) * step))
     order = _order(pace)
     if count > 1:
         # All steps from rest; then ω at the start of each, by the phases that it has turned through until then.
-        driven = _rates(np.zeros_like(forces[0]), turning, spins, forces, DRIVEN_ORDER).sum(axis=0)
-        turned = np.cumsum(drive.a * step * (spins[0] + 0.5 * gained), axis=0)
+        driven = _rates(np.zeros_like(forces[0]), turning, spins, wheel, forces, DRIVEN_ORDER).sum(axis=0)
+        turned = np.cumsum(drive.a * step * (spins[0] + 0.5 * gained) - drive.wheel * step, axis=0)
         sums = omega + np.cumsum(np.exp(1j * turned) * driven, axis=0)
         later = sums[:-1] * np.exp(-1j * turned[:-1])
         omega_starts = np.concatenate([omega[None], later])
     else:
         omega_starts = np.broadcast_to(omega, starts.shape)
     while True:
-        rates = _rates(omega_starts, turning, spins, forces, order)
+        rates = _rates(omega_starts, turning, spins, wheel, forces, order)
         turns = _turns(rates, spins, step, order)
         last = max(float(np.abs(rates[-2:] * step).max()), float(np.abs(turns[-2:]).max()))
         if last <= REMAINDER:
@@ -179,11 +181,11 @@ def _powers(constant: ComplexArray, turning: list[tuple[Any, Any]]) -> list[Any]
     return terms
 
 
-def _rates(omega: ComplexArray, turning: Any, spins: Array, forces: list[Any], order: int) -> ComplexArray:
+def _rates(omega: ComplexArray, turning: Any, spins: Array, wheel: Any, forces: list[Any], order: int) -> ComplexArray:
     """Series of ω (order+1, s, n) from its start (s, n)."""
     series = np.empty((order + 1, *omega.shape), dtype=complex)
     series[0] = omega
-    level, slope = turning * spins[0], turning * spins[1]
+    level, slope = turning * spins[0] + wheel, turning * spins[1]
     slanted = bool(slope.any())
     for k in range(order):
         following = level * series[k]
@@ -275,10 +277,12 @@ class Forcing(NamedTuple):
 
     ``turning``: torques M e^{irt} about axis 3 of the body, as (M = M1 + iM2 in N m at t = 0, r in rad/s).
     ``growth``: rate κ in 1/s at which energy dissipation lets a small nutation grow (negative: decay), `energy_sink`.
+    ``wheel``: constant momentum h along axis 3 besides I3 ω3, N m s; (n,) by case in `batch`.
     """
 
     turning: tuple[tuple[complex, float], ...] = ()
     growth: float = 0.0
+    wheel: Any = 0.0
 
 
 NOTHING = Forcing()
@@ -333,12 +337,12 @@ def integrate(
     acceleration = np.asarray(torque) / inertia
     jerk = None if slope is None else slope / inertia
     strength = _strength(acceleration, jerk, forcing, min(moments), end - start)
-    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0)
+    fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0) + abs(forcing.wheel) / min(moments)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     even = jerk is None and falling is None
     if moments[0] == moments[1] and forcing.growth == 0.0 and even and not turned <= SHORT:
         return _symmetric(moments, torque, rates, quaternion, start, end, forcing, most)
-    size = float(np.linalg.norm(inertia * rates)) + strength * max(moments) * (end - start)
+    size = float(np.linalg.norm(inertia * rates)) + abs(forcing.wheel) + strength * max(moments) * (end - start)
     floor = (AT_REST * size) ** 2
     gone, duration = 0.0, end - start  # counted from the start: a late clock cannot tell so short a step
     for _ in range(most + 1):
@@ -406,6 +410,7 @@ def _symmetric(
         np.array([complex(torque[0], torque[1]) / A]),
         np.array([float(torque[2]) / C]),
         tuple((np.array([size / A]), rate) for size, rate in forcing.turning),
+        forcing.wheel / A,
     )
     omega, spin, duration = (
         np.array([complex(rates[0], rates[1])]),
@@ -460,7 +465,7 @@ def _series(
 ) -> Array:
     """Taylor coefficients (ORDER+1, 7) of rates and quaternion in units of time ``unit``.
 
-    dω1/dt = (I2 - I3)/I1 ω2 ω3 + M1/I1 and round, Magnus 1970 (1) for three different moments;
+    dω1/dt = (I2 - I3)/I1 ω2 ω3 - h/I1 ω2 + M1/I1 and round, Magnus 1970 (1) for three different moments and a wheel;
     dq/dt = q (0, ω)/2, and the terms of `_Sink` where energy is dissipated, of `_Light` where moments are ``falling``.
     """
     first, second, third = moments
@@ -469,7 +474,7 @@ def _series(
     series[0] = state
     turning = [(size * cmath.exp(1j * rate * now), 1j * rate * unit) for size, rate in forcing.turning]
     light = None if falling is None else _Light(np.asarray(moments), falling, unit)
-    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing.growth, floor)
+    sink = None if forcing.growth == 0.0 else _Sink(np.asarray(moments), forcing.growth, floor, forcing.wheel)
     for k in range(ORDER):
         # (series of the product of any two components)_k, by rows and columns, in one matrix product
         w = series[: k + 1].T @ series[k::-1, :3]
@@ -478,6 +483,9 @@ def _series(
         following[0] = step * coupling[0] * w[1, 2]
         following[1] = step * coupling[1] * w[2, 0]
         following[2] = step * coupling[2] * w[0, 1]
+        if forcing.wheel:
+            following[0] -= step * forcing.wheel / first * series[k, 1]
+            following[1] += step * forcing.wheel / second * series[k, 0]
         if k == 0:
             following[:3] += unit * acceleration
         elif k == 1 and jerk is not None:
@@ -532,8 +540,8 @@ class _Sink:
     for q. ``floor`` keeps q regular where external torques bring H to rest: there is nothing to dissipate there.
     """
 
-    def __init__(self, moments: Array, growth: float, floor: float) -> None:
-        self.moments, self.growth, self.floor = moments, growth, floor
+    def __init__(self, moments: Array, growth: float, floor: float, wheel: float) -> None:
+        self.moments, self.growth, self.floor, self.wheel = moments, growth, floor, wheel
         self.momentum = np.zeros((ORDER, 3))
         self.squares = np.zeros(ORDER)  # |H|²
         self.quotient = np.zeros(ORDER)  # q
@@ -546,6 +554,7 @@ class _Sink:
         """
         momentum, slip = self.momentum, self.slip
         momentum[k] = self.moments * rates if more is None else self.moments * rates + more
+        momentum[k, 2] += self.wheel if k == 0 else 0.0
         self.squares[k] = momentum[: k + 1].ravel() @ momentum[k::-1].ravel()
         if k == 0:
             self.squares[0] += self.floor

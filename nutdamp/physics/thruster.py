@@ -386,9 +386,8 @@ Valve = Trapezoid | Measured
 
 
 def shape_factor(
-    a: float,
-    spin: float,
-    spin_rate: float,
+    rate: float,
+    change: float,
     ramps: Sequence[Ramp],
     centroid: float,
     growth: float = 0.0,
@@ -396,9 +395,10 @@ def shape_factor(
 ) -> complex:
     """Factor on the impulse at the ``centroid`` for the effect of a shaped pulse on ω: see `response.width_factor`.
 
-    F = (1/E) ∫ f(t) exp(i a (ω3 (t - t_c) + drift (t² - t_c²)/2 + spin_rate ∫∫ f) - κ (t - t_c)) dt with the thrust f
+    F = (1/E) ∫ f(t) exp(i (rate (t - t_c) + drift (t² - t_c²)/2 + change ∫∫ f) - κ (t - t_c)) dt with the thrust f
     of the ``ramps``, their impulse E, and times from the start of the first: with the whole spin change at the
-    centroid ω3 turns the body by the end as far as it does. ``spin`` is ω3 as the first begins, rad/s.
+    centroid the body turns by the end as far as it does. ``rate`` is ν as the first begins, rad/s, ``change`` its
+    derivative under the full axial torque.
     """
     nodes, weights = gauss_legendre(NODES)
     origin = ramps[0].begin
@@ -407,14 +407,14 @@ def shape_factor(
     for ramp in ramps:
         length = ramp.end - ramp.begin
         slope = (ramp.last - ramp.first) / length
-        pace = abs(a) * (abs(spin) + (abs(spin_rate) + abs(drift)) * (ramp.end - origin)) + abs(growth)
+        pace = abs(rate) + (abs(change) + abs(drift)) * (ramp.end - origin) + abs(growth)
         panels = min(max(math.ceil(pace * length / (2.0 * REACH)), 1), 20_000)
         half = 0.5 * length / panels
         s = ((2.0 * np.arange(panels)[:, None] + 1.0) * half + half * nodes).ravel()
         time = ramp.begin - origin + s
         level = ramp.first + slope * s
         swept = turned + given * s + 0.5 * ramp.first * s**2 + slope * s**3 / 6.0
-        phase = a * (spin * (time - centre) + 0.5 * drift * (time**2 - centre**2) + spin_rate * swept)
+        phase = rate * (time - centre) + 0.5 * drift * (time**2 - centre**2) + change * swept
         total += half * complex(np.exp(1j * phase - growth * (time - centre)) * level @ np.tile(weights, panels))
         turned += given * length + 0.5 * ramp.first * length**2 + slope * length**3 / 6.0
         given += ramp.impulse

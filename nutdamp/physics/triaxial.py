@@ -78,19 +78,21 @@ def free_attitude(moments: ArrayLike, rates0: ArrayLike, quaternion0: ArrayLike,
     return np.asarray(result / np.linalg.norm(result, axis=-1, keepdims=True), dtype=np.float64)
 
 
-def body_nutation_rate(moments: ArrayLike, spin: float) -> float:
+def body_nutation_rate(moments: ArrayLike, spin: float, wheel: float = 0.0) -> float:
     """Rate of a small nutation about axis 3 seen in the body, rad/s, signed: ω3 sqrt((I1 - I3)(I2 - I3)/(I1 I2)).
 
     Positive like aω3 for spin about the axis of least moment and ω3 > 0, and aω3 itself for I1 = I2, Magnus 1970 (12).
     The mean of I1 and I2 instead misses it: 0.818 for 0.775 rad/s with 120, 100, 80 kg m² and 3 rad/s. Zero where I3
-    equals another moment, even if rounding has put it on the wrong side. Raises ValueError for spin about the
-    intermediate axis, which does not nutate but grows.
+    equals another moment, even if rounding has put it on the wrong side. With a ``wheel`` of h N m s the root is of
+    (I1ω3 - H3)(I2ω3 - H3)/(I1 I2), H3 = I3ω3 + h. Raises ValueError where there is no nutation but growth, as for spin
+    about the intermediate axis without wheel.
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
-    square = (first - third) / first * ((second - third) / second)
-    if square < 0.0 and rigid_body.axis_class(moments) == "intermediate":
+    leading = ((first - third) * spin - wheel) / first
+    square = leading * (((second - third) * spin - wheel) / second)
+    if square < 0.0 and (wheel != 0.0 or rigid_body.axis_class(moments) == "intermediate"):
         raise ValueError("spin about the axis of the middle moment has no nutation rate")
-    return math.copysign(math.sqrt(max(square, 0.0)), first - third) * spin
+    return math.copysign(math.sqrt(max(square, 0.0)), leading)
 
 
 def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
@@ -105,40 +107,48 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
 
 
-def widest_cones(moments: ArrayLike, rates0: ArrayLike, sense: float) -> ConeAngles:
-    """Cone angles at the instant of largest nutation angle of the motion through ``rates0``.
+def arc_cones(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
+    """Cone angles at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
 
-    The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed.
+    The spin axis is ``sense``·e3, so that angles above 90 deg mean a spin that has been reversed. Constant with I1 =
+    I2; else θ swings between two values while H is fixed in space.
     """
-    least, largest = _extreme_cones(moments, rates0)
-    # The extremes count from the end of the axis about which the body spins now, which need not be that one.
-    reversed_ = sense * float(np.asarray(rates0, dtype=float)[2]) < 0.0
-    return _of_other_end(least) if reversed_ else largest
+    first, second, _ = np.asarray(moments, dtype=float).tolist()
+    if first == second:
+        return momentary(moments, rates, sense, wheel)
+    nutation, body = widest_cones(np.asarray(moments, dtype=float), np.asarray(rates, dtype=float), sense, wheel)
+    return ConeAngles(float(nutation), float(body))
 
 
-def _extreme_cones(moments: ArrayLike, rates0: ArrayLike) -> tuple[ConeAngles, ConeAngles]:
-    """Cone angles at the least and at the largest nutation angle."""
-    polhode = _polhode(moments, rates0)
-    inertia, (a, b, c) = polhode.moments, polhode.axes
-    if polhode.pace == 0.0:
-        now = rigid_body.momentary(inertia, np.abs(polhode.rates), 1.0)
-        return now, now
-    d_ca, d_cb = abs(inertia[c] - inertia[a]), abs(inertia[c] - inertia[b])
-    # Components of H at the two crossings; P and Q hold at both.
-    at_b, at_a = np.zeros(3), np.zeros(3)
-    at_b[c], at_b[a] = inertia[c] * polhode.largest, math.sqrt(inertia[a] * polhode.about_c / d_ca)
-    at_a[c] = math.sqrt(inertia[c] * polhode.balance / d_cb)
-    at_a[b] = math.sqrt(inertia[b] * polhode.about_c / d_cb)
-    crossing_b, crossing_a = (rigid_body.momentary(inertia, momentum / inertia, 1.0) for momentum in (at_b, at_a))
-    if c == 2:
-        return crossing_b, crossing_a
-    least = crossing_b if a == 2 else crossing_a
-    return least, _of_other_end(least)
+def widest_cones(moments: Array, rates: Array, sense: float, wheel: ArrayLike = 0.0) -> tuple[Array, Array]:
+    """Nutation and body cone (...), rad, of `arc_cones` for bodies with ``moments`` and ``rates`` (3, ...).
+
+    Where H3 has fallen by δ, |H| and the energy leave H2² = H2(0)² + [2(ω3 - H3/I1)δ + (1/I1 - 1/I3)δ²]/(1/I2 - 1/I1),
+    H3 and ω3 at t = 0, and H1² likewise: H3 turns back at the first δ at which either vanishes.
+    """
+    third, spin, axial = moments[2], sense * rates[2], sense * (moments[2] * rates[2] + wheel)
+    across = moments[:2] * rates[:2]
+    falls = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for kept in (0, 1):  # the component that is left where the other vanishes
+            apart = 1.0 / moments[1 - kept] - 1.0 / moments[kept]
+            bend = (1.0 / moments[kept] - 1.0 / third) / apart
+            slope = 2.0 * (spin - axial / moments[kept]) / apart
+            falls.append(_first_zero(across[1 - kept] ** 2, slope, bend))
+    fall = np.where(moments[0] == moments[1], 0.0, np.minimum(*falls))
+    left = np.sqrt(np.maximum(across[0] ** 2 + across[1] ** 2 + fall * (2.0 * axial - fall), 0.0))
+    transverse = left / np.where(falls[0] <= falls[1], moments[0], moments[1])
+    after = axial - fall
+    return np.arctan2(left, after), np.arctan2(transverse, (after - sense * np.asarray(wheel)) / third)
 
 
-def _of_other_end(cones: ConeAngles) -> ConeAngles:
-    """Cone angles of the same instant seen from the other end of axis 3."""
-    return ConeAngles(math.pi - cones.nutation, math.pi - cones.body)
+def _first_zero(value: Array, slope: Array, bend: Array) -> Array:
+    """First x >= 0 at which ``value`` + ``slope`` x + ``bend`` x², ``value`` >= 0, turns negative; infinite: never."""
+    square = slope * slope - 4.0 * bend * value
+    root = np.sqrt(np.maximum(square, 0.0))
+    rising = np.where(bend < 0.0, -0.5 * (slope + root) / bend, np.inf)
+    zero = np.where(square < 0.0, np.inf, np.where(slope < 0.0, 2.0 * value / (root - slope), rising))
+    return np.where((value == 0.0) & (slope == 0.0), 0.0, zero)  # at rest there, even if not for long
 
 
 class _ScaledPolhode(NamedTuple):
@@ -308,14 +318,3 @@ def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:
         np.where(still, np.copysign(1.0, cosine), ratio * sn),
         np.where(still, 1.0, dn),
     )
-
-
-def arc_cones(moments: tuple[float, float, float], rates: ArrayLike, sense: float) -> ConeAngles:
-    """Cone angles at the instant of largest nutation on the torque-free motion through ``rates`` (3,) rad/s.
-
-    Constant with I1 = I2; else θ swings between two values while H is fixed in space. The spin axis is ``sense``·e3.
-    """
-    if moments[0] == moments[1]:
-        return momentary(moments, rates, sense)
-
-    return widest_cones(moments, np.asarray(rates, dtype=float), sense)

@@ -82,7 +82,7 @@ def turns(spacecraft: Spacecraft) -> tuple[Turns, ...]:
         assert commands is not None
         widths = commandable_widths(commands, channel)
         if len(widths):
-            given, momentum = acts(channel, widths), spacecraft.inertia.C * abs(spin)
+            given, momentum = acts(channel, widths), abs(spacecraft.axial)
             each = precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
             least, most = int(np.argmin(each)), int(np.argmax(each))
             ends = (float(value[at]) for at in (least, most) for value in (each, widths))
@@ -147,21 +147,21 @@ def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
 def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
     if math.isinf(on_time):
         return 0.5 * math.pi
-    inertia, spin = spacecraft.inertia, spacecraft.spin
-    factor = abs(response.width_factor(inertia.a, spin, channel.axial / inertia.C, on_time))
-    return math.atan2(abs(channel.transverse) * on_time * factor, inertia.C * abs(spin))
+    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
+    factor = abs(response.width_factor(spacecraft.nutation_rate, slope, on_time))
+    return math.atan2(abs(channel.transverse) * on_time * factor, abs(spacecraft.axial))
 
 
 def mounting_angle(spacecraft: Spacecraft) -> float:
     """`body.mounting_angle` of the spacecraft, rad."""
-    inertia = spacecraft.inertia
-    return rigid_body.mounting_angle(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    inertia, rate = spacecraft.inertia, spacecraft.transverse_rate
+    return rigid_body.mounting_angle(inertia.A, inertia.C, rate, spacecraft.spin, inertia.wheel)
 
 
 def nearest_pair(spacecraft: Spacecraft) -> PairFit | None:
     """The two channels whose directions come nearest to the turn between two half pulses; None without channels."""
     inertia, rate, spin = spacecraft.inertia, spacecraft.transverse_rate, spacecraft.spin
-    needed = cmath.rect(1.0, rigid_body.turn_between_halves(inertia.A, inertia.C, rate, spin))
+    needed = cmath.rect(1.0, rigid_body.turn_between_halves(inertia.A, inertia.C, rate, spin, inertia.wheel))
     usable = [channel for channel in spacecraft.channels if channel.damps]
     torques = np.array([channel.transverse for channel in usable])
     best: PairFit | None = None
@@ -205,22 +205,21 @@ def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
 
 
 def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequence:
-    inertia, spin = spacecraft.inertia, spacecraft.spin
-    A, C = inertia.A, inertia.C
-    spin_rate = disturbance.axial / C
+    A, C, turning = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.nutation_rate
+    spin_rate, spin = disturbance.axial / C, spacecraft.inertia.equivalent(spacecraft.spin)
     if disturbance.transverse == 0.0:
         return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
-    largest, period = response.beat(A, C, spin, disturbance.transverse, disturbance.rate)
+    largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
     if period > RESONANT * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
-            (mark, response.resonant_time(A, C, omega0, spin, disturbance.transverse, mark))
+            (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))
             for mark in MARKS
             if mark > spacecraft.nutation
         )
         return Consequence(disturbance, None, None, None, period, times, spin_rate)
-    steady = abs(response.steady_response(A, C, spin, disturbance.transverse, disturbance.rate))
+    steady = abs(response.steady_response(A, turning, disturbance.transverse, disturbance.rate))
     tilt, swell = (rigid_body.nutation_angle(A, C, rate, spin) for rate in (steady, largest))
     return Consequence(disturbance, steady, float(tilt), float(swell), period, (), spin_rate)
 
@@ -243,6 +242,6 @@ class SpinAxis(NamedTuple):
 def spin_axis(spacecraft: Spacecraft) -> SpinAxis:
     """Class, stability and nutation rates of the spin axis."""
     inertia, spin = spacecraft.inertia, spacecraft.spin
-    kind, grows = rigid_body.axis_class(inertia.moments), rigid_body.growth(inertia.moments, spin)
-    rates = rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
+    kind, grows = rigid_body.axis_class(inertia.moments), rigid_body.growth(inertia.moments, spin, inertia.wheel)
+    rates = rigid_body.nutation_rates(inertia.A, inertia.C, spacecraft.transverse_rate, spin, inertia.wheel)
     return SpinAxis(kind, grows.squared_exponent, grows.growth_time, rigid_body.principal_tilt(inertia.axes), rates)

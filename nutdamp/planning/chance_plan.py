@@ -235,19 +235,21 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Disp
         whole = np.broadcast_to(np.asarray(value, dtype=complex), len(drawn) + 1)
         return float(whole[-1].real), np.asarray(whole[:-1].imag / STEP)
 
-    (A, dA), (C, dC) = parts(cases.A), parts(cases.C)
+    (A, dA), (C, dC), (wheel, dwheel) = parts(cases.A), parts(cases.C), parts(cases.wheel)
     rates = [parts(component) for component in cases.omega0]
     spin, dspin = rates[2]
     a = 1.0 - C / A
     da = C / A**2 * dA - dC / A
+    axial, daxial = C * spin + wheel, dC * spin + C * dspin + dwheel
+    dnutation = a * dspin + da * spin - dwheel / A + wheel / A**2 * dA
     start = A * (rates[0][1] + 1j * rates[1][1]) + dA * complex(rates[0][0], rates[1][0])
     tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
-    pointed = start + C * spin * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
+    pointed = start + axial * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
     impulses = [[parts(part) for part in impulse] for impulse in cases.impulses]
     begun = [parts(start) for start in cases.starts]
     on = np.asarray(on_times)
     torque = np.array([impulse[0][1] + 1j * impulse[1][1] for impulse in impulses]) / on[:, None]
-    axial = np.array([impulse[2][1] for impulse in impulses]) / on[:, None]
+    axial_torque = np.array([impulse[2][1] for impulse in impulses]) / on[:, None]
     late = np.array([start[1] for start in begun])
     delay = np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)])
     mixed = mixing(drawn, model.groups)
@@ -257,14 +259,14 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Disp
         ),
         axial=np.array([impulse[2][0] for impulse in impulses]) / on,
         begin=np.asarray(np.array([start, pointed]) @ mixed, dtype=np.complex128),
-        rates=np.array([a * dspin + da * spin, dspin]) @ mixed,
+        rates=np.array([dnutation, dspin]) @ mixed,
         torque=np.asarray(torque @ mixed, dtype=np.complex128),
-        axial_torque=axial @ mixed,
+        axial_torque=axial_torque @ mixed,
         late=late @ mixed,
         own=np.array([" pulse " in entry.name for entry in drawn], dtype=bool),
         spin=C * dspin @ mixed,
         delay=delay,
-        less=(dC / C + dspin / spin) @ mixed,
+        less=daxial / axial @ mixed,
     )
     return effects, tuple(drawn)
 
@@ -307,15 +309,15 @@ class _MarginSearch:
         if self.program.forbidden.size > LARGEST:
             raise Infeasible("too many slots")
         flat = self.model.body
-        spin = flat.inertia.C * abs(flat.spin if flat.goal.spin is None else flat.goal.spin)
+        axial = abs(flat.inertia.axial(flat.spin if flat.goal.spin is None else flat.goal.spin))
         self.limits = tuple(
             ChanceLimit(kind, most)
             for part, kind, most in (
-                (Part.NUTATION, 0, spin * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
+                (Part.NUTATION, 0, axial * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
                 (
                     requirements.aim(spacecraft),
                     1,
-                    spin * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
+                    axial * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
                 ),
                 (Part.SPIN, 2, flat.inertia.C * parts.get(Part.SPIN, 0.0)),
             )

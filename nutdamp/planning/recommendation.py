@@ -378,5 +378,5 @@ class Hindrance:
     @property
     def steady_tilt(self) -> float:
         """Angle in rad at which the disturbances hold the body once the pulses are over."""
-        inertia, spin = self.spacecraft.inertia, self.spacecraft.spin
-        return math.atan(inertia.A * abs(steady_omega(self.spacecraft, self.pulses.end)) / (inertia.C * abs(spin)))
+        body = self.spacecraft
+        return math.atan(body.inertia.A * abs(steady_omega(body, self.pulses.end)) / abs(body.axial))

@@ -99,7 +99,7 @@ class Certificate:
     def moments(self) -> list[Vector]:
         """Even moments (n,) s in each window, many in a turn unless there are too many turns."""
         body, spans = self.spacecraft, self.windows
-        turns = max(abs(body.inertia.a * body.spin), abs(body.spin)) / (2.0 * math.pi)
+        turns = body.fastest / (2.0 * math.pi)
         total = sum(end - begin for begin, end in spans)
         pace = min(LOOKS * turns, MOST_LOOKS / max(total, 1e-9))
         return [np.linspace(begin, end, math.ceil((end - begin) * pace) + 2) for begin, end in spans]

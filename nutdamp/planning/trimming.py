@@ -236,10 +236,7 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
 
 def _heading(plan: Plan) -> Vector:
     """Direction (3,) of H at the end of the nominal flight, in body axes at t = 0."""
-    flown = plan.flight
-    end = flown.settled
-    momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flown.last_moments))
-    axis = attitude.rotate(attitude.conjugate(plan.spacecraft.initial.quaternion), momentum)
+    axis = attitude.rotate(attitude.conjugate(plan.spacecraft.initial.quaternion), plan.flight.last_momentum)
     return np.asarray(axis / np.linalg.norm(axis))
 
 

@@ -55,11 +55,12 @@ FIRED, INTEGRATED = 1.0, 40.0
 def spin_turn(spacecraft: Spacecraft) -> float:
     """Time between two Sun pulses, s: the average one of the free motion.
 
-    The body turns about H at |H|/A, and about its axis at aω3: together, and at small angles, at ω3.
+    The body turns about H at |H|/A, and about its axis at ω3 - H3/A: together, and at small angles, at ω3.
     """
     inertia = spacecraft.inertia
     size = float(np.linalg.norm(spacecraft.momentum))
-    return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.spin) + inertia.a * spacecraft.spin)
+    turning = inertia.a * spacecraft.spin - inertia.wheel / inertia.A
+    return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.axial) + turning)
 
 
 def sun_pulses(flown: Flight, until: float) -> Vector:
@@ -371,9 +372,9 @@ class BlockModel:
             raise Infeasible("the spin axis points to the Sun or away from it: it has no Sun pulse")
         self._frame = np.array([np.cross(np.cross(sun, start), sun) / sine, np.cross(sun, start) / sine, sun])
         self.goal = self._frame @ spacecraft.target_axis
-        self.rate, supply = self.inertia.body_rate, Supply(spacecraft)
+        supply, rate = Supply(spacecraft), spacecraft.nutation_rate
+        self._slope, self._offset = self.inertia.linear_rate(spacecraft.spin)
         first = first_sun_pulse(spacecraft)
-        rate = self.rate * spacecraft.spin
         self.start = BlockState(
             sun_angle=math.atan2(sine, float(sun @ start)),
             longitude=0.0,
@@ -387,10 +388,14 @@ class BlockModel:
         self.steady = supply.steady
         self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
+    def rate(self, spin: Any) -> Any:
+        """Rate ν of the nutation in the body at a ``spin``, rad/s."""
+        return self._slope * spin + self._offset
+
     def turned_by(self, channel: Channel, width: Any, spin: Any) -> Any:
         """Turn of H by one pulse, rad."""
         given = acts(channel, width)
-        momentum = self.inertia.C * abs(spin)
+        momentum = abs(self.inertia.axial(spin))
         return precession.turned_by(momentum, abs(channel.transverse), given.on_time, spin, given.spread)
 
     def full_pulses(self, state: BlockState, channel: Channel, width: Any, count: Any) -> tuple[Any, Any]:
@@ -461,7 +466,7 @@ class BlockModel:
 
         The kicks of the block, each carried to the first one, add up to a phasor; ω must then point against it.
         """
-        interval, rate = trial.every * self.turn, self.rate * self.body.spin
+        interval, rate = trial.every * self.turn, self.rate(self.body.spin)
         kicks = channel.transverse * self.kicks(state, channel, trial, rate * interval)
         to_go = np.angle(-kicks / (state.phasor * np.exp(-1j * rate * trial.wait * self.turn)))
         return (
@@ -494,7 +499,7 @@ class BlockModel:
         interval = trial.every * turn + rhumb.turn / trial.count * turn / (2.0 * math.pi)
         first = state.sun_pulse + trial.wait * self.turn * np.abs(self.body.spin / state.spin)
         following = first + (trial.count - 1) * interval + turn
-        rate = self.rate * spin
+        rate = self.rate(spin)
         kick = channel.transverse * np.sinc(0.5 * rate * given.spread / np.pi)
         since_last = turn - trial.delay - given.centroid
         kicks = self.kicks(state, channel, trial, rate * interval, back=True)
@@ -512,7 +517,7 @@ class BlockModel:
 
     def apart(self, state: BlockState, flown: Flight) -> BlockState:
         """Difference of the motion as ``flown`` from ``state``, to be added to the states of other blocks."""
-        end, rate = flown.settled, self.rate * flown.settled.spin
+        end, rate = flown.settled, self.rate(flown.settled.spin)
         axis = self._frame @ flown.final.momentum
         since = float(state.sun_pulse) - flown.schedule.end
         return BlockState(
@@ -533,5 +538,5 @@ class BlockModel:
             axis=-1,
         )
         apart = np.arctan2(np.linalg.norm(np.cross(axis, self.goal), axis=-1), axis @ self.goal)
-        nutation = np.arctan2(np.abs(state.phasor), self.inertia.C * np.abs(state.spin))
+        nutation = np.arctan2(np.abs(state.phasor), np.abs(self.inertia.axial(state.spin)))
         return Left(nutation, apart, state.spin)

@@ -306,9 +306,9 @@ class BlockSearch:
     def _undamped(self, state: BlockState, channel: Channel, every: int) -> Array:
         """Nutation that is left at least, as in `_short_by`."""
         widths, counts = commandable_widths(self.commands, channel)[:, None], self._counts(state, every)
-        trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate * self.body.spin * self.model.turn
+        trial, step = Trial(0, 0.0, widths, counts, every), self.model.rate(self.body.spin) * self.model.turn
         kicks = abs(channel.transverse) * np.abs(self.model.kicks(state, channel, trial, every * step))
-        left = np.abs(np.abs(state.phasor) - kicks) / (self.model.inertia.C * abs(self.body.spin))
+        left = np.abs(np.abs(state.phasor) - kicks) / abs(self.body.axial)
         return np.asarray(left / self._most.get(Part.NUTATION, math.inf)).reshape(-1, len(widths) * len(counts))
 
     def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:

@@ -251,7 +251,7 @@ class Scheme:
     function ``alternatives`` too, of schedules about as good. ``body_fixed``: fires channels of
     the file only, no steerable torquer. ``reads_commands``: makes blocks of the ``commands``
     of the file, and is planned where there are some. ``on_true_body``: needs no symmetric model. ``slow``: may take
-    seconds.
+    seconds. ``by_turns``: fires at one phase of each spin turn, so that the body has to spin.
     """
 
     name: str
@@ -268,6 +268,7 @@ class Scheme:
     reads_commands: bool = False
     on_true_body: bool = False
     slow: bool = False
+    by_turns: bool = False
 
 
 ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
@@ -295,6 +296,7 @@ RHUMB_LINE = Scheme(
     only_points=True,
     reads_sun=True,
     body_fixed=True,
+    by_turns=True,
 )
 COMMAND_BLOCK = Scheme(
     "command-block",
@@ -305,6 +307,7 @@ COMMAND_BLOCK = Scheme(
     on_true_body=True,
     body_fixed=True,
     slow=True,
+    by_turns=True,
 )
 NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
 """Free motion, for comparison."""

@@ -62,7 +62,7 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
     body, commands = model.body, model.body.commands
     assert commands is not None
     way, half = body.to_turn if body.goal.axis is not None else 0.0, 0.5 * commands.delay_step
-    spin, damped = abs(body.spin), abs(model.rate * body.spin)
+    spin, damped = abs(body.spin), abs(model.rate(body.spin))
     aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
     steps = [step for channel in channels for step in _steps(model, channel)]
     along = 0.5 * min(steps, default=0.0)

@@ -101,11 +101,10 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
     """`misses` of a flight; ``spin`` adds a fifth, the relative error of the final spin."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
-    moments = np.asarray(flight_.last_moments)
-    body = flight_.settled.rates * moments
-    after = attitude.rotate(flight_.settled.quaternion, body)
+    inertia = replace(spacecraft.inertia, moments=flight_.last_moments)
+    body, after = inertia.momentum(flight_.settled.rates), flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
-    body[:2] -= moments[:2] * (steady.real, steady.imag)
+    body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
     left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin
     return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
@@ -234,7 +233,7 @@ class _Movable:
     """
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
-        pace, earliest = 1.0 / abs(spacecraft.spin), spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
+        pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
         self.channel = channel_of(spacecraft, pulse)
         self.torquer = spacecraft.torquer
@@ -486,7 +485,7 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
     Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
     """
     here = start.here
-    h = here.inertia.C * abs(here.spin)
+    h = abs(here.axial)
     # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
     span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
     best: tuple[float, FlownBuilder] | None = None

@@ -28,7 +28,7 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = ImpulseBuilder(spacecraft)
     on_times = {channel.name: _on_time(builder, channel, options.on_time) for channel in channels}
-    if spacecraft.inertia.a == 0.0:
+    if spacecraft.nutation_rate == 0.0:
         _standing(builder, channels, options)
     else:
         _turning(builder, channels, on_times, options)

@@ -68,7 +68,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     """
     expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
-    if math.tan(spacecraft.nutation) > _reach(spacecraft) / _axial(spacecraft):
+    if math.tan(spacecraft.nutation) > _reach(spacecraft) / abs(spacecraft.axial):
         builder = correction.damped(builder, one_pulse.schedule)
     if options.cones is not None:
         return _row(builder, options.cones)
@@ -102,15 +102,11 @@ def _counts(fewest: int, most: int) -> Iterator[int]:
         cones += 1 + cones // 6
 
 
-def _axial(spacecraft: Spacecraft) -> float:
-    return spacecraft.inertia.C * abs(spacecraft.spin)
-
-
 def _reach(spacecraft: Spacecraft) -> float:
     """Most by which one pulse turns H, N m s."""
-    torquer, spin = spacecraft.torquer, abs(spacecraft.spin)
+    torquer, spin = spacecraft.torquer, spacecraft.spin
     if torquer is not None:
-        return math.inf if torquer.torque is None else 2.0 * torquer.torque / spin
+        return math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
     return max(
         (precession.reach(abs(channel.transverse), spin, channel.max_on_time) for channel in usable(spacecraft)),
         default=0.0,
@@ -119,7 +115,7 @@ def _reach(spacecraft: Spacecraft) -> float:
 
 def _fewest(spacecraft: Spacecraft) -> int:
     """Least number of cones whose pulses are not beyond reach."""
-    reach, turn = _reach(spacecraft) / _axial(spacecraft), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
+    reach, turn = _reach(spacecraft) / abs(spacecraft.axial), max(spacecraft.to_turn - spacecraft.nutation, 0.0)
     for cones in range(1, MOST_CONES):
         pulse = (1.0 if cones == 1 else 2.0) * math.tan(turn / (2 * cones))
         if 0.0 <= pulse <= reach:
@@ -129,7 +125,7 @@ def _fewest(spacecraft: Spacecraft) -> int:
 
 def _most(spacecraft: Spacecraft) -> int:
     """Largest number of cones for which there are time and pulses."""
-    half_turn = math.pi * spacecraft.inertia.A / _axial(spacecraft)
+    half_turn = math.pi * spacecraft.inertia.A / abs(spacecraft.axial)
     room = int(max(spacecraft.horizon - spacecraft.limits.earliest, 0.0) / half_turn) + 1
     most = spacecraft.limits.max_pulses
     return min(MOST_CONES, room, MOST_CONES if most is None else most - 1)
@@ -162,7 +158,7 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
         builder.fire(steered or (_fixed(here, remaining),))
     builder.fire(pulse_pairs.schedule(builder.here, straight=True))
     angle = spacecraft.to_turn
-    ideal = precession.half_cones_impulse(_axial(spacecraft), angle, cones) if angle < cones * math.pi else math.inf
+    ideal = precession.half_cones_impulse(abs(spacecraft.axial), angle, cones) if angle < cones * math.pi else math.inf
     schedule = builder.schedule()
     plain = len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0
     if plain and not damped:
@@ -177,13 +173,13 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
     and what it misses then is made up for by the cones that follow.
     """
-    h, windows, target, channels = _axial(here), Windows(here), here.target_axis, usable(here)
-    step = 2.0 * math.pi / abs(here.spin) / SAMPLES
+    h, windows, target, channels = abs(here.axial), Windows(here), here.target_axis, usable(here)
+    step = 2.0 * math.pi / here.fastest / SAMPLES
     share = (windows.horizon - here.limits.earliest) / (cones + 1)
     span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
-    _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(times)
+    _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
     best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
@@ -213,7 +209,7 @@ def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
     """Half-angle, rad, of ``cones`` equal cones from the best point of the present one, and the pulse for it, N m s."""
     far = here.to_turn + here.nutation
     equal = min(far / (2 * cones), 1.0)
-    return equal, _axial(here) * (math.tan(here.nutation) + math.tan(equal))
+    return equal, abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
 
 
 def _costs(

@@ -60,8 +60,8 @@ def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
             channel, longest_useful(channel.max_on_time, builder.period) if on_time is None else on_time
         )
 
-    spin_rate = channel.axial / spacecraft.inertia.C
-    return _train(spacecraft, abs(channel.transverse), spin_rate, channel.max_on_time, fire)
+    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
+    return _train(spacecraft, abs(channel.transverse), slope, channel.max_on_time, fire)
 
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable) -> ImpulseBuilder:
@@ -73,7 +73,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable) -> ImpulseBuilder:
 def _train(
     spacecraft: Spacecraft,
     torque: float,
-    spin_rate: float,
+    slope: float,
     max_on_time: float,
     fire: Callable[[ImpulseBuilder, float], Pulse | None],
 ) -> ImpulseBuilder:
@@ -83,11 +83,11 @@ def _train(
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
             return math.inf
-        return torque * on_time * abs(response.width_factor(start.a, start.spin, spin_rate, on_time))
+        return torque * on_time * abs(response.width_factor(start.turning, slope, on_time))
 
     longest = longest_useful(max_on_time, start.period)
     count = 1
-    single = math.isinf(torque) or response.on_time_for(start.left, torque, start.a, start.spin, spin_rate, longest)
+    single = math.isinf(torque) or response.on_time_for(start.left, torque, start.turning, slope, longest)
     share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
     if not single and share > 0.0:
         most = start.most

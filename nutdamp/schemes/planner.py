@@ -63,6 +63,8 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
     scheme = SCHEMES[name]
     chosen = settled(scheme, options, spacecraft)
+    if scheme.by_turns and spacecraft.spin == 0.0:
+        raise Infeasible("the body does not turn about axis 3: there is no spin turn to fire once in")
     if scheme.on_true_body:
         return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
     if spacecraft.thrust_laws:

@@ -76,7 +76,7 @@ class SteerablePair:
 
     def __init__(self, spacecraft: Spacecraft, torquer: Steerable) -> None:
         self.spacecraft, self.torquer = spacecraft, torquer
-        self.A, self.h = spacecraft.inertia.A, spacecraft.inertia.C * abs(spacecraft.spin)
+        self.A, self.h = spacecraft.inertia.A, abs(spacecraft.axial)
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
         self.start = spacecraft.initial
         self.windows = Windows(spacecraft)
@@ -86,10 +86,10 @@ class SteerablePair:
     def axes(self, times: Vector) -> Vector:
         """Spin axis S at ``times`` (n,) s, (n, 3), inertial."""
         _, quaternions = self._arc(0.0, self.start).motion(times)
-        return attitude.rotate(quaternions, np.array([0.0, 0.0, math.copysign(1.0, self.spacecraft.spin)]))
+        return attitude.rotate(quaternions, np.array([0.0, 0.0, self.spacecraft.sense]))
 
     def _arc(self, since: float, state: SpinState) -> Arc:
-        return Arc(self.A, self.spacecraft.inertia.C, since, state)
+        return Arc.of(self.spacecraft.inertia, state, since)
 
     def on_times(self, jumps: Vector) -> Vector:
         """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no pulse can."""
@@ -214,9 +214,9 @@ class SteerablePair:
 
     def no_room(self, cones: int) -> str:
         """Reason why no pulse could be placed."""
-        torque, spin, horizon = self.torquer.torque, abs(self.spacecraft.spin), self.windows.horizon
+        torque, horizon = self.torquer.torque, self.windows.horizon
         if torque is not None:
-            once = 2.0 * torque / spin
+            once = precession.reach(torque, self.spacecraft.spin, math.inf)
             axes = self.axes(self.moments()[:SPIN_SAMPLES])
             if len(axes) == 0:
                 return "no time is left between limits.earliest and limits.horizon"
@@ -388,16 +388,16 @@ class _PairSearch:
     def __init__(self, spacecraft: Spacecraft, channels: list[Channel]) -> None:
         self.spacecraft, self.channels, self.windows = spacecraft, channels, Windows(spacecraft)
         inertia = spacecraft.inertia
-        self.A, self.h = inertia.A, inertia.C * abs(spacecraft.spin)
-        self.turning = inertia.a * spacecraft.spin
+        self.A, self.h = inertia.A, abs(spacecraft.axial)
+        self.turning = spacecraft.nutation_rate
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
         self.floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
-        self.arc = Arc(inertia.A, inertia.C, 0.0, spacecraft.initial)
+        self.arc = Arc.of(inertia, spacecraft.initial)
         self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
 
     def times(self) -> Vector:
         """Moments (n,) s of the first pulse that are looked at."""
-        turn = 2.0 * math.pi / abs(self.spacecraft.spin)
+        turn = 2.0 * math.pi / self.spacecraft.fastest
         first = self.spacecraft.limits.earliest
         ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
         span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
@@ -409,8 +409,7 @@ class _PairSearch:
         direction = channel.transverse / abs(channel.transverse)
         _, quaternions = self.arc.motion(times)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        sense = math.copysign(1.0, self.spacecraft.spin)
-        axes = attitude.rotate(quaternions, np.array([0.0, 0.0, sense]))
+        axes = attitude.rotate(quaternions, np.array([0.0, 0.0, self.spacecraft.sense]))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             first = (self.h - self.momentum @ self.target) / (push @ self.target)
             first = np.where((first >= 0.0) & (first <= DEAREST * self.floor), first, np.nan)
@@ -450,7 +449,7 @@ class _PairSearch:
         candidates: list[PairCandidate] = []
         if len(times) < 2:
             return candidates
-        adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / abs(self.spacecraft.spin) / BODY_SAMPLES
+        adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / self.spacecraft.fastest / BODY_SAMPLES
         for one in self.channels:
             if work.exhausted():
                 break

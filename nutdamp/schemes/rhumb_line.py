@@ -99,7 +99,7 @@ class Train:
         self.here, self.options = here, options
         self.windows = Windows(here)
         self.turn = 2.0 * math.pi / abs(here.spin)
-        self.h = here.inertia.C * abs(here.spin)
+        self.h = abs(here.axial)
         self.sun = here.goal.sun
         self.channels = [] if here.torquer is not None else _spread(usable(here), options.per_turn)
         if self.channels:
@@ -170,7 +170,7 @@ class Train:
         A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
         of its square.
         """
-        needed = float(left[count - 1]) / max(abs(self.here.inertia.a), LEAST_RATIO)
+        needed = float(left[count - 1]) / max(abs(self.here.nutation_rate / self.here.spin), LEAST_RATIO)
         return SPARE + ROOM * needed**2 / min(count, LAST)
 
     def _free(self, left: Vector) -> list[Attempt]:
@@ -254,11 +254,11 @@ class Train:
 
     def left_by(self, shots: list[Shot]) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
-        start, A, a, spin = self.here.initial, self.here.inertia.A, self.here.inertia.a, self.here.spin
+        start, A = self.here.initial, self.here.inertia.A
         pushes = np.array(
             [_in_body(self.here, self.ahead, t) if channel is None else channel.transverse for t, channel in shots]
         )
-        turned = a * spin * np.array([shot.t for shot in shots])
+        turned = self.here.nutation_rate * np.array([shot.t for shot in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
         counts = np.arange(1, len(shots) + 1)
         return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
@@ -374,7 +374,7 @@ def _aligned(here: Spacecraft, channel: Channel, ahead: Vector, ready: float) ->
 
 def _in_body(here: Spacecraft, direction: Vector, t: float) -> complex:
     """Components of an inertial ``direction`` (3,) along axes 1 and 2 of the body at ``t`` s, undisturbed."""
-    _, quaternions = Arc(here.inertia.A, here.inertia.C, 0.0, here.initial).motion(np.array([t]))
+    _, quaternions = Arc.of(here.inertia, here.initial).motion(np.array([t]))
     body = attitude.matrix(quaternions[0]).T @ direction
     return complex(body[0], body[1])
 
@@ -459,7 +459,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     """Advice on a pulse length that works instead of the requested one, the nearest first."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
     try:
-        if spacecraft.least_impulse > 1e-9 * builder.here.inertia.C * abs(spacecraft.spin):
+        if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
             builder = correction.damped(builder, one_pulse.schedule)
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:

@@ -46,6 +46,7 @@ class ImpulseBuilder:
     def __init__(self, spacecraft: Spacecraft, *, endless: bool = False) -> None:
         self.spacecraft = spacecraft
         self.A, self.C, self.a = spacecraft.inertia.A, spacecraft.inertia.C, spacecraft.inertia.a
+        self.wheel = spacecraft.inertia.wheel
         self.windows = Windows(spacecraft, endless=endless)
         self.omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         self.spin = spacecraft.spin
@@ -62,7 +63,7 @@ class ImpulseBuilder:
     def settled(self) -> bool:
         """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
         corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
-        return self.left <= max(1e-13 * self.C * abs(self.spin), corrected)
+        return self.left <= max(1e-13 * abs(self.C * self.spin + self.wheel), corrected)
 
     @property
     def growing(self) -> bool:
@@ -81,9 +82,14 @@ class ImpulseBuilder:
         return MOST_PULSES if most is None else min(most, MOST_PULSES)
 
     @property
+    def turning(self) -> float:
+        """Rate ν in rad/s at which ω turns in the body at the present spin."""
+        return self.a * self.spin - self.wheel / self.A
+
+    @property
     def period(self) -> float:
         """Nutation period in the body at the present spin, s; infinite for a sphere."""
-        rate = abs(self.a * self.spin)
+        rate = abs(self.turning)
         return 2.0 * math.pi / rate if rate > 0.0 else math.inf
 
     @property
@@ -94,29 +100,37 @@ class ImpulseBuilder:
     def _coast(self, time: float) -> tuple[complex, float]:
         """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
         since, drift, growth = time - self.now, self.spacecraft.spin_drift, self.spacecraft.growth
-        omega, spin, turned = self.omega, self.spin, since
+        omega, spin, angle, slower = self.omega, self.spin, self.turning * since, self.wheel / self.C
         if growth != 0.0:
-            effect = energy_sink.coast(self.A, self.C, growth, omega, spin, since)
-            omega, spin, turned = omega * effect.transverse, spin * effect.axial, effect.turned
-        angle = self.a * (self.spin * turned + 0.5 * drift * since * since)
+            effect = energy_sink.coast(self.A, self.C, growth, omega, spin, since, self.wheel)
+            angle = self.a * (spin + slower) * effect.turned - slower * since
+            omega, spin = omega * effect.transverse, (spin + slower) * effect.axial - slower
+        angle += 0.5 * self.a * drift * since * since
         return omega * cmath.exp(-1j * angle), spin + drift * since
 
     def _sink(self) -> tuple[float, float, float]:
         """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
-        axial, across = (self.C * self.spin) ** 2, (self.A * abs(self.omega)) ** 2
+        axial, across = (self.C * self.spin + self.wheel) ** 2, (self.A * abs(self.omega)) ** 2
         size = axial + across
         if size == 0.0:
             return self.spacecraft.growth, 1.0, 0.0
         return self.spacecraft.growth, math.sqrt(axial / size), across / size
 
     def _turned(self, time: float) -> float:
-        """Time, s, in which the present spin turns the body as far as it turns from now to ``time`` s."""
+        """Time, s, in which the present spin turns the body as far as it turns from now to ``time`` s.
+
+        Nearly so with a wheel under dissipation.
+        """
         since = time - self.now
-        return since if self.spacecraft.growth == 0.0 else energy_sink.course(*self._sink(), since).turned
+        return since if self._even else energy_sink.course(*self._sink(), since).turned
 
     def _when(self, turned: float) -> float:
         """Time at which `_turned` is ``turned`` s."""
-        return self.now + (turned if self.spacecraft.growth == 0.0 else energy_sink.time_to_turn(*self._sink(), turned))
+        return self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
+
+    @property
+    def _even(self) -> bool:
+        return self.spacecraft.growth == 0.0 or self.wheel != 0.0
 
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
@@ -132,7 +146,7 @@ class ImpulseBuilder:
             return 0.0 + 0.0j
         torque = disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)
         driven = response.rotating_torques(
-            np.array([since]), 0.0, self.spin, self.A, self.C, np.array([torque]), np.array([disturbance.rate])
+            np.array([since]), 0.0, self.turning, self.A, np.array([torque]), np.array([disturbance.rate])
         )
         return complex(driven[0])
 
@@ -140,14 +154,9 @@ class ImpulseBuilder:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
         axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
         _, spin = self._coast(pulse.start)
-        factor = response.width_factor(
-            self.a,
-            spin,
-            axial / self.C,
-            pulse.on_time,
-            growth=self.spacecraft.growth,
-            drift=self.spacecraft.spin_drift,
-        )
+        rate, slope = self.a * spin - self.wheel / self.A, self.a * axial / self.C
+        growth, drift = self.spacecraft.growth, self.a * self.spacecraft.spin_drift
+        factor = response.width_factor(rate, slope, pulse.on_time, growth, drift)
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
 
     def left_after(self, pulse: Pulse) -> float:
@@ -173,8 +182,8 @@ class ImpulseBuilder:
 
     def on_time_for(self, channel: Channel, impulse: float, longest: float = math.inf) -> float | None:
         """On-time in s for which ``channel`` acts on ω like ``impulse`` N m s; None if none up to ``longest``."""
-        spin_rate = channel.axial / self.C
-        return response.on_time_for(impulse, abs(channel.transverse), self.a, self.spin, spin_rate, longest)
+        slope = self.a * channel.axial / self.C
+        return response.on_time_for(impulse, abs(channel.transverse), self.turning, slope, longest)
 
     def align(self, channel: Channel, on_time: float) -> Pulse | None:
         """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
@@ -184,7 +193,7 @@ class ImpulseBuilder:
         if math.isinf(self.period):
             start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
-        first = turn / (self.a * self.spin)  # and the times below: as long as it takes at the present spin
+        first = turn / self.turning  # and the times below: as long as it takes at the present spin
         # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
         slack = min(TOUCHING, 1e-3 * on_time) if self.pulses else 0.0
 
@@ -220,7 +229,7 @@ class ImpulseBuilder:
         for _ in range(20):
             turn = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
             _, spin = self._coast(centre)
-            centre += turn / (self.a * (spin or self.spin))
+            centre += turn / ((self.a * spin - self.wheel / self.A) or self.turning)
             if abs(turn) < ALIGNED:
                 break
         return centre
@@ -232,7 +241,7 @@ class ImpulseBuilder:
             if start is None:
                 return None
             return steerable_pulse(steerable, start, cmath.phase(-self.omega_at(start)), impulse=impulse)
-        needed = response.on_time_for(impulse, steerable.torque, self.a, self.spin, 0.0, math.inf)
+        needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
         if needed is None:
             return None
         on_time = self.windows.on_time(needed, 0.0, math.inf)
@@ -295,7 +304,7 @@ def expect_aim(spacecraft: Spacecraft) -> None:
 def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
     """Error where no channel can be fired against ω within the limits, with the cure."""
     omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    if spacecraft.inertia.a == 0.0:
+    if spacecraft.nutation_rate == 0.0:
         off = {channel.name: abs(cmath.phase(-omega * channel.transverse.conjugate())) for channel in channels}
         nearest = min(off, key=lambda name: off[name])
         return Infeasible(
@@ -331,7 +340,7 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
 
 def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left: float) -> str:
     """Error where trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
-    ratio = spacecraft.inertia.C / (spacecraft.inertia.A * per_turn)
+    ratio = spacecraft.axial / (spacecraft.inertia.A * spacecraft.spin * per_turn)
     off, least = abs(ratio - round(ratio)), math.degrees(left)
     if off * most >= 1.0:
         return (
@@ -347,7 +356,7 @@ def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left
 
 def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
     """Turn of H in degrees by an ``impulse`` across the spin axis, N m s; of A|ω|, the nutation."""
-    return f"{math.degrees(math.atan2(impulse, spacecraft.inertia.C * abs(spacecraft.spin))):.4g} deg"
+    return f"{math.degrees(math.atan2(impulse, abs(spacecraft.axial))):.4g} deg"
 
 
 def _end(builder: ImpulseBuilder, channel: Channel, shortest: Pulse) -> float:
@@ -410,18 +419,16 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel
     inertia = spacecraft.inertia
     if inertia.symmetric:
         return SymmetricModel(spacecraft, _aimed(undisturbed, spacecraft), np.ones(2))
-    from nutdamp.physics import triaxial  # a body of three moments needs it, and few plans are of one
-
     first, second, C = inertia.moments
-    # a ω3 is the true nutation rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
-    A = C / (1.0 - triaxial.body_nutation_rate(inertia.moments, 1.0))
-    circle = (first * (first - C) / (second * (second - C))) ** 0.25
+    # Its nutation has the true rate, and (s1 ω1, s2 ω2) moves on a circle (linearised Euler equations).
+    A, spin, axial = inertia.nutating(spacecraft.spin), spacecraft.spin, spacecraft.axial
+    circle = (first * (first * spin - axial) / (second * (second * spin - axial))) ** 0.25
     scale = np.array([circle, 1.0 / circle])
     stretch = scale * A / np.array([first, second])  # for torques and impulses
     size = float(np.mean(stretch)) if turning else 1.0
     body = replace(
         undisturbed,
-        inertia=Inertia((A, A, C), inertia.axes),
+        inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
         omega0=np.array([*(scale * undisturbed.omega0[:2] / size), undisturbed.omega0[2]]),
         channels=tuple(_stretched(channel, stretch if not turning else np.ones(2)) for channel in undisturbed.channels),
         steerable=_stretched_torquer(undisturbed.steerable, stretch),
@@ -484,7 +491,7 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
     """True if ω beats against the disturbance at least once within the horizon; else it counts as resonant."""
-    detuning = abs(spacecraft.inertia.a * spacecraft.spin + disturbance.rate)
+    detuning = abs(spacecraft.nutation_rate + disturbance.rate)
     return detuning * spacecraft.horizon > 2.0 * math.pi
 
 
@@ -493,7 +500,7 @@ def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     inertia = spacecraft.inertia
     return sum(
         (
-            response.steady_response(inertia.A, inertia.C, spacecraft.spin, disturbance.transverse, disturbance.rate)
+            response.steady_response(inertia.A, spacecraft.nutation_rate, disturbance.transverse, disturbance.rate)
             * complex(math.cos(disturbance.rate * time), math.sin(disturbance.rate * time))
             for disturbance in spacecraft.disturbances
             if disturbance.transverse and settles(spacecraft, disturbance)

@@ -42,6 +42,9 @@ CLOSE_IN_SHORT = 1.1
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
+STILL = 0.1
+"""Angle in rad: channels that turn no further within the horizon stand still in space, as those of a despun body."""
+
 SHORTLIST = 6
 """Candidates that are flown and corrected, at most."""
 
@@ -98,7 +101,7 @@ def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOption
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
     inertia, windows = spacecraft.inertia, Windows(spacecraft)
     form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
-    halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
     placed = (
@@ -121,12 +124,12 @@ def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> floa
     """On-time in s of one half pulse; raises Infeasible where the torque is too weak for it."""
     if torquer.torque is None:
         return 0.0
-    on_time = response.on_time_for(impulse, torquer.torque, spacecraft.inertia.a, spacecraft.spin, 0.0, math.inf)
+    on_time = response.on_time_for(impulse, torquer.torque, spacecraft.nutation_rate, 0.0, math.inf)
     if on_time is None:
-        needed = 0.5 * abs(spacecraft.inertia.a * spacecraft.spin) * impulse
+        needed = 0.5 * abs(spacecraft.nutation_rate) * impulse
         raise Infeasible(
-            f"half the nutation needs a torque above {needed:.4g} N m to be taken out within half a body nutation "
-            f"period; the torquer has {torquer.torque:.4g} N m"
+            f"half the nutation needs more than {needed / torquer.torque:.4g} times the torque of the torquer to be "
+            "taken out within half a body nutation period"
         )
     return Windows(spacecraft).on_time(on_time, 0.0, math.inf)
 
@@ -237,7 +240,8 @@ def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: b
 
 def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[Note, ...]:
     inertia = spacecraft.inertia
-    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spacecraft.spin)
+    spin = inertia.equivalent(spacecraft.spin)
+    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
     first, second = schedule.pulses
     turns = (second.t - first.t) / halves.wait
     apart = note(
@@ -255,25 +259,29 @@ def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Sch
 def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
     inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    A, C, a, spin = inertia.A, inertia.C, inertia.a, spacecraft.spin
+    A, C, turning, spin = inertia.A, inertia.C, spacecraft.nutation_rate, inertia.equivalent(spacecraft.spin)
     theta = spacecraft.nutation
     turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
-    rate = a * spin + C / A * spin / math.cos(0.5 * theta)
+    rate = turning + C / A * spin / math.cos(0.5 * theta)
+    to_go = math.pi - turn
+    if abs(rate) * spacecraft.horizon < STILL:  # the channels stand still in space: they close at any time, or never
+        if abs(cmath.phase(cmath.rect(1.0, to_go))) > STILL:
+            return []
+        to_go, rate = -turn, turning  # until the second opposes ω as the first does
     if rate == 0.0:
         return []
-    sense = math.copysign(1.0, rate)
-    first_wait = ((math.pi - turn) * sense) % (2 * math.pi) / abs(rate)
+    first_wait = to_go * math.copysign(1.0, rate) % (2 * math.pi) / abs(rate)
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
-    turns = _turns(count, turn + a * spin * first_wait, 2 * math.pi * a * spin / abs(rate))
+    turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns
     halves = rigid_body.half_pulses(A, C, abs(omega0), spin)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
         halves = rigid_body.half_pulses_as_printed(A, C, abs(omega0), spin)
         count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
-        odd = 2 * _turns(count, turn + a * spin * halves.wait, 2 * a * spin * halves.wait) + 1
+        odd = 2 * _turns(count, turn + turning * halves.wait, 2 * turning * halves.wait) + 1
         waits = halves.wait * odd
-    miss = np.angle(np.exp(1j * (turn + a * spin * waits)))
+    miss = np.angle(np.exp(1j * (turn + turning * waits)))
     factor = 1.0 / np.cos(0.5 * miss)
     placed = (
         _place(spacecraft, one, two, halves, float(waits[index]), float(miss[index]), literal)
@@ -314,19 +322,19 @@ def _place(
     literal: bool,
 ) -> HalfPulseCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
-    windows, a, spin = Windows(spacecraft), spacecraft.inertia.a, spacecraft.spin
+    windows, turning = Windows(spacecraft), spacecraft.nutation_rate
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     factor = 1.0 if literal else 1.0 / math.cos(0.5 * miss)
     # Both together oppose ω0 where the middle between their directions does.
     phase = rigid_body.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
-    if a == 0.0 and abs(phase) > ALIGNED:
+    if turning == 0.0 and abs(phase) > ALIGNED:
         return None
-    period = 2 * math.pi / abs(a * spin) if a != 0.0 else math.inf
+    period = 2 * math.pi / abs(turning) if turning != 0.0 else math.inf
 
     def opposed_from(time: float) -> float:
-        if a == 0.0:
+        if turning == 0.0:
             return time
-        return phase / (a * spin) + max(math.ceil((time - phase / (a * spin)) / period), 0) * period
+        return phase / turning + max(math.ceil((time - phase / turning) / period), 0) * period
 
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
@@ -352,22 +360,21 @@ def _place(
             return HalfPulseCandidate(
                 short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
             )
-        first += delay if a == 0.0 else max(math.ceil(delay / period), 1) * period
+        first += delay if turning == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 
 
 def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
     """Deficit of a pulse of ``on_time`` s against the impulse ``needed`` N m s, over that for all nutation."""
-    rate = channel.axial / spacecraft.inertia.C
-    width = response.width_factor(spacecraft.inertia.a, spacecraft.spin, rate, on_time)
+    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
+    width = response.width_factor(spacecraft.nutation_rate, slope, on_time)
     return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
 
 
 def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
     """On-time in s with which a channel gives the effective impulse ``needed`` N m s, or comes nearest to it."""
-    rate, longest = channel.axial / spacecraft.inertia.C, channel.max_on_time
-    a, spin = spacecraft.inertia.a, spacecraft.spin
-    on_time = response.on_time_for(needed, abs(channel.transverse), a, spin, rate, longest)
+    slope, longest = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C, channel.max_on_time
+    on_time = response.on_time_for(needed, abs(channel.transverse), spacecraft.nutation_rate, slope, longest)
     if on_time is None:
         on_time = longest_useful(longest, spacecraft.body_period)
     return max(on_time, channel.min_on_time)
@@ -378,13 +385,14 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
     if spacecraft.growth == 0.0:
         return 1.0
     inertia, (first, second, spin) = spacecraft.inertia, spacecraft.omega0.tolist()
-    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, complex(first, second), spin, time)
+    omega = complex(first, second)
+    effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, omega, spin, time, inertia.wheel)
     return float(effect.transverse)
 
 
 def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
     names = ", ".join(channel.name for channel in channels)
-    if spacecraft.inertia.a == 0.0:
+    if spacecraft.nutation_rate == 0.0:
         return (
             "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
             f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"

@@ -232,7 +232,8 @@ def _translated(
     for pulse_ in schedule:
         here, pulse = lightened(spacecraft, supply.since), pulse_
         if here.moments != planned_.moments:
-            slower = 1.0 if correct.momentum or here.body_rate == 0.0 else planned_.body_rate / here.body_rate
+            rate = here.nutation_rate(spacecraft.spin)
+            slower = 1.0 if correct.momentum or rate == 0.0 else planned_.nutation_rate(spacecraft.spin) / rate
             late += (slower - 1.0) * (pulse_.t - before)
             size = here.C / planned_.C if correct.momentum else here.A / planned_.A
             pulse = replace(pulse_.moved(late), on_time=size * pulse_.on_time, impulse=size * pulse_.impulse)

@@ -184,7 +184,7 @@ def commandable_widths(commands: Commands, channel: Channel) -> Vector:
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
     """Effect of half a tick in start and on-time of each pulse, rad, as a root sum of squares; without ticks 0."""
     body, half = spacecraft, 0.5 * (spacecraft.limits.tick or 0.0)
-    rate, size = max(1.0, abs(body.inertia.a)) * abs(body.spin), body.inertia.C * abs(body.spin)
+    rate, size = body.fastest, abs(body.axial)
     lengths = ((pulse.magnitude, 1.0 / pulse.on_time if pulse.on_time > 0.0 else 0.0) for pulse in pulses)
     return [half * magnitude * math.hypot(share, rate) / size for magnitude, share in lengths]
 

@@ -122,11 +122,13 @@ class Inertia:
     """Principal moments (kg m²) and the rotation that leads from principal axes to the axes of the file.
 
     ``moments`` is (I1, I2, I3), those that `inertia.settled` calls equal made so; ``axes`` is 3×3, its columns the
-    principal axes in file axes.
+    principal axes in file axes. ``wheel`` is the momentum h (N m s) of a part that turns otherwise, constant along
+    axis 3: a momentum wheel or a despun platform.
     """
 
     moments: rigid_body.Moments
     axes: Vector = field(default_factory=lambda: np.eye(3))
+    wheel: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "moments", rigid_body.settled(self.moments))
@@ -146,25 +148,61 @@ class Inertia:
         """Inertia ratio (A - C)/A, Magnus (4): positive prolate, negative oblate, zero for a sphere."""
         return rigid_body.ratio(self.A, self.C)
 
-    @property
-    def body_rate(self) -> float:
-        """Rate at which a small nutation turns in the body, over ω3: ``a`` where I1 = I2."""
-        first, second, third = self.moments
-        if self.symmetric or (first - third) * (second - third) <= 0.0:
+    def axial(self, spin: Any) -> Any:
+        """H3 = Cω3 + h, N m s, signed, at a ``spin`` ω3 in rad/s: a number or an array."""
+        return self.C * spin + self.wheel
+
+    def equivalent(self, spin: Any) -> Any:
+        """Spin H3/C, rad/s, with which the body without wheel has the same H."""
+        return spin + self.wheel / self.C
+
+    def momentum(self, rates: Vector) -> Vector:
+        """Angular momentum (..., 3) N m s in principal axes at ``rates`` (..., 3) rad/s."""
+        return np.asarray(np.asarray(self.moments) * rates + np.array([0.0, 0.0, self.wheel]))
+
+    def nutation_rate(self, spin: float) -> float:
+        """Rate ν in rad/s at which a small nutation turns in the body at a ``spin`` ω3: ω3 - H3/A where I1 = I2.
+
+        That of the mean of I1 and I2 where a small nutation grows instead.
+        """
+        if self._swings(spin):
+            from nutdamp.physics import triaxial  # few bodies need it
+
+            return triaxial.body_nutation_rate(self.moments, spin, self.wheel)
+        return self.a * spin - self.wheel / self.A
+
+    def nutation_slope(self, spin: float) -> float:
+        """Derivative of `nutation_rate` by the spin: ``a`` where I1 = I2."""
+        if not self._swings(spin):
             return self.a
-        from nutdamp.physics import triaxial  # few bodies need it
+        if self.wheel == 0.0:
+            return self.nutation_rate(1.0)
+        (first, second, third), axial = self.moments, self.axial(spin)
+        change = (first - third) * (second * spin - axial) + (second - third) * (first * spin - axial)
+        return float(0.5 * change / (first * second * self.nutation_rate(spin)))
 
-        return triaxial.body_nutation_rate(self.moments, 1.0)
+    def linear_rate(self, spin: float) -> tuple[float, float]:
+        """Slope and offset (rad/s) of `nutation_rate`, taken as linear about a ``spin``: exact where I1 = I2.
 
-    @property
-    def nutating(self) -> float:
+        Without a wheel the offset is zero.
+        """
+        slope = self.nutation_slope(spin)
+        return slope, 0.0 if self.wheel == 0.0 else self.nutation_rate(spin) - slope * spin
+
+    def _swings(self, spin: float) -> bool:
+        """True if I1 ≠ I2 and a small nutation turns on an ellipse."""
+        (first, second, third), wheel = self.moments, self.wheel
+        rate = spin if wheel else 1.0  # without a wheel the sign is that of any spin
+        return first != second and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
+
+    def nutating(self, spin: float) -> float:
         """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
-        return self.A if self.symmetric else self.C / (1.0 - self.body_rate)
+        return self.A if self.symmetric else float(self.axial(spin)) / (spin - self.nutation_rate(spin))
 
     @property
     def shape(self) -> str:
-        """``prolate``, ``oblate`` or ``sphere``."""
-        return rigid_body.shape(self.A, self.C)
+        """``prolate``, ``oblate`` or ``sphere``; ``gyrostat`` with a wheel, of which A and C alone do not tell."""
+        return "gyrostat" if self.wheel else rigid_body.shape(self.A, self.C)
 
     @property
     def symmetric(self) -> bool:
@@ -349,7 +387,7 @@ class Spacecraft(results.Data, results.Shown):
         By shape it grows in a prolate body and decays in an oblate one, unless the file says what it does, as of a boom
         that the Sun heats. A sphere has no energy to give: zero. See `physics.energy_sink`.
         """
-        if self.dissipation is None or self.inertia.a == 0.0:
+        if self.dissipation is None or (self.nutation_grows is None and self.inertia.a == 0.0):
             return 0.0
         grows = self.inertia.a > 0.0 if self.nutation_grows is None else self.nutation_grows
         return 1.0 / self.dissipation if grows else -1.0 / self.dissipation
@@ -374,7 +412,8 @@ class Spacecraft(results.Data, results.Shown):
         """
         if self.limits.horizon is not None:
             return self.limits.horizon
-        body, inertial = rigid_body.body_period(self.inertia.A, self.inertia.C, self.spin), self.inertial_period
+        inertia, inertial = self.inertia, self.inertial_period
+        body = rigid_body.body_period(inertia.A, inertia.C, self.spin, inertia.wheel)
         return 20.0 * (max(body, inertial) if math.isfinite(body) else inertial)
 
     @cached_property
@@ -382,9 +421,9 @@ class Spacecraft(results.Data, results.Shown):
         """State at t = 0; without an attitude in the file the inertial frame N of `attitude.frame_n`."""
         omega, spin = complex(self.omega0[0], self.omega0[1]), float(self.omega0[2])
         if self.attitude is None:
-            first, second, third = self.inertia.moments
+            first, second, third = self.inertia.momentum(self.omega0).tolist()
             # With moments of one, rates are momenta: N goes by the true H.
-            quaternion = attitude.frame_n(1.0, 1.0, complex(first * omega.real, second * omega.imag), third * spin)
+            quaternion = attitude.frame_n(1.0, 1.0, complex(first, second), third)
         else:
             quaternion = attitude.multiply(self.attitude.quaternion, attitude.from_matrix(self.inertia.axes))
         return SpinState(omega, spin, quaternion)
@@ -392,13 +431,13 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def axis(self) -> Vector:
         """Spin axis at t = 0, inertial unit vector (3,)."""
-        return attitude.rotate(self.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, self.spin)]))
+        return attitude.rotate(self.initial.quaternion, np.array([0.0, 0.0, self.sense]))
 
     @cached_property
     def momentum(self) -> Vector:
         """Angular momentum at t = 0 in the inertial frame, (3,) N m s."""
         start = self.initial
-        return attitude.rotate(start.quaternion, start.rates * np.asarray(self.inertia.moments))
+        return attitude.rotate(start.quaternion, self.inertia.momentum(start.rates))
 
     @cached_property
     def target_axis(self) -> Vector:
@@ -415,8 +454,8 @@ class Spacecraft(results.Data, results.Shown):
 
     @property
     def turning_impulse(self) -> float:
-        """C |ω3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target with less."""
-        return self.inertia.C * abs(self.spin) * self.to_turn
+        """|H3| β in N m s with β = `to_turn`: no schedule of a symmetric body turns H to the target with less."""
+        return abs(self.axial) * self.to_turn
 
     def direction_in_n(self, tilt: float, azimuth: float) -> Vector:
         """Inertial unit vector (3,) ``tilt`` rad from H at t = 0, ``azimuth`` rad about it from x of the frame N."""
@@ -451,7 +490,7 @@ class Spacecraft(results.Data, results.Shown):
     @cached_property
     def widest(self) -> ConeAngles:
         """Cone angles at the largest nutation of the free motion from t = 0; constant with I1 = I2."""
-        return arc_cones(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin))
+        return arc_cones(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel)
 
     @property
     def nutation(self) -> float:
@@ -461,7 +500,7 @@ class Spacecraft(results.Data, results.Shown):
     @property
     def tilt(self) -> float:
         """Angle between H and the spin axis at t = 0 itself, rad: below `nutation` where I1 ≠ I2, else equal."""
-        return rigid_body.momentary(self.inertia.moments, self.omega0, math.copysign(1.0, self.spin)).nutation
+        return rigid_body.momentary(self.inertia.moments, self.omega0, self.sense, self.inertia.wheel).nutation
 
     @property
     def transverse_rate(self) -> float:
@@ -474,15 +513,36 @@ class Spacecraft(results.Data, results.Shown):
         return float(self.omega0[2])
 
     @property
+    def axial(self) -> float:
+        """H3 = Cω3 + h at t = 0, N m s, signed."""
+        return float(self.inertia.axial(self.spin))
+
+    @property
+    def sense(self) -> float:
+        """Sign σ of H3 at t = 0: the spin axis is σ·e3, and stays the same end of the body through a reversal."""
+        return math.copysign(1.0, self.axial)
+
+    @property
+    def nutation_rate(self) -> float:
+        """Rate ν of a small nutation in the body at t = 0, rad/s, signed."""
+        return self.inertia.nutation_rate(self.spin)
+
+    @property
+    def fastest(self) -> float:
+        """Faster of spin and nutation in the body, rad/s: what paces the choice of a moment."""
+        return max(abs(self.spin), abs(self.nutation_rate))
+
+    @property
     def body_period(self) -> float:
         """Period of a small nutation seen in the body, Magnus (12), s; infinite for a sphere."""
-        rate = abs(self.inertia.body_rate * self.spin)
+        rate = abs(self.nutation_rate)
         return 2 * math.pi / rate if rate > 0.0 else math.inf
 
     @property
     def inertial_period(self) -> float:
         """Nutation period seen inertially, 2π A/|H|, s; with I1 ≠ I2 that of a small nutation."""
-        return rigid_body.inertial_period(self.inertia.nutating, self.inertia.C, self.transverse_rate, self.spin)
+        inertia, spin = self.inertia, self.inertia.equivalent(self.spin)
+        return rigid_body.inertial_period(inertia.nutating(self.spin), inertia.C, self.transverse_rate, spin)
 
     @property
     def nutation_period(self) -> float:

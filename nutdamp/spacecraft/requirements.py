@@ -139,10 +139,11 @@ def unaided(spacecraft: Spacecraft) -> bool:
         return False
     nutation = _idle(spacecraft, spacecraft.horizon)
     aim = 0.0 if spacecraft.goal.axis is None else spacecraft.to_turn
-    # H stays, and C ω3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
+    # H stays, and H3 = |H| cos θ with it, so that spin and nutation are worst at one end of the time or the other.
     faster = math.cos(nutation) / math.cos(spacecraft.nutation)
-    most = max(nutation, spacecraft.nutation)
-    ends = [Left(most, aim, spin) for spin in (spacecraft.spin, spacecraft.spin * faster)]
+    most, slower = max(nutation, spacecraft.nutation), spacecraft.inertia.wheel / spacecraft.inertia.C
+    later = (spacecraft.spin + slower) * faster - slower
+    ends = [Left(most, aim, spin) for spin in (spacecraft.spin, later)]
     return all(bound.met for left in ends for bound in held(spacecraft, left))
 
 

@@ -29,11 +29,11 @@ class Tolerance:
 class Dispersions:
     """Tolerances of a spacecraft; None, or no entry, for exactly known values.
 
-    ``A`` (both transverse moments) and ``C`` in kg m²; ``omega0`` the rates at t = 0 about the axes of the file,
-    rad/s. ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses; ``thrust_per_pulse``
-    is a relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes across the force)
-    and ``position`` (m, each component) are by thruster too. The steerable torquer counts as the thruster
-    `schedule.STEERABLE`; ``center_of_mass`` is of each component, m. ``timing`` s shifts each pulse,
+    ``A`` (both transverse moments) and ``C`` in kg m², ``wheel_momentum`` N m s; ``omega0`` the rates at t = 0 about
+    the axes of the file, rad/s. ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses;
+    ``thrust_per_pulse`` is a relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes
+    across the force) and ``position`` (m, each component) are by thruster too. The steerable torquer counts as the
+    thruster `schedule.STEERABLE`; ``center_of_mass`` is of each component, m. ``timing`` s shifts each pulse,
     ``timing_offset`` s the whole schedule; ``attitude`` rad tilts the spin axis at t = 0 about two axes across it.
     ``open_delay``, ``close_delay``, ``rise_time`` and ``fall_time`` s and ``impulse_bit``, a relative one, are by
     thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is off,
@@ -46,6 +46,7 @@ class Dispersions:
 
     A: Tolerance | None = None
     C: Tolerance | None = None
+    wheel_momentum: Tolerance | None = None
     omega0: tuple[Tolerance | None, Tolerance | None, Tolerance | None] = (None, None, None)
     thrust: Mapping[str, Tolerance] = field(default_factory=dict)
     thrust_per_pulse: Tolerance | None = None

@@ -24,7 +24,6 @@ from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, Consequence
 from nutdamp.spacecraft.equipment import SunSensor
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.units import bar
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.plan_json import aspects_json, direction_json, spacecraft_json
@@ -101,7 +100,8 @@ def turn_table(spacecraft: Spacecraft) -> DataTable:
 
 TANK = (
     Column("used_kg", "used", "kg", lambda row: row[1], lambda used: f"{used:.4g}", "screen json"),
-    Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]), bar, "screen json"),
+    Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]),
+           lambda pressure: quantity(1e-5 * pressure, "bar"), "screen json"),
     Column("thrust_factor", "", "", lambda row: row[0].thrust_factor(row[1]), where="json"),
     Column("", "thrust", "%", lambda row: 100.0 * row[0].thrust_factor(row[1]), lambda share: f"{share:.4g}",
            "screen"),

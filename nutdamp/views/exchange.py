@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
+    from nutdamp.common.results import Note
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds.message import Message
     from nutdamp.flight.propagation import Flight
@@ -38,7 +39,7 @@ class Format(NamedTuple):
     """A format: its ``name``, a ``summary`` for help pages, the function that gives the text.
 
     ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
-    frame of the attitude. ``needs_orbit``: incomplete without one.
+    frame of the attitude. ``needs_orbit``: incomplete without one. ``nutates``: as symmetric bodies do.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Format(NamedTuple):
     track: bool = False
     dated: bool = False
     needs_orbit: bool = False
+    nutates: bool = False
 
 
 def _json(request: Request) -> str:
@@ -119,7 +121,13 @@ FORMATS = {
         Format("apm", "state and pulses (CCSDS)", _apm, message=True, dated=True),
         Format("aem", "attitude history (CCSDS) as quaternions", _aem, message=True, track=True, dated=True),
         Format(
-            "aem-spin", "as spin, nutation and momentum", partial(_aem, spin=True), message=True, track=True, dated=True
+            "aem-spin",
+            "as spin, nutation and momentum",
+            partial(_aem, spin=True),
+            message=True,
+            track=True,
+            dated=True,
+            nutates=True,
         ),
         Format("opm", "velocity change of each pulse (CCSDS)", _opm, message=True, dated=True, needs_orbit=True),
         Format("stk", "attitude history as .a", _stk, track=True, dated=True),
@@ -160,6 +168,14 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
             cure = "an earlier --until" if row.track else "a shorter horizon"
             raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
     return row.text(request)
+
+
+def export_notes(plan: Plan, form: str) -> list[Note]:
+    """Notes on the motion that the format ``form`` does not hold."""
+    from nutdamp.common.results import note
+    from nutdamp.files.ccsds.write import spinning
+
+    return [note("spin-alone")] * (FORMATS[form].nutates and not spinning(plan.spacecraft.inertia))
 
 
 def lacking(plan: Plan, form: str) -> str | None:

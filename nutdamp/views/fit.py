@@ -14,6 +14,7 @@ from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.files.fitted import notes
+from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, percent
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
@@ -33,24 +34,29 @@ MOST_PAIRS = 6
 def in_shown(signal: str) -> tuple[str, float]:
     """Unit in which a signal is shown, and its factor from SI."""
     if signal == "acceleration":
-        return "m/s²", 1.0
+        return screen_unit("m/s²")
     return ("ms", 1e3) if signal == "sun_pulse" else ("deg" if signal == "axis" else "deg/s", 180.0 / math.pi)
+
+
+def _unit(row: Estimate) -> tuple[str, float]:
+    """Unit of an estimate on screens, and its factor from SI."""
+    return screen_unit(row.unit, row.factor)
 
 
 def _scaled(name: str, row: Estimate) -> float | None:
     """A field of an estimate in its unit; None where it is not known, or infinite."""
     value = getattr(row, name)
-    return None if value is None or math.isinf(value) else value * row.factor
+    return None if value is None or math.isinf(value) else value * _unit(row)[1]
 
 
 def _value(row: Estimate) -> str:
     """The value to the digits that its sigma leaves, 0 where it is within rounding of it."""
     shown = row.value if math.isinf(row.sigma) or abs(row.value) > NOTHING * row.sigma else 0.0
-    return f"{shown * row.factor:.{_digits(row)}g}"
+    return f"{shown * _unit(row)[1]:.{_digits(row)}g}"
 
 
 def _file(row: Estimate) -> str | None:
-    return None if row.file is None else f"{row.file * row.factor:.{max(_digits(row) - 2, 4)}g}"
+    return None if row.file is None else f"{row.file * _unit(row)[1]:.{max(_digits(row) - 2, 4)}g}"
 
 
 def _changed(change: float) -> str:
@@ -72,7 +78,7 @@ ESTIMATES = (
     Column("", "value", "", _value, where="screen"),
     Column("", "sigma", "", lambda row: _scaled("sigma", row), lambda sigma: f"{sigma:.2g}", "screen"),
     Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
-    Column("unit", "unit", "", lambda row: row.unit, where="screen json", kind=TEXT),
+    Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
     Column("file", "", "", lambda row: _scaled("file", row), where="json"),
     Column("", "file", "", _file, where="screen"),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),

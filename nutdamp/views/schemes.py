@@ -16,7 +16,7 @@ from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
 from nutdamp.views.decisions import COUNT, limit, size
-from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, turning
+from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, turn_floor, turning
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, digits, short_angle, small_angle
 
@@ -184,7 +184,7 @@ def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
     """The floors of impulse, N m s, by name: A|ω0|, and with a target C|ω3|β."""
     yield "A|ω0|", body.least_impulse
     if body.goal.axis is not None:
-        yield "C|ω3|β", turning(body)
+        yield turn_floor(body), turning(body)
 
 
 def _over(whole: float) -> Getter:

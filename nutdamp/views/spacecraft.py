@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -15,6 +16,7 @@ from nutdamp.planning.plan import NO_NUTATION
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.units import screen_unit
 from nutdamp.views.tables import WIDTH, facts
 from nutdamp.views.text import (
     RPM,
@@ -121,8 +123,13 @@ def beyond_floors(spacecraft: Spacecraft) -> str:
     return " and ".join(causes)
 
 
+def turn_floor(spacecraft: Spacecraft) -> str:
+    """Symbol of the least impulse that turns H to its target."""
+    return "|H3|β" if spacecraft.inertia.wheel else "C|ω3|β"
+
+
 def turning(spacecraft: Spacecraft) -> float:
-    """C |ω3| β in N m s; 0 where H points at the target already, but for rounding."""
+    """C |ω3| β in N m s, |H3| β with a wheel; 0 where H points at the target already, but for rounding."""
     return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
 
 
@@ -142,9 +149,13 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
     yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
     if not inertia.symmetric:
-        first, second, _ = inertia.moments
-        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body"
-    yield "spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.spin < 0.0)
+        unit, factor = screen_unit("kg m²")
+        first, second, _ = factor * np.asarray(inertia.moments)
+        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; planned on the equivalent symmetric body"
+    if inertia.wheel:
+        whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
+        yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"
+    yield "spin", spin_text(spacecraft.spin) + ": the spin axis is body axis -3" * (spacecraft.sense < 0.0)
     now = "" if inertia.symmetric else f"{degrees(spacecraft.tilt)} at t = 0, at most "
     cones = f"body cone {degrees(motion.body)} + space cone {degrees(motion.space)}"
     yield "nutation", f"{now}{degrees(motion.nutation)} = {cones}"
@@ -161,7 +172,7 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         turn = quantity(turning(spacecraft), "N m s")
         least = "" if beyond else ", the least to turn H"
         yield "target", direction_text(spacecraft, spacecraft.goal.axis)
-        yield "", f"β = {degrees(spacecraft.to_turn)} from H; C|ω3|β = {turn}{least}"
+        yield "", f"β = {degrees(spacecraft.to_turn)} from H; {turn_floor(spacecraft)} = {turn}{least}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
     yield "actuators", _actuators(spacecraft)

@@ -74,6 +74,20 @@ def sinking(model: DispersedModel, time_constant: float = 15.0) -> DispersedMode
     return DispersedModel(replace(model.spacecraft, dissipation=time_constant), model.schedule)
 
 
+def wheeled(model: DispersedModel, wheel: float, *, spin: float | None = None) -> DispersedModel:
+    """The same with a wheel whose momentum (N m s) is dispersed, and another ``spin`` (rad/s)."""
+    body, given = model.spacecraft, model.spacecraft.dispersions or Dispersions()
+    rates = body.omega0 if spin is None else np.array([*body.omega0[:2], spin])
+    held = replace(
+        body,
+        inertia=replace(body.inertia, wheel=wheel),
+        omega0=rates,
+        nutation_grows=True,
+        dispersions=replace(given, wheel_momentum=normal(4.0)),
+    )
+    return DispersedModel(held, model.schedule)
+
+
 def steered(
     *, moments: tuple[float, float, float] = (120.0, 120.0, 80.0), spin: float = 3.0, scale: float = 1.0
 ) -> DispersedModel:

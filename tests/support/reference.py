@@ -12,6 +12,8 @@ With energy dissipation it is H in space that is integrated, where dissipation c
     dH/dt = R M,      dR/dt = R [I⁻¹ RᵀH + s]×,
 
 s the turn of axis 3 away from H at κ sin θ cos θ. No torque of dissipation stands in these equations.
+
+A ``wheel`` adds its constant momentum h e3 to I ω, wherever H stands.
 """
 
 from __future__ import annotations
@@ -71,11 +73,11 @@ def vector(*components: float) -> Array:
     return np.array(components, dtype=float)
 
 
-def frame_n(moments: Sequence[float], rates: Array) -> Array:
+def frame_n(moments: Sequence[float], rates: Array, wheel: float = 0.0) -> Array:
     """Rotation body -> N: z along H, the spin axis in the half plane x >= 0 of x-z, or body axis 1 along x."""
-    h = np.asarray(moments) * rates
+    h = np.asarray(moments) * rates + vector(0, 0, wheel)
     z = h / np.linalg.norm(h)
-    spin_axis = vector(0, 0, math.copysign(1, rates[2]))
+    spin_axis = vector(0, 0, math.copysign(1, h[2]))
     y = np.cross(z, spin_axis)
     if not y.any():
         y = np.cross(z, vector(1, 0, 0))
@@ -83,9 +85,9 @@ def frame_n(moments: Sequence[float], rates: Array) -> Array:
     return np.array([np.cross(y, z), y, z])
 
 
-def momentum(moments: Sequence[float], motion: Motion) -> Array:
+def momentum(moments: Sequence[float], motion: Motion, wheel: float = 0.0) -> Array:
     """H in the inertial frame, (3,) N m s."""
-    return np.asarray(motion.rotation @ (np.asarray(moments) * motion.rates))
+    return np.asarray(motion.rotation @ (np.asarray(moments) * motion.rates + vector(0, 0, wheel)))
 
 
 def energy(moments: Sequence[float], rates: Array) -> float:
@@ -99,9 +101,9 @@ def angle(u: Array, v: Array) -> float:
     return 2 * math.atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
 
 
-def nutation(moments: Sequence[float], rates: Array, sense: float) -> float:
+def nutation(moments: Sequence[float], rates: Array, sense: float, wheel: float = 0.0) -> float:
     """Angle between H and the spin axis ``sense``·e3, rad."""
-    return angle(np.asarray(moments) * rates, vector(0, 0, sense))
+    return angle(np.asarray(moments) * rates + vector(0, 0, wheel), vector(0, 0, sense))
 
 
 def turned(first: Array, second: Array) -> float:
@@ -142,7 +144,12 @@ def _turning(rotation: Sequence[float], p: float, q: float, r: float) -> list[fl
 
 
 def coast(
-    moments: Sequence[float], motion: Motion, torque: Array, times: Array, growing: Array | None = None
+    moments: Sequence[float],
+    motion: Motion,
+    torque: Array,
+    times: Array,
+    growing: Array | None = None,
+    wheel: float = 0.0,
 ) -> list[Motion]:
     """The motion at ``times`` (n,) s > 0 under a constant body torque, or one ``growing`` by so many (3,) N m/s."""
     A, B, C = (float(one) for one in moments)
@@ -152,8 +159,8 @@ def coast(
     def slope(t: float, y: Array) -> list[float]:
         p, q, r, *rotation = y.tolist()  # component by component: quicker than small arrays
         return [
-            (m1 + g1 * t - (C - B) * q * r) / A,
-            (m2 + g2 * t - (A - C) * r * p) / B,
+            (m1 + g1 * t - (C - B) * q * r - q * wheel) / A,
+            (m2 + g2 * t - (A - C) * r * p + p * wheel) / B,
             (m3 + g3 * t - (B - A) * p * q) / C,
             *_turning(rotation, p, q, r),
         ]
@@ -173,7 +180,9 @@ def coast(
     return [Motion(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
 
 
-def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Array, growth: float) -> list[Motion]:
+def sinking(
+    moments: Sequence[float], motion: Motion, torque: Array, times: Array, growth: float, wheel: float = 0.0
+) -> list[Motion]:
     """`coast` of a body in which energy dissipation lets a small nutation grow at the rate ``growth`` κ, 1/s."""
     A, B, C = (float(one) for one in moments)
     x, y_, z = (float(one) for one in torque)
@@ -184,17 +193,18 @@ def sinking(moments: Sequence[float], motion: Motion, torque: Array, times: Arra
         u1, u2, u3 = ((a * hx + d * hy + g * hz), (b * hx + e * hy + h * hz), (c * hx + f * hy + i * hz))
         # s = κ (u·e3) (u × e3), u the direction of H in the body.
         sinks = growth * u3 / (size * size)
-        p, q, r = u1 / A + sinks * u2, u2 / B - sinks * u1, u3 / C
+        p, q, r = u1 / A + sinks * u2, u2 / B - sinks * u1, (u3 - wheel) / C
         rates = [a * x + b * y_ + c * z, d * x + e * y_ + f * z, g * x + h * y_ + i * z]
         return [*rates, *_turning([a, b, c, d, e, f, g, h, i], p, q, r)]
 
-    h0 = momentum(moments, motion)
+    h0 = momentum(moments, motion, wheel)
     y0 = np.concatenate([h0, motion.rotation.ravel()])
     atol = np.array([RTOL * float(np.linalg.norm(h0))] * 3 + [RTOL] * 9)
     solution = solve_ivp(slope, (0.0, float(times[-1])), y0, method="DOP853", t_eval=times, rtol=RTOL, atol=0.1 * atol)
     assert solution.success
     found = [(y[:3], y[3:].reshape(3, 3)) for y in solution.y.T]
-    return [Motion(rotation.T @ h / np.asarray(moments), rotation) for h, rotation in found]
+    inner = vector(0, 0, wheel)
+    return [Motion((rotation.T @ h - inner) / np.asarray(moments), rotation) for h, rotation in found]
 
 
 def fly(
@@ -204,10 +214,11 @@ def fly(
     until: float,
     rotation: Array | None = None,
     growth: float = 0.0,
+    wheel: float = 0.0,
 ) -> Motion:
     """The motion at ``until`` s, kicks at that moment included; restarts at every edge of a torque."""
     events = list(events)
-    start = frame_n(moments, rates) if rotation is None else rotation
+    start = frame_n(moments, rates, wheel) if rotation is None else rotation
     motion, now = Motion(np.asarray(rates, dtype=float), start), 0.0
     edges = {0.0, until}
     for event in events:
@@ -222,9 +233,9 @@ def fly(
             torque = torque + sum((e.at(now) for e in swelling), np.zeros(3))
             span = np.array([edge - now])
             found = (
-                sinking(moments, motion, torque, span, growth)
+                sinking(moments, motion, torque, span, growth, wheel)
                 if growth
-                else coast(moments, motion, torque, span, growing)
+                else coast(moments, motion, torque, span, growing, wheel)
             )
             motion, now = found[0], edge
         for event in events:

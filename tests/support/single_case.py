@@ -27,7 +27,7 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
     count, dynamics = number_of(cases), make_dynamics(model.spacecraft)
     moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
-    bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing)
+    bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
     fired = propagated.fly(model, bodies, rates, upright, cases, propagated.seen_nominally(model))
     pulses = zip(cases.impulses, fired.seen, strict=True)
     impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
@@ -66,7 +66,7 @@ def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]
         per_kg = one, two, three
     true = replace(
         body,
-        inertia=replace(body.inertia, moments=(first, second, third)),
+        inertia=replace(body.inertia, moments=(first, second, third), wheel=float(np.squeeze(case.wheel))),
         omega0=np.array(case.omega0, dtype=float),
         attitude=Attitude(quaternion),
         tank=None if body.tank is None else replace(body.tank, inertia_per_kg=per_kg),
@@ -93,7 +93,7 @@ def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
     true, schedule = realised(model, draws)
     made = propagation.flown(true, schedule)
     settled, left = made.settled, made.residual
-    momentum = attitude.rotate(settled.quaternion, settled.rates * np.asarray(made.last_moments))
+    momentum = made.last_momentum
     target = attitude.rotate(model.spacecraft.initial.quaternion, model.target)
     propellant = model.cases(draws).propellant
     return np.array(

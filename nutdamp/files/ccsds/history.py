@@ -187,7 +187,7 @@ def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> R
         raise BadRequest("the spacecraft file has no attitude.epoch to count the times of a history from")
     if history.frame is not None and given.frame not in (None, history.frame):
         raise BadRequest(f"the history is in {history.frame}, the spacecraft file in {given.frame}: expected one frame")
-    axis = math.copysign(1.0, spacecraft.spin) * spacecraft.inertia.axes[:, 2]
+    axis = spacecraft.sense * spacecraft.inertia.axes[:, 2]
     signals = dict(zip(AXIS, attitude.rotate(history.quaternions, axis).T, strict=True))
     if history.rates is not None:
         signals |= dict(zip(GYROS, history.rates.T, strict=True))

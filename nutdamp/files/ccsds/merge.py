@@ -56,7 +56,7 @@ def merged_text(source: Source, motion: MessageMotion, *, inertia: bool) -> str:
     before = source.read(lambda _: None)
     after = before
     if inertia and motion.tensor is not None:
-        after = replace(after, inertia=Inertia(*principal_axes(motion.tensor)))
+        after = replace(after, inertia=Inertia(*principal_axes(motion.tensor), before.inertia.wheel))
     axes = after.inertia.axes
     rates = before.rates if motion.rates is None else motion.rates
     after = replace(after, omega0=axes.T @ rates)

@@ -41,7 +41,7 @@ def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> I
         starts = STARTS if abs(channel.transverse) > 1e-12 * abs(channel.axial) else 1
         for number in range(starts):
             start = spacecraft.limits.earliest + number / starts * spacecraft.nutation_period
-            for turns in (0.0, 2.0 * math.pi / abs(spacecraft.spin)):
+            for turns in (0.0, 2.0 * math.pi / spacecraft.fastest):
                 schedule = _schedule(spacecraft, channel, start, turns, fly)
                 if schedule is not None:
                     yield schedule

@@ -241,14 +241,14 @@ def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, co
         / inertia.C
     )
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    stays = inertia.C * (abs(spacecraft.spin) + faster) * math.tan(allowed.nutation)
+    stays = (abs(spacecraft.axial) + inertia.C * faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
         return 0.0
     low, wide = _arcs(
         [
             (min(phases) - wider, max(phases) + wider)
             for begins, ends in slackened(free_windows(spacecraft))
-            for phases in [(inertia.a * spacecraft.spin * begins, inertia.a * spacecraft.spin * ends)]
+            for phases in [(spacecraft.nutation_rate * begins, spacecraft.nutation_rate * ends)]
             for wider in [abs(inertia.a) * faster * max(ends - limits.earliest, 0.0)]
         ]
     )
@@ -270,7 +270,7 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, a
     final = spacecraft.goal.spin
     assert final is not None
     C, off = spacecraft.inertia.C, abs(final) * allowed.spin
-    stays = C * (abs(final) + off) * math.tan(allowed.nutation)
+    stays = (abs(spacecraft.inertia.axial(final)) + C * off) * math.tan(allowed.nutation)
     change = final - spacecraft.spin
     change = math.copysign(max(abs(change) - off, 0.0), change)
     goal = complex(max(spacecraft.least_impulse - stays, 0.0), C * change)
@@ -288,11 +288,11 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, a
 
 
 def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of the way of H to the direction of the target, round the sphere of radius C|ω3|."""
+    """Least cost of the way of H to the direction of the target, round the sphere of radius |H3|."""
     nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
     way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
     dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
-    return spacecraft.inertia.C * abs(spacecraft.spin) * way / dearest * (1.0 - ROUNDING)
+    return abs(spacecraft.axial) * way / dearest * (1.0 - ROUNDING)
 
 
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:

@@ -103,7 +103,7 @@ class ChanceModel:
     def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
         self.program, self.uncertain, self.limits = program, uncertain, limits
         body = program.spacecraft
-        self.pace = np.array([body.inertia.a * body.spin, body.spin])
+        self.pace = np.array([body.nutation_rate, body.spin])
         self.goal = np.array([complex(goal[0], goal[1]), complex(goal[2], goal[3]), goal[4]])
         self.turn = 2.0 * np.pi / max(abs(self.pace[0]), abs(self.pace[1]))
         self.count = int(self.turn_of(np.array([program.end]))[0]) + 1

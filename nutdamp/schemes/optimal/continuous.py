@@ -116,8 +116,7 @@ def _small_angles(problem: Problem) -> Influence:
 
 def _slot(problem: Problem) -> float:
     """Width of a slot, s, where there is room for as many."""
-    body = problem.spacecraft
-    return 2.0 * math.pi / max(abs(body.inertia.a * body.spin), abs(body.spin)) / SLOTS
+    return 2.0 * math.pi / problem.spacecraft.fastest / SLOTS
 
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:

@@ -84,7 +84,7 @@ class Task:
         self.unit = size / np.linalg.norm(self.torques, axis=1)
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
-        self.pace = min(1.0 / abs(body.spin), body.inertial_period)
+        self.pace = min(1.0 / body.fastest, body.inertial_period)
         dynamics, start = make_dynamics(body), body.initial
         self._forced = _Forces(dynamics.constant, dynamics.forcing)
         self._coasting = _Forces(np.zeros(3), dynamics.forcing._replace(turning=()))
@@ -111,7 +111,7 @@ class Task:
         shift[inertial @ self._target < 0.0] += self.momentum  # the other way round is no solution
         if self.loose:
             shift = shift - self.off * x[:, -2:]
-        spin = momentum[2] - self.body.inertia.C * self.spin
+        spin = momentum[2] - self.body.inertia.axial(self.spin)
         return np.asarray(np.column_stack([momentum[:2].T, shift, spin])[:, self.chosen] / self.momentum)
 
     def _in_turn(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
@@ -132,7 +132,7 @@ class Task:
                 batch.advance(batch.MotionStretch(bodies, now, rates, turn), begin - now)
                 batch.advance(batch.MotionStretch(bodies, begin, rates, turn, torque), on_time)
                 now = begin + on_time
-        return rates * moments, turn
+        return bodies.momentum(rates), turn
 
     def _together(self, which: Indices, x: Vector, kicks: int) -> tuple[Vector, Vector]:
         """`_in_turn` of a body without external torque, all stretches at once.
@@ -143,6 +143,7 @@ class Task:
         """
         count, n = which.shape
         (A, _, C), rates, turn = self._start
+        wheel = self._coasting.forcing.wheel
         parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
@@ -152,9 +153,10 @@ class Task:
             widths = np.zeros_like(starts)
         coasts = np.diff(starts, axis=1, prepend=0.0)
         coasts[:, 1:] -= widths[:, :-1]
-        axial = C * rates[2] + np.cumsum(impulses[:, :, 2], axis=1)
+        axial = C * rates[2] + wheel + np.cumsum(impulses[:, :, 2], axis=1)
         before, pace = axial - impulses[:, :, 2], 1.0 / C - 1.0 / A
-        turned, within = pace * before * coasts, pace * (before + 0.5 * impulses[:, :, 2]) * widths
+        turned = (pace * before - wheel / C) * coasts
+        within = (pace * (before + 0.5 * impulses[:, :, 2]) - wheel / C) * widths
         phase = np.cumsum(turned + within, axis=1)
         begun = np.exp(1j * (phase - within))  # as each pulse begins
         added = impulses[:, :, 0] + 1j * impulses[:, :, 1]
@@ -189,7 +191,8 @@ class Task:
         """
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        rates = np.array([across.real.ravel(), across.imag.ravel(), before.ravel()]) / moments
+        spinning = before.ravel() - self._coasting.forcing.wheel
+        rates = np.array([across.real.ravel(), across.imag.ravel(), spinning]) / moments
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
         stretch = batch.MotionStretch(bodies, np.zeros(count), rates, turns, self.torques[which].reshape(-1, 3).T)

@@ -179,7 +179,7 @@ class Program:
 
     def __post_init__(self) -> None:
         body, limits = self.spacecraft, self.spacecraft.limits
-        slot = 2 * math.pi / max(abs(body.inertia.a * body.spin), abs(body.spin)) / SLOTS
+        slot = 2 * math.pi / body.fastest / SLOTS
         self.end = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
         count = max(math.ceil((self.end - limits.earliest) / slot), 1)
         edges = np.linspace(limits.earliest, self.end, count + 1)

@@ -219,7 +219,7 @@ class Problem:
         off = 0.0
         if self.options.shift is not None and equations.shift:
             final = body.spin if body.goal.spin is None else body.goal.spin
-            off = body.inertia.C * abs(final) * math.sin(min(self.options.shift, 0.5 * math.pi))
+            off = abs(body.inertia.axial(final)) * math.sin(min(self.options.shift, 0.5 * math.pi))
         return Program(body, self.channels, self.costs, aim, off=off)
 
     def within(self, horizon: float) -> Spacecraft:
@@ -341,9 +341,9 @@ class Problem:
         if most * largest >= body.least_impulse:
             return ""
         return (
-            f"limits.max_pulses = {most} is too few: so many pulses give at most {most * largest:.4g} N m s, and "
-            f"taking out the nutation takes {body.least_impulse:.4g} N m s, "
-            f"{math.ceil(body.least_impulse / largest)} pulses or more"
+            f"limits.max_pulses = {most} is too few: so many pulses give at most "
+            f"{100.0 * most * largest / body.least_impulse:.4g} % of the impulse that takes out the nutation, "
+            f"{math.ceil(body.least_impulse / largest)} pulses or more all of it"
         )
 
     def cure(self, long_enough: Callable[[float], float | None]) -> str:

@@ -106,7 +106,7 @@ def small_angles(spacecraft: Spacecraft, equations: EndEquations) -> Influence:
     every = np.array([*there, *shift, inertia.C * (final - spin)])
 
     def rows(times: Vector) -> Vector:
-        turned = np.exp(1j * np.outer(times, [inertia.a * spin, spin]))
+        turned = np.exp(1j * np.outer(times, [spacecraft.nutation_rate, spin]))
         turned[:, 0] *= np.exp(np.minimum(-growth * (times - last), 0.0))
         shifts = np.zeros((len(times), 2, 3))
         shifts[:, :, :2] = _complex_product(turned[:, 1])
@@ -137,14 +137,14 @@ def misses(flight: Flight, equations: EndEquations) -> Vector:
     body, end = flight.spacecraft, flight.settled
     back = _turned_back(flight, np.array([flight.schedule.end]))[0]
     nutation = body.inertia.A * end.omega * back
-    momentum = attitude.rotate(end.quaternion, end.rates * np.asarray(flight.last_moments))
+    momentum = flight.last_momentum
     final = end.spin if body.goal.spin is None else body.goal.spin
     shift = square_to_target(body) @ momentum
     return np.array([nutation.real, nutation.imag, *shift, body.inertia.C * (end.spin - final)])[equations.chosen]
 
 
 def _turning(spacecraft: Spacecraft) -> Vector:
-    return np.repeat([spacecraft.inertia.a * spacecraft.spin, spacecraft.spin, 0.0], [2, 2, 1])
+    return np.repeat([spacecraft.nutation_rate, spacecraft.spin, 0.0], [2, 2, 1])
 
 
 def square_to_target(spacecraft: Spacecraft) -> Vector:
@@ -159,7 +159,7 @@ def square_to_target(spacecraft: Spacecraft) -> Vector:
 
 
 def _turned_back(flight: Flight, times: Vector) -> Vector:
-    """e^{ia∫ω3dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
+    """e^{i∫ν dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
     spacecraft, schedule = flight.spacecraft, flight.schedule
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
     if spacecraft.growth != 0.0:
@@ -169,17 +169,17 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
-    return np.asarray(np.exp(1j * inertia.a * turned))
+    return np.asarray(np.exp(1j * (inertia.a * turned - inertia.wheel / inertia.A * times)))
 
 
 def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
-    """Factor `_turned_back` where dissipation changes ω3: on coasts ω/ω3, or tan θ, grows by e^{κt} exactly."""
-    body = flight.spacecraft
+    """Factor `_turned_back` where dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly."""
+    body, inertia = flight.spacecraft, flight.spacecraft.inertia
     knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
     grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
-    least = math.exp(-MOST_GROWN) * abs(body.spin)
-    now, then = (np.maximum(np.abs(np.interp(at, knots, spins)), least) for at in (times, flight.schedule.end))
-    phase = body.inertia.a * np.interp(times, knots, turned)
+    least, axial = math.exp(-MOST_GROWN) * abs(body.axial), inertia.axial(spins)
+    now, then = (np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, flight.schedule.end))
+    phase = inertia.a * np.interp(times, knots, turned) - inertia.wheel / inertia.A * times
     return np.asarray(np.exp(1j * phase + grown) * then / now)
 
 
@@ -212,7 +212,7 @@ class PulseParameters:
         names = {channel.name: channel for channel in spacecraft.channels}
         self.channels = [names[pulse.channel] for pulse in schedule]
         self.original = schedule
-        pace = 1.0 / abs(spacecraft.spin)
+        pace = 1.0 / spacecraft.fastest
         self.room = rooms(spacecraft, schedule.pulses)
         start: list[float] = []
         scale: list[float] = []

@@ -21,12 +21,11 @@ from support.spinners import commanded, flown_by_reference
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.closed_form import ClosedForm, nodes_for
-from nutdamp.montecarlo.propagated import RealWidths, largest_nutation
+from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
-from nutdamp.physics.triaxial import arc_cones
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
 from nutdamp.spacecraft.model import Disturbance, Inertia
@@ -44,10 +43,13 @@ SYMMETRIC = {
     "steerable, oblate, spin reversed": STEERED,
     "prolate, dissipation": dispersed.sinking(PROLATE),
     "oblate, dissipation": dispersed.sinking(STEERED, 4.0),
+    "despun, a wheel": dispersed.wheeled(PROLATE, 180.0, spin=0.0),
+    "a wheel against the spin, dissipation": dispersed.wheeled(dispersed.sinking(STEERED, 20.0), 700.0),
 }
 THREE = {
     "three moments": dispersed.with_jets(moments=(120.0, 105.0, 80.0)),
     "three moments, oblate, spin reversed": dispersed.with_jets(moments=(80.0, 95.0, 120.0), spin=-2.0),
+    "middle moment, a wheel": dispersed.wheeled(dispersed.with_jets(moments=(80.0, 120.0, 95.0)), 400.0),
 }
 LEAKS = (Disturbance(0.02 + 0.01j, 0.05), Disturbance(0.03 + 0.0j, rate=-3.0))
 LEAKING = DispersedModel(replace(PROLATE.spacecraft, disturbances=LEAKS, dissipation=400.0), PROLATE.schedule)
@@ -66,7 +68,7 @@ def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> Non
     model = SYMMETRIC[name]
     draws = dispersed.first_cases(Study(model), CASES)
     by_sum = outputs(ClosedForm, model, draws)
-    estimate = np.asarray(model.spacecraft.inertia.moments) * model.spacecraft.omega0
+    estimate = model.spacecraft.inertia.momentum(model.spacecraft.omega0)
     for case in range(0, CASES, 5):
         one = dispersed.one_of(draws, case)
         true, made = realised(model, one)
@@ -74,14 +76,15 @@ def test_the_impulse_sum_agrees_with_an_independent_integrator(name: str) -> Non
             reference.Kick(pulse.t, np.array([acting.real, acting.imag, pulse.impulse[2]]))
             for pulse, acting in zip(made, propagation.effective_impulses(true, made), strict=True)
         ]
-        moments, until = true.inertia.moments, max(pulse.t for pulse in made)
-        end = reference.fly(moments, true.omega0, kicks, until, np.eye(3), true.growth)
-        momentum = reference.momentum(moments, end)
+        moments, until, wheel = true.inertia.moments, max(pulse.t for pulse in made), true.inertia.wheel
+        end = reference.fly(moments, true.omega0, kicks, until, np.eye(3), true.growth, wheel)
+        momentum = reference.momentum(moments, end, wheel)
+        begun = reference.momentum(moments, reference.Motion(true.omega0, np.eye(3)), wheel)
         # The axis error: H in the estimated body axes, from the true ones by the tilt, against H of the estimate.
         pointed = Rotation.from_rotvec([one["attitude x"], one["attitude y"], 0.0]).apply(momentum)
         expected = [
-            reference.nutation(moments, end.rates, math.copysign(1.0, true.spin)),
-            reference.angle(np.asarray(moments) * true.omega0, momentum),
+            reference.nutation(moments, end.rates, math.copysign(1.0, begun[2]), wheel),
+            reference.angle(begun, momentum),
             reference.angle(pointed, estimate),
             end.rates[2] - true.spin,
         ]
@@ -153,6 +156,7 @@ FLOWN = {
     "disturbances, dissipation": LEAKING,
     "prolate, dissipation": SYMMETRIC["prolate, dissipation"],
     "oblate, dissipation": dispersed.sinking(STEERED, 5.0),
+    "despun, a wheel": SYMMETRIC["despun, a wheel"],
     **THREE,
 }
 
@@ -167,23 +171,11 @@ def test_through_real_widths_each_case_is_the_flight_of_its_own_spacecraft(name:
         assert flown[:, case] == pytest.approx(flown_outputs(model, one), abs=1e-10, nan_ok=True)
 
 
-def test_largest_nutation_of_many_is_that_of_each() -> None:
-    """Prolate, oblate and intermediate axes, small and large angles, motions over the separatrix, reversed spin."""
-    generator = np.random.default_rng(12)
-    moments = generator.uniform(50.0, 100.0, (3, 400))
-    momentum = generator.normal(size=(3, 400)) * [[30.0], [30.0], [200.0]]
-    momentum[:2, :20] *= 1e-7
-    largest = largest_nutation(moments, tuple(momentum), 1.0)
-    for case in range(400):
-        first, second, third = (float(moment) for moment in moments[:, case])
-        expected = arc_cones((first, second, third), momentum[:, case] / moments[:, case], 1.0)
-        assert largest[case] == pytest.approx(expected.nutation, rel=1e-9, abs=1e-15), case
-
-
 BLOCKS = {
     "spin reversed": by_blocks(),
     "spin": by_blocks(spin=1.3),
     "three moments": by_blocks(spin=2.0, moments=(110.0, 98.0, 150.0)),
+    "a wheel": dispersed.wheeled(by_blocks(spin=1.3), 60.0),
     "disturbances": by_blocks(disturbances=(Disturbance(0.02 + 0.01j, 0.03), LEAKS[1])),
 }
 

@@ -63,8 +63,9 @@ def turned(first: Array, second: Array) -> float:
 
 def extremes(moments: Sequence[float] | Array, rates0: Sequence[float] | Array) -> tuple[float, float]:
     """Least and largest nutation angle."""
-    least, largest = triaxial._extreme_cones(moments, rates0)
-    return least.nutation, largest.nutation
+    sense = math.copysign(1.0, rates0[2])
+    least, largest = (triaxial.arc_cones(moments, rates0, end * sense).nutation for end in (-1.0, 1.0))
+    return math.pi - least, largest
 
 
 def flown(moments: Sequence[float] | Array, rates0: Sequence[float] | Array, times: Array) -> tuple[Array, Array]:
@@ -131,7 +132,8 @@ def test_rates_to_every_digit(moments: list[float], rates0: list[float], until: 
 def test_on_the_separatrix_it_ends_in_a_spin_about_the_middle_axis(rates0: list[float]) -> None:
     moments = [1.5, 2.0, 3.0]
     assert triaxial.nutation_period(moments, rates0) == math.inf
-    assert extremes(moments, rates0)[1] == pytest.approx(math.pi / 2, rel=1e-15)
+    # A rounding of the rates moves the largest angle by the root of it.
+    assert extremes(moments, rates0)[1] == pytest.approx(math.pi / 2, abs=2e-8)
     (end,) = triaxial.free_rates(moments, rates0, [1e4])
     assert abs(end[[0, 2]]).max() < 1e-300
     assert moments[1] * abs(end[1]) == pytest.approx(np.linalg.norm(np.multiply(moments, rates0)), rel=1e-14)
@@ -215,7 +217,8 @@ def test_rates_that_stay() -> None:
         half = 0.5 * size * times[:, None]
         by_spin = attitude.multiply(START, np.hstack([np.cos(half), np.sin(half) * np.array(rates0) / (size or 1.0)]))
         assert turned(attitudes, by_spin) < 2e-13
-        assert len(set(extremes(moments, rates0))) == 1
+        least, largest = extremes(moments, rates0)
+        assert least == pytest.approx(largest, rel=1e-15)
 
 
 def test_period_has_its_limits() -> None:

@@ -104,7 +104,7 @@ def test_the_shape_acts_on_omega_as_dop853_says(a: float, axial: float) -> None:
     end = swells[-1].end
     flown = reference.fly((A, A, C), reference.vector(0.05, 0.02, spin), swells, end).rates
     acts, centroid, ramps = valve.thrust(0.9)
-    factor = shape_factor(a, spin, axial / C, ramps, centroid)
+    factor = shape_factor(a * spin, a * axial / C, ramps, centroid)
     jump = axial * acts / C
     omega = (0.05 + 0.02j) * cmath.exp(-1j * a * spin * (0.5 + centroid)) + (8.0 + 3.0j) * acts / A * factor
     omega *= cmath.exp(-1j * a * (spin + jump) * (end - 0.5 - centroid))
@@ -117,8 +117,10 @@ def test_the_shape_factor_of_a_rectangle_is_the_width_factor(turns: Triple) -> N
     """By spin rate, growth and drift."""
     for on_time in (1e-4, 0.3, 9.0):
         _, centroid, ramps = Trapezoid().thrust(on_time)
-        factor = shape_factor(0.4, 3.0, turns[0], ramps, centroid, *turns[1:])
-        assert factor == pytest.approx(response.width_factor(0.4, 3.0, turns[0], on_time, *turns[1:]), abs=1e-13)
+        factor = shape_factor(1.2, 0.4 * turns[0], ramps, centroid, turns[1], 0.4 * turns[2])
+        assert factor == pytest.approx(
+            response.width_factor(1.2, 0.4 * turns[0], on_time, turns[1], 0.4 * turns[2]), abs=1e-13
+        )
 
 
 def test_cold_pulses_warm_up_and_blowdown_keeps_pressure_times_volume() -> None:

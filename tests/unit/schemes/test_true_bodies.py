@@ -130,7 +130,7 @@ def test_steady_omega_is_the_forced_term_where_the_disturbance_beats_within_the_
     spacecraft, times = under(Disturbance(0.3 + 0.1j, rate=2.0)), np.linspace(0.0, 5.0, 7)
     shape, start = spacecraft.inertia, steady_omega(spacecraft, 0.0)
     torque = np.array([0.3 + 0.1j]), np.array([2.0])
-    moved = response.rotating_torques(times, start, spacecraft.spin, shape.A, shape.C, *torque)
+    moved = response.rotating_torques(times, start, shape.nutation_rate(spacecraft.spin), shape.A, *torque)
     assert moved == pytest.approx(np.array([steady_omega(spacecraft, time) for time in times]), rel=1e-12)
     for beats, settles in ((0.9, False), (1.1, True)):
         rate = 2.0 * math.pi * beats / EXAMPLE.horizon - EXAMPLE.inertia.a * EXAMPLE.spin

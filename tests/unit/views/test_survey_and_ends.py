@@ -142,7 +142,7 @@ def test_the_forced_tilt_stays_and_the_beat_swells_from_rest() -> None:
         swollen = propagation.flown(body, Schedule(), effect.beat_period).sampled(401, effect.beat_period).nutation
         assert swollen.max() == pytest.approx(effect.beat, rel=1e-4)
         assert swollen[-1] < 1e-12
-        steady = response.steady_response(A, C, 3.0, torque, rate)
+        steady = response.steady_response(A, (A - C) / A * 3.0, torque, rate)
         assert effect.precession == pytest.approx(abs(steady), rel=1e-12)
         assert precession is None or effect.precession == pytest.approx(precession, rel=1e-12)
         kept = replace(body, omega0=np.array([steady.real, steady.imag, 3.0]))
