@@ -180,7 +180,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     """The files of a certificate, if there is one."""
     if proof is None:
         return {}
-    from nutdamp.figures.certificate import certificate_figure
+    from nutdamp.figures.trade import certificate_figure
     from nutdamp.views.plan_json import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}

@@ -13,12 +13,13 @@ from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
+from nutdamp.estimation.signals import KIND
 from nutdamp.files.fitted import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, percent
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0
@@ -33,9 +34,10 @@ MOST_PAIRS = 6
 
 def in_shown(signal: str) -> tuple[str, float]:
     """Unit in which a signal is shown, and its factor from SI."""
-    if signal == "acceleration":
-        return screen_unit("m/s²")
-    return ("ms", 1e3) if signal == "sun_pulse" else ("deg" if signal == "axis" else "deg/s", 180.0 / math.pi)
+    unit = KIND[signal].unit
+    if unit == "s":
+        return "ms", 1e3
+    return (unit.replace("rad", "deg"), 180.0 / math.pi) if unit.startswith("rad") else screen_unit(unit)
 
 
 def _unit(row: Estimate) -> tuple[str, float]:
@@ -138,6 +140,11 @@ def _probe(row: Prospect) -> str | None:
 def prospect_table(ahead: Outlook) -> DataTable:
     """A row for each coast and probe pulse of the forecast."""
     level = exact_percent(ahead.probability)
+
+    def gain(row: Prospect) -> float | None:
+        rate = ahead.gain(row)
+        return None if rate is None else math.degrees(rate)
+
     columns = (
         Column("coast_s", "", "", lambda row: row.length, where="json"),
         Column("", "coast", "s", lambda row: f"{row.length:.4g}" + " (now)" * (row is ahead.now), where="screen",
@@ -156,6 +163,11 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("", "comply", "%", lambda row: None if row.met is None else 100.0 * row.met,
                lambda share: f"{share:.4g}", "screen"),
         Column("propellant_kg", "", "", lambda row: row.propellant, where="json"),
+        Column("", Shared.PROPELLANT, "g", lambda row: row.propellant and 1e3 * row.propellant, lambda kg: f"{kg:.3g}",
+               "screen"),
+        Column("gain_deg_kg", "", "", gain, where="json"),
+        Column("", "gain", "deg/g", lambda row: (rate := gain(row)) and 1e-3 * rate, lambda rate: f"{rate:.2g}",
+               "screen"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
@@ -209,6 +221,10 @@ def advice(ahead: Outlook) -> Iterator[str]:
         if probe.propellant is not None and ahead.propellant is not None:
             spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
             yield f"the probe pulse takes {spent}"
+        thrifty = ahead.thrifty
+        if thrifty is not None and thrifty is not probe:
+            takes = f"{mass(thrifty.propellant or 0.0)}, {degrees(thrifty.nutation)} left"
+            yield f"most is gained per propellant by the probe pulse of {thrifty.probe} ({takes})"
     elif ahead.probes:
         yield "no single probe pulse of a channel of the plan pays"
 
@@ -279,5 +295,6 @@ def _outlook(ahead: Outlook) -> dict[str, Any]:
         "probability": ahead.probability,
         "longer_coast_s": None if longer is None else longer.length,
         "probe": None if probe is None else probe.probe,
+        "probe_per_propellant": None if ahead.thrifty is None else ahead.thrifty.probe,
         "prospects": prospect_table(ahead).json(),
     }

@@ -148,6 +148,17 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
+def angle_of(path: str) -> Callable[[Any], float | None]:
+    """Value of a column: the angle of a row at a dotted ``path`` of attributes, in degrees; None where one is None."""
+
+    def value(row: Any) -> float | None:
+        for name in path.split("."):
+            row = None if row is None else getattr(row, name)
+        return None if row is None else math.degrees(row)
+
+    return value
+
+
 def always(_: Any) -> bool:
     """True: the column belongs to every table of its kind."""
     return True

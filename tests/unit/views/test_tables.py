@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from types import SimpleNamespace as Row
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
 from nutdamp.units import US, screen_units
 from nutdamp.views.pulses import block_table, pulse_table
-from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable, angle_of
 from nutdamp.views.text import vector
 
 TABLE = DataTable(
@@ -95,6 +96,12 @@ def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str
     dated, valves = plan.spacecraft.utc(0.0) is not None, plan.pulses.through_valves
     assert names == (*PULSES_HEADER, *(EFFECTIVE * valves), *(("utc",) * dated))
     assert tuple(next(csv.reader(io.StringIO(block_table(plan.flight).csv())))) == BLOCKS_HEADER
+
+
+def test_an_angle_of_a_row_is_in_degrees_and_unknown_where_a_step_to_it_is() -> None:
+    end = angle_of("flight.end")
+    assert end(Row(flight=Row(end=math.pi))) == 180.0
+    assert (end(Row(flight=None)), end(Row(flight=Row(end=None)))) == (None, None)
 
 
 def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
