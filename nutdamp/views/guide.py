@@ -211,8 +211,8 @@ def found(requested: str) -> Topic:
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
     if name in NAMES:
         return page_or_topic(name)
-    if name == "energy-sink":
-        return page_or_topic("dissipation")
+    if name in (other := {"energy-sink": "dissipation", "gyrostat": "wheel"}):
+        return page_or_topic(other[name])
     if _FIGURE.fullmatch(name):
         return page_or_topic("figures")
     if match := _NUMBER.fullmatch(requested.strip().casefold()):
