@@ -35,7 +35,7 @@ def record(
     """Gyros of a coast of 200 s at 4 Hz with noise, and the true rates at t = 0."""
     draw = np.random.default_rng([59, seed])
     rates = body.omega0 * 1.03
-    times = np.arange(1, 800) * 0.25
+    times = np.asarray(np.arange(1, 800) * 0.25, dtype=float)
     start = reference.Motion(rates, reference.frame_n(moments, rates, wheel))
     motions = (
         reference.sinking(moments, start, np.zeros(3), times, growth, wheel)
