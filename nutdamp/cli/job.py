@@ -233,7 +233,7 @@ class Job:
         self._expect_picture()
         self.source = self.given.source(self.remark)
         body = self.source.read(lambda doubt: say(doubt.as_warning))
-        self.spacecraft = self.aim.applied(body, self.remark) if any(self.aim) else body
+        self.spacecraft = self.aim.applied(body, self.remark) if any(given is not None for given in self.aim) else body
         from nutdamp.files.tabular import check_place
 
         for path in filter(None, self.written.values()):

@@ -7,10 +7,7 @@ from typing import NamedTuple
 
 from nutdamp.errors import nearest
 from nutdamp.files.fields import RIGHT_ANGLE, KeyPath
-from nutdamp.files.rules import (
-    Facts,
-    Finding,
-)
+from nutdamp.files.rules import Facts, Finding, inertia_of
 from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, READING, VALVE_TIMES, by_name, size_of
 from nutdamp.files.thruster_rules import instead, moments_of, thrusts
 from nutdamp.files.yaml import Node
@@ -232,7 +229,7 @@ def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
             continue
         if key == "omega0" and isinstance(node.value, list):
             for index, _ in node.children():
-                yield ToleranceEntry((*path, index), kind, _spin(facts) if index == 2 else None, "the spin")
+                yield ToleranceEntry((*path, index), kind, *(_spin(facts) if index == 2 else (None, "")))
         elif key in BY_THRUSTER and isinstance(node.value, dict) and by_name(node.value):
             for name, _ in node.children():
                 nominal = forces.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
@@ -251,16 +248,19 @@ def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
         moments = moments_of(facts)
         return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
     if key == "omega0":
-        return _spin(facts), "the spin"
+        return _spin(facts)
     if QUANTITIES[key] == "ratio":
         return 1.0, ""
     return (RIGHT_ANGLE, "a right angle") if QUANTITIES[key] == "angle" else (None, "")
 
 
-def _spin(facts: Facts) -> float | None:
-    """|ω3| about the third axis of the file; None where it is zero or cannot be read."""
+def _spin(facts: Facts) -> tuple[float | None, str]:
+    """|ω3| about the third axis of the file, |H3|/C with a wheel; None where it is zero or cannot be read."""
     spin = facts.number("rate", "omega0", 2) if facts.has("omega0") else facts.number("rate", "state", "spin")
-    return abs(spin) if spin else None
+    inertia = inertia_of(facts)
+    if spin is not None and inertia is not None and inertia.wheel:
+        return abs(inertia.equivalent(spin)) or None, "H3/C"
+    return abs(spin) if spin else None, "the spin"
 
 
 def _thruster_names(facts: Facts) -> Iterator[Finding]:

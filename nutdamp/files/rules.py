@@ -398,13 +398,17 @@ def _motion(facts: Facts) -> Iterator[Finding]:
         yield Finding(("omega0",), "missing; give omega0: [ω1, ω2, ω3], or state: {spin: …, nutation: …}")
     for path, spin in ((("state", "spin"), facts.number("rate", "state", "spin")), _spin_of_omega0(facts)):
         if spin is not None and abs(spin) < SMALLEST and not wheel_of(facts):
-            yield Finding(path, "the spin is zero; expected a rate about axis 3; nothing nutates without it")
+            yield Finding(path, "the spin is zero; expected a rate about axis 3, or a wheel; nothing nutates without")
     spin, inertia = spin_of(facts), inertia_of(facts)
     if spin is not None and inertia is not None and inertia.wheel:
         axial = inertia.axial(spin)
         if abs(axial) <= CANCELLED * abs(inertia.wheel):
             problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s: without momentum nothing nutates"
             yield Finding(("wheel", "momentum"), problem)
+        elif spin == 0.0 and facts.has("sun_sensor"):
+            yield Finding(
+                ("sun_sensor",), "the body does not turn about axis 3: there are no Sun pulses; leave it out", True
+            )
         elif axial * spin < 0.0 and facts.has("sun_sensor"):
             problem = (
                 "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned then"

@@ -359,12 +359,13 @@ EQUATIONS = ("1", "17", "18", "19")
 def _method(compared: Comparison) -> Iterator[Block]:
     """A paragraph on the method, the equations used with their symbols, the sources."""
     unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (not compared.spacecraft.inertia.symmetric)
+    wheel = " With the wheel H3 = Cω3 + h stands for the Cω3 below, and ω3 - H3/A for aω3."
     yield Prose(
         f"Schemes plan on the nominal values of the input file ({', '.join(plan.scheme for plan in compared.plans)}). "
         "Each schedule is then flown: Euler's equations with the true principal moments are integrated through the "
         "real pulse widths by Taylor series, coasts of symmetric bodies as exact arcs. Recommendation, requirement and "
         "verdict go by that flight. By M(17), the impulse sum, each pulse acts at its centre with its effective "
-        f"impulse{unequal}."
+        f"impulse{unequal}.{wheel * (compared.spacecraft.inertia.wheel != 0.0)}"
     )
     chosen = compared.recommended
     topics = [guide.found(number) for number in EQUATIONS]

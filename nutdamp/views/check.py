@@ -246,7 +246,8 @@ def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
 def _spin_axis(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     spin = capability.spin_axis(spacecraft)
     stable = f"stable, p² = {spin.exponent:.4g} / s²" if spin.exponent < 0.0 else "a sphere, no axis is special"
-    unstable = " (not under dissipation)" if spin.kind == "minimum" else ""
+    by_shape = spin.kind == "minimum" and not spacecraft.inertia.wheel
+    unstable = " (not under dissipation)" if by_shape or spacecraft.growth > 0.0 else ""
     yield "spin axis", f"{spin.kind} moment of inertia; {stable}{unstable}"
     body, despun, inertial = spin.rates
     yield "nutation rate", f"{body:.4g} in the body, {despun:.4g} despun, {inertial:.4g} inertially, rad/s"

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.forecast import Outlook, Prospect
-from nutdamp.estimation.parameters import untold
+from nutdamp.estimation.parameters import in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.signals import KIND
 from nutdamp.files.fitted import notes
@@ -195,7 +195,9 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
 def _record(fit: Fit) -> str:
     """Length of the record, and the pulses fired in it."""
     record, values = fit.model.record, fit.named
-    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", fit.model.spacecraft.spin))  # in the body, small angles
+    body = fit.model.spacecraft
+    wheel = values.get("wheel", body.inertia.wheel) / in_moments(body, values)[0]
+    rate = abs((1.0 - values["C/A"]) * values.get("omega_3", body.spin) - wheel)  # in the body, small angles
     turns = f", nutation periods: {record.length * rate / (2.0 * math.pi):.3g}" if rate else ""
     fired = f", pulses fired meanwhile: {len(record.fired)}" if len(record.schedule) else ""
     return f"{record.start:g} s to {record.end:g} s{turns}{fired}"

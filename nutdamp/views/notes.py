@@ -29,14 +29,14 @@ UNITS: dict[str, Callable[[float], str]] = {
     "_deg": lambda value: degrees(math.radians(value)),
     "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,
-    "_s": duration,
     "_Nms": lambda value: quantity(value, "N m s"),
     "_rpm": lambda value: quantity(value, "rpm", 5),
     "_percent": lambda value: f"{value:.3g} %",
     "_share": lambda value: f"{value:.10g} %",
     "_bar": lambda value: quantity(value, "bar"),
+    "_s": duration,
 }
-"""Texts of values by the end of their names."""
+"""Texts of values by the end of their names, the first that fits."""
 
 
 def severity(note: Note) -> str:

@@ -146,6 +146,9 @@ def unsaid(body: Spacecraft) -> list[str]:
         remarks.append("The disturbances of the spacecraft file are not in this message.")
     if body.dissipation is not None:
         remarks.append("The energy dissipation of the spacecraft file is not in this message.")
+    if body.inertia.wheel:
+        momentum = f"{body.inertia.wheel:.9g} N*m*s along principal axis 3"
+        remarks.append(f"The wheel of the spacecraft file, {momentum}, is in no keyword of this message.")
     per_kg = shed(body)
     if per_kg is not None:
         values = ", ".join(f"{moment:.9g}" for moment in per_kg)

@@ -204,7 +204,8 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         plans.append(partial(two_pulse.alternatives, body, TwoPulseOptions()))
     else:
         plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
-        plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
+        if body.spin != 0.0:
+            plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
         plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
     for plan in plans:
         if work.exhausted():

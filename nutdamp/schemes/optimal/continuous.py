@@ -120,7 +120,7 @@ def _slot(problem: Problem) -> float:
 
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:
-    """The cheapest firing of one channel after another in time order; None where there is none, to first order."""
+    """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
     body, channels = problem.spacecraft, problem.channels
     begin = body.limits.earliest
     count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
@@ -149,7 +149,7 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
         return None
     shares = optimum.x[2 * equations :].reshape(len(channels), slots)
-    return _in_order(channels, edges, free, shares * width)
+    return _in_order(channels, edges, free, shares * width) or None
 
 
 def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.intp], times: Vector) -> list[Piece]:

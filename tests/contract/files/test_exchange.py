@@ -119,7 +119,8 @@ def test_what_a_message_leaves_out_is_said() -> None:
     disturbed = varied(plan, disturbances=(Disturbance(0.01 + 0j),), dissipation=600.0)
     tilted = messages.planned("tilted tensor, backwards")
     said = []
-    for other in (disturbed, varied(plan, tank=TANK), tilted):
+    wheeled = varied(plan, inertia=replace(plan.spacecraft.inertia, wheel=-4.0))
+    for other in (disturbed, varied(plan, tank=TANK), tilted, wheeled):
         lines = export_text(other, "apm").partition("MAN_START")[0].splitlines()
         said += [line for line in lines if re.match("COMMENT (?!nutdamp)", line) and line not in usual]
     check_text("files.apm-comments", "\n".join(said))

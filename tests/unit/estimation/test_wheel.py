@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import math
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 from support import reference
 from support.cases import spread
 
@@ -17,6 +19,7 @@ from nutdamp.estimation.model import Model
 from nutdamp.estimation.results import carried
 from nutdamp.estimation.signals import ACCELERATION, GYROS, Record
 from nutdamp.files.fitted import fitted_text
+from nutdamp.views.fit import fit_screen
 
 FILE: dict[str, Any] = {
     "name": "dual spin",
@@ -69,6 +72,15 @@ def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str
     if "A" not in fitted.named:
         assert (inertia.C * rates[2] + wheel) * told / inertia.C == pytest.approx(axial, rel=1e-3)
     assert sigmas[0] < 0.011 * 300.0
+
+
+def test_the_screen_counts_the_turns_of_the_nutation() -> None:
+    """Of a body that does not spin, too: 60 N m s / 300 kg m² for 199.75 s."""
+    body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": 0}})
+    seen, _ = record(body, (300.0, 300.0, 200.0), 60.0)
+    console = Console(file=io.StringIO(), width=120, record=True)
+    console.print(fit_screen(estimates(body, seen), 0.0))
+    assert "nutation periods: 6.36" in console.export_text()
 
 
 def test_a_momentum_with_a_tolerance_is_estimated_and_written() -> None:

@@ -230,6 +230,12 @@ def test_only_assumptions_that_apply_are_told() -> None:
         assert [text for text in guide.limits() if text.startswith(begin)], begin
 
 
+def test_with_a_wheel_the_page_says_what_its_equations_mean() -> None:
+    for wheel in ("", "\nwheel: {momentum: 40 N m s}\n"):
+        made = report_page(compared_text(example_text() + wheel, ("one-pulse",)), Repeat("", "", ""))
+        assert ("H3 = Cω3 + h" in section(tree(made), "background").text) == bool(wheel)
+
+
 def test_without_a_feasible_plan_the_page_says_why() -> None:
     only = compared_text(NO_THRUSTERS, ("four-pulse",))
     made = report_page(only, Repeat("", "", ""))

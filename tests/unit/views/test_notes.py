@@ -69,6 +69,11 @@ def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, sh
     assert "0.0598 rad/s" in text(note("spin-change", scheme="x", spin_change_rad_s=0.0598))
 
 
+def test_a_rate_is_no_time() -> None:
+    values: tuple[tuple[str, Value], ...] = (("scheme", "x"), ("spin_change_rad_s", 1.2e-5))
+    assert text(Note("spin-change", values)).endswith("1.2e-05 rad/s")
+
+
 def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:
     entry = note("momentum-shift", scheme="optimal", momentum_shift_deg=0.25)
     assert message(entry).startswith("note[momentum-shift]: optimal ")

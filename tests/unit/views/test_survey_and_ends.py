@@ -371,3 +371,12 @@ def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
     vectors = [channel["torque_Nm"] for channel in file["channels"]] + file["spacecraft"]["principal_axes"]
     parts = [float(cell) for row in rows[1:] for cell in row[4:8]] + [value for each in vectors for value in each]
     assert not [value for value in parts if 0.0 < abs(value) < 1e-14]
+
+
+@pytest.mark.parametrize("nutation", ["grows", "decays"])
+def test_with_a_wheel_dissipation_does_what_the_file_says(run: Run, tmp_path: Path, nutation: str) -> None:
+    """The long body of the example; without a wheel its shape tells."""
+    more = f"\nwheel: {{momentum: 40 N m s}}\ndissipation: {{time_constant: 600 s, nutation: {nutation}}}\n"
+    (tmp_path / "wheel.yaml").write_text(example_text() + more, "utf-8")
+    shown = " ".join(run("check", "wheel.yaml", "-v").stdout.split())
+    assert ("not under dissipation" in shown) == (nutation == "grows")

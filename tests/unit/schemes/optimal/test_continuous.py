@@ -11,7 +11,7 @@ from support import places
 from support.builders import Outcome, fan, spinner
 from support.cases import deep, spread
 
-from nutdamp.files.reader import load_spacecraft
+from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -37,6 +37,15 @@ def test_schedules_that_leave_no_pause_are_found(name: str, free: bool, latest: 
     ended = Outcome(body, made.pulses)
     assert ended.nutation < 1e-9
     assert free or ended.shift < 1e-9
+
+
+@pytest.mark.parametrize("wheel", [0.0, 60.0])
+def test_a_nutation_smaller_than_any_pulse_has_no_schedule(wheel: float) -> None:
+    """1e-4 deg: less than the shortest on-time of the example takes out, and nothing that a slot would fire for."""
+    text = example_text().replace("nutation: 5 deg", "nutation: 0.0001 deg", 1)
+    made = plan(read_spacecraft(f"{text}\nwheel: {{momentum: {wheel} N m s}}\n", "craft.yaml"), "optimal")
+    assert made.failure is None
+    assert "on-times of 0.02 s or more" in (made.refusal or "")
 
 
 @pytest.mark.parametrize("name", ["continuous-opt507", deep("continuous-opt513")])
