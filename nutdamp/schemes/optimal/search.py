@@ -149,7 +149,11 @@ class _FlownSchedule(NamedTuple):
 
 
 class _LeastCostSearch(Problem):
-    """The search for the cheapest schedule."""
+    """The search for the cheapest schedule; ``nearest`` are all schedules that it has corrected."""
+
+    def __init__(self, spacecraft: Spacecraft, options: OptimalOptions) -> None:
+        super().__init__(spacecraft, options)
+        self.nearest: list[_FlownSchedule] = []
 
     def soonest(self) -> Schedule:
         """The schedule that ends first: of one channel after another, or another one that ends before it."""
@@ -241,9 +245,20 @@ class _LeastCostSearch(Problem):
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
+        if best is None and first.unmet <= UNMET:
+            best = self.nearly()
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
+
+    def nearly(self) -> Schedule | None:
+        """The cheapest schedule so far that leaves a share `NEARLY` of the tightest bound.
+
+        For where none leaves nothing, as channels that stand still in space may not.
+        """
+        most = min(bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
+        there = [each for each in self.nearest if each.left <= NEARLY * most]
+        return min(there, key=lambda each: each.price).schedule if there else None
 
     def keeping(self, best: Schedule | None) -> Schedule | None:
         """The cheapest schedule found that keeps H, or reaches the target; None where it would not replace the best."""
@@ -466,13 +481,9 @@ class _LeastCostSearch(Problem):
     def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
         """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
 
-        All that leave up to `DAMPED_ANGLE` leave as little. Where none leaves nothing, as channels that stand still
-        in space may not, those that leave a share `NEARLY` of the tightest bound will do.
+        All that leave up to `DAMPED_ANGLE` leave as little.
         """
+        self.nearest += candidates
         there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
-        if not there:
-            bounds = (bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
-            nearly = NEARLY * min(bounds)
-            there = [candidate for candidate in candidates if candidate.left <= nearly]
         best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
         return None if best is None else best.schedule
