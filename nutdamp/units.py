@@ -10,7 +10,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike, fspath
@@ -165,6 +167,39 @@ def pattern(kind: str) -> str:
     """Regular expression (ECMA 262 and Python) of the texts that `parse` takes for ``kind``; for JSON Schema."""
     units = "|".join(map(_spellings, KINDS[kind].factors))
     return rf"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*({units})\s*$"
+
+
+SI, US = "si", "us"
+"""Systems of units of screens; files are SI."""
+
+_US_UNITS = {"N m": "ft lbf", "kg m²": "slug ft²", "kg": "lbm", "g": "lbm", "N": "lbf", "mm": "in", "m": "ft",
+             "bar": "psi"}  # fmt: skip
+"""Units of screens, and the US customary ones in their place."""
+
+_CUSTOMARY = re.compile(rf"({'|'.join(_US_UNITS)})(?= s$|/|$)")
+"""The part of a unit to be replaced: that of N m s, kg/year or m/s²."""
+
+_system = ContextVar("system of units", default=SI)
+
+
+@contextmanager
+def screen_units(system: str) -> Iterator[None]:
+    """Context in which `screen_unit` is of a ``system``."""
+    token = _system.set(system)
+    try:
+        yield
+    finally:
+        _system.reset(token)
+
+
+def screen_unit(unit: str, scale: float = 1.0) -> tuple[str, float]:
+    """The unit of screens for a unit of SI, and ``scale``, a factor to the latter, as one to the former."""
+    replaced = _CUSTOMARY.match(unit) if _system.get() == US else None
+    if replaced is None:
+        return unit, scale
+    factors = {name.replace("^2", "²"): factor for kind in KINDS.values() for name, factor in kind.factors.items()}
+    customary = _US_UNITS[replaced[0]]
+    return customary + unit[replaced.end() :], scale * factors[replaced[0]] / factors[customary]
 
 
 def bar(pressure: float) -> str:

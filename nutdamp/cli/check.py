@@ -16,13 +16,13 @@ from nutdamp.cli.job import (
     deliver,
     expect_outputs,
     quiet_option,
+    screen_options,
     set_option,
     spacecraft_argument,
-    verbose_option,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
 from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, goal_options
-from nutdamp.cli.screen import console, say, show
+from nutdamp.cli.screen import console, say, show, units_of_screen
 from nutdamp.errors import nearest, printable
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.argument("files", nargs=-1, type=FILE, metavar="[SPACECRAFT]...")
 @set_option
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
-@verbose_option
+@screen_options
 @quiet_option
 def command(
     files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
@@ -61,7 +61,8 @@ def command(
             continue
         reports.append(result.to_dict())
         if not silent:
-            show(check_screen(result.spacecraft, verbose=verbose))
+            with units_of_screen():
+                show(check_screen(result.spacecraft, verbose=verbose))
             if len(files) > 1:
                 click.echo()
     try:
@@ -79,7 +80,7 @@ def command(
 @goal_options
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
-@verbose_option
+@screen_options
 @quiet_option
 def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nutdamp.cli.flown import flown_options, plan_or_read
-from nutdamp.cli.job import Job, plot_options, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Job, plot_options, quiet_option, screen_options, spacecraft_argument
 from nutdamp.cli.main import leave, stoppable
 from nutdamp.cli.options import END, OUTPUT, SAMPLES, Count, SessionCommand, goal_options
 from nutdamp.cli.screen import say
@@ -49,7 +49,7 @@ FIGURES = ("overview", "cases", "momentum")
 @click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
 @click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
-@verbose_option
+@screen_options
 @quiet_option
 def command(
     job: Job,

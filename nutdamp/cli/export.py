@@ -12,7 +12,7 @@ from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, FILE, OUTPUT, NameType, SessionCommand, goal_options
 from nutdamp.cli.screen import say
 from nutdamp.errors import BadRequest, printable
-from nutdamp.views.exchange import FORMATS, expect_possible, lacking
+from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
 
 @click.command("export", cls=SessionCommand, context_settings={"allow_extra_args": True})
@@ -53,6 +53,7 @@ def command(ctx: click.Context, job: Job, form: str | None, xml: bool, until: fl
     missing = lacking(plan, form)
     if missing is not None:
         job.doubt(missing)
+    job.note(export_notes(plan, form))
     if output != "-":
         job.remark(f"wrote {printable(output)}: {plan.scheme}, {len(plan.pulses)} pulses")
     decided = decide(compare_plans((plan,)))

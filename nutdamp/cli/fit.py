@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Files, Job, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Files, Job, quiet_option, screen_options, spacecraft_argument
 from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 
 
@@ -14,19 +14,21 @@ from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, UnitType
 @click.argument("telemetry", type=FILE, metavar="TELEMETRY.csv")
 @spacecraft_argument
 @click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
-@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses: a CSV file with a column t_s or utc.")
+@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.")
 @click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
 @click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
 @click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
-@verbose_option
+@screen_options
 @quiet_option
 def command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
 
     TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
-    axis_dec_deg, axis_x, axis_y and axis_z, acceleration_m_s2, sun_pulse (0 or 1); empty cells are missing samples.
+    axis_dec_deg, axis_x, axis_y and axis_z, q_w to q_z, acceleration_m_s2, crossing_azimuth_deg and
+    crossing_elevation_deg of crossing_ra_deg and crossing_dec_deg (of the Sun where they are empty), sun_aspect_deg,
+    sun_pulse (0 or 1); empty cells are missing samples.
     Least squares on the closed forms of the coast; what the data do not tell stays at the tolerances of the file.
     -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well all is known.
 

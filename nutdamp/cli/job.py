@@ -17,9 +17,10 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import click
 
 from nutdamp.cli.options import END, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
-from nutdamp.cli.screen import say, show, working
+from nutdamp.cli.screen import UNITS, say, show, units_of_screen, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
 from nutdamp.schemes.catalogue import Options
+from nutdamp.units import SI, US
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -40,7 +41,18 @@ DEFAULT_FILE = "spacecraft.yaml"
 FIGURES = ("overview", "motion", "sphere", "history")
 """Pictures that ``--plot`` can draw, the default first."""
 
-verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
+
+def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
+    ctx.meta[UNITS] = value
+
+
+def screen_options(command: Command) -> Command:
+    """``--units`` and ``--verbose``."""
+    units = click.option("--units", type=NameType((SI, US)), default=SI, expose_value=False, callback=_units,
+                         help="Units of the screen, default si; files are SI.")  # fmt: skip
+    return units(click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")(command))
+
+
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
 
 
@@ -255,8 +267,9 @@ class Job:
         """Print notes on results on standard error, unless quiet."""
         from nutdamp.views.notes import message
 
-        for entry in notes:
-            self.remark(message(entry))
+        with units_of_screen():
+            for entry in notes:
+                self.remark(message(entry))
 
     def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""
@@ -350,7 +363,8 @@ def deliver(
     failures = list(unsaved)
     # All content is made before any file is written, so that a failure leaves no file behind.
     contents = [(path, _file_of(make(), path)) for path, make in outputs if path is not None]
-    shown = [make() for make in screens]
+    with units_of_screen():
+        shown = [make() for make in screens]
     if contents:
         from nutdamp.errors import CannotWrite
         from nutdamp.files.tabular import write_whole

@@ -6,7 +6,7 @@ from functools import partial
 
 import click
 
-from nutdamp.cli.job import Files, Job, carry_options, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Files, Job, carry_options, quiet_option, screen_options, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, Angles, Count, Direction, SessionCommand, UnitType
 from nutdamp.cli.screen import say
@@ -28,7 +28,7 @@ from nutdamp.units import LARGEST_SEED, thresholds, tilt
 @click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
 @carry_options("end of the run")
 @click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
-@verbose_option
+@screen_options
 @quiet_option
 def command(
     job: Job, until: float | None, seed: int, case: int | None, samples: int, at: float | None, verbose: bool
@@ -76,7 +76,7 @@ def command(
 @click.option("--csv", type=OUTPUT, help="Write a row for each two thresholds.")
 @click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
-@verbose_option
+@screen_options
 @quiet_option
 def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool) -> None:
     """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import compared_with, robust_of
-from nutdamp.cli.job import FIGURES, Files, Job, carry_options, plot_options, quiet_option, spacecraft_argument
+from nutdamp.cli.job import (
+    FIGURES,
+    Files,
+    Job,
+    carry_options,
+    plot_options,
+    quiet_option,
+    screen_options,
+    spacecraft_argument,
+)
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import OUTPUT, SchemeName, SessionCommand, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
@@ -38,7 +47,7 @@ PRIMER = "primer"
     "names",
     multiple=True,
     type=SchemeName(PLANNED),
-    help=f"Plan it alone; repeatable: {listed(PLANNED, 'or')}.",
+    help=f"Repeatable: {listed(PLANNED, 'or')}.",
 )
 @scheme_options
 @goal_options
@@ -52,7 +61,7 @@ PRIMER = "primer"
 @click.option("--certificate", type=OUTPUT, help="Write the proof of the least cost (JSON).")
 @carry_options("end of the last pulse")
 @plot_options((*FIGURES, PRIMER))
-@click.option("-v", "--verbose", is_flag=True, help="Show all values and remarks.")
+@screen_options
 @quiet_option
 def command(
     job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
@@ -171,7 +180,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     """The files of a certificate, if there is one."""
     if proof is None:
         return {}
-    from nutdamp.figures.certificate import certificate_figure
+    from nutdamp.figures.trade import certificate_figure
     from nutdamp.views.plan_json import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}

@@ -10,7 +10,7 @@ import math
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from time import monotonic as clock
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.errors import printable
+from nutdamp.units import SI, screen_units
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
@@ -80,6 +81,16 @@ class _Visible:
 
         for text, style, control in console.render(self.renderable, options):
             yield Segment(text if control else visible(text), style, control)
+
+
+UNITS = "nutdamp.units"
+"""Key of ``--units`` in the context of a command line."""
+
+
+def units_of_screen() -> AbstractContextManager[None]:
+    """Context of texts for people: in the units of ``--units``."""
+    context = click.get_current_context(silent=True)
+    return screen_units(SI if context is None else context.meta.get(UNITS, SI))
 
 
 DEBUG = "nutdamp.debug"

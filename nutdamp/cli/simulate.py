@@ -16,8 +16,8 @@ from nutdamp.cli.job import (
     deliver,
     plot_options,
     quiet_option,
+    screen_options,
     spacecraft_argument,
-    verbose_option,
 )
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, OUTPUT, SessionCommand, goal_options
@@ -89,7 +89,7 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @carry_options("the end")
 @plot_options(FIGURES)
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
-@verbose_option
+@screen_options
 @quiet_option
 def command(
     job: Job, real: bool, until: float | None, samples: int, at: float | None, drawn: bool, verbose: bool

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nutdamp.cli.flown import fronts_of
-from nutdamp.cli.job import Job, Output, quiet_option, spacecraft_argument, verbose_option
+from nutdamp.cli.job import Job, Output, quiet_option, screen_options, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
     FOLDER,
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
 @click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
-@verbose_option
+@screen_options
 @quiet_option
 def command(job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool) -> None:
     """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.

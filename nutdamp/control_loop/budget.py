@@ -69,8 +69,9 @@ class HeldNutation:
 
     @property
     def slows(self) -> float | None:
-        """Relative change of the spin in a year of the cycle, at the present rate; signed."""
-        return None if self.cycle is None else self.cycle.spin_rate * YEAR / self.spacecraft.spin
+        """Relative change of the spin in a year of the cycle, at the present rate; signed. None without spin."""
+        spin = self.spacecraft.spin
+        return None if self.cycle is None or spin == 0.0 else self.cycle.spin_rate * YEAR / spin
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -17,16 +17,14 @@ from numpy.typing import NDArray
 from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn
-from nutdamp.estimation.model import Model, Vector
-from nutdamp.estimation.parameters import ACCELERATION, GYROS, RATIO, SUN_PULSE
+from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import RATIO
 from nutdamp.estimation.search import NORMAL_MAD, least
+from nutdamp.estimation.signals import BODY, GYROS, KIND, SPACE, SUN_PULSE, Vector
 from nutdamp.physics import body as rigid_body
 
 if TYPE_CHECKING:
     from nutdamp.estimation.fit import Fit
-
-SHOW_NUTATION = {*GYROS[:2], "axis", ACCELERATION}
-"""Signals one of which there must be."""
 
 STUCK, FEWEST, COARSE = 0.2, 20, 10
 """Part of the samples of a sensor, and number of them, that are alike in a row where it is stuck; a record that has
@@ -38,13 +36,13 @@ def expect_alive(model: Model) -> None:
 
     That gyro 3 does not change all along is as it should be.
     """
-    varying = [index for index, name in enumerate(model.signals) if name in SHOW_NUTATION and _run(model, index)[3] > 1]
+    shows = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
+    varying = [index for index in shows if _run(model, index)[3] > 1]
     for index, signal in enumerate(model.signals):
         if signal == SUN_PULSE:
             continue
         begins, ends, alike, different = _run(model, index)
-        count = int((model.signal == index).sum()) // (2 if signal == "axis" else 1)
-        if alike < max(FEWEST, STUCK * count):
+        if alike < max(FEWEST, STUCK * len(model.samples[index])):
             continue
         dead = different == 1 and signal != GYROS[2] and bool(set(varying) - {index})
         if dead or different > COARSE:
@@ -57,10 +55,7 @@ def expect_alive(model: Model) -> None:
 
 def _run(model: Model, index: int) -> tuple[float, float, int, int]:
     """First and last time (s) and number of the most samples of a signal in a row that are alike; how many differ."""
-    rows = np.flatnonzero(model.signal == index)
-    values, times = model.measured[rows, None], model.times[rows]
-    if model.signals[index] == "axis":
-        values = model.axes
+    values, times = model.samples[index], model.times[model.signal == index]
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1, [len(values)]])
     at = int(np.argmax(np.diff(edges)))
     first, last = edges[at], edges[at + 1] - 1
@@ -69,10 +64,10 @@ def _run(model: Model, index: int) -> tuple[float, float, int, int]:
 
 def expect_enough(model: Model) -> None:
     """Raise Infeasible for a record that cannot tell as much as is estimated."""
-    if not SHOW_NUTATION & set(model.signals):
+    if not any(KIND[name].nutation for name in model.signals):
         raise Infeasible(
             f"no nutation is seen in {' and '.join(model.signals)} alone{once_a_turn(model.record)}; omega_1 or "
-            "omega_2, the axis or an acceleration beside them would show it"
+            "omega_2, the axis, an acceleration, Sun aspect angles or crossings beside them would show it"
         )
     rows, free = len(np.unique(model.times)), sum(math.isinf(parameter.prior) for parameter in model.parameters)
     if len(model.measured) <= free + 2:
@@ -81,8 +76,8 @@ def expect_enough(model: Model) -> None:
             "unknowns; a longer record, or more samples, helps"
         )
     body, length = model.spacecraft, model.record.length
-    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin)
-    if set(model.signals) == {"axis"}:
+    period = rigid_body.body_period(body.inertia.A, body.inertia.C, body.spin, body.inertia.wheel)
+    if not any(KIND[name].nutation == BODY for name in model.signals):
         period = body.inertial_period
     if length < 0.5 * period:
         raise Infeasible(
@@ -209,13 +204,13 @@ def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float |
     None where no step shows; ``small``: one that may hide in noise.
     """
     model = fitted.model
-    chosen = [index for index in signals if model.signals[index] in (*GYROS, ACCELERATION, "axis")]
+    chosen = [index for index in signals if model.signals[index] == GYROS[2] or KIND[model.signals[index]].nutation]
     splits = np.linspace(model.record.start, model.record.end, SPLITS + 2)[1:-1]
     total, left = 0.0, np.zeros(len(splits))
     for index in chosen:
         rows, rate = np.flatnonzero(model.signal == index), _rate(fitted, index)
-        # Of the axis what is off in two directions across it.
-        for part in np.array_split(rows, 2) if model.signals[index] == "axis" else (rows,):
+        # Of directions what is off in two ways across them.
+        for part in np.array_split(rows, KIND[model.signals[index]].parts):
             without, with_step = _with_step(fitted, part[fitted.used[part] | (not small)], rate, splits)
             total, left = total + without, left + with_step
     best = int(np.argmin(left))
@@ -226,7 +221,7 @@ def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float |
 def _rate(fitted: Fit, signal: int) -> float:
     """Rate at which a signal shows the nutation, rad/s: in the body, or of the axis about H."""
     rate = initial_guess.nutation_rate(fitted.model, fitted.values)
-    if fitted.model.signals[signal] != "axis":
+    if KIND[fitted.model.signals[signal]].nutation != SPACE:
         return rate
     named = fitted.named
     axial = named[RATIO] * named.get("omega_3", fitted.model.spacecraft.spin)

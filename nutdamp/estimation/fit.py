@@ -19,8 +19,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import expect_alive, expect_enough, expect_explained
 from nutdamp.estimation.initial_guess import starts
-from nutdamp.estimation.model import Matrix, Model, Vector
-from nutdamp.estimation.parameters import Record
+from nutdamp.estimation.model import Model
 from nutdamp.estimation.search import (
     covariance_of,
     jacobian,
@@ -34,6 +33,7 @@ from nutdamp.estimation.search import (
     share_left,
     units_of,
 )
+from nutdamp.estimation.signals import Matrix, Record, Vector
 from nutdamp.spacecraft.model import Spacecraft
 
 OUTLIER = 5.0
@@ -85,7 +85,7 @@ class Fit:
     """Estimate of a spacecraft from a record.
 
     ``values`` (p,) of the model's parameters, SI, with their ``covariance`` (p, p); ``noise`` one sigma of each signal
-    (rad of the axis, s of Sun pulses); ``used`` (m,) the samples that are no outliers, ``residuals`` (m,) measured
+    (rad of directions, s of Sun pulses); ``used`` (m,) the samples that are no outliers, ``residuals`` (m,) measured
     less predicted; ``finished`` unless the search ended with its budget of work.
     """
 
@@ -219,14 +219,16 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     grown = fitted.index("growth")
     growing = grown is not None and bool(abs(fitted.values[grown]) > GROWS * fitted.sigmas[grown])
     if model.unequal:
-        return _widened(fitted, Model(spacecraft, record), ("growth",)) if _shows_growth(fitted) else fitted
+        if _shows_growth(fitted):
+            return _widened(fitted, Model(spacecraft, record), ("growth",))
+        return _grown_a_little(fitted)
     three = Model(spacecraft, record, unequal=True, growing=growing)
     if not _shown(fitted, three, _begun(fitted, three), _places(three, UNEQUAL_BY)):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
     unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
     if not growing or not _shows_growth(unequal):
-        return unequal
+        return _grown_a_little(unequal)
     begin = _begun(fitted, three)
     of_moments = _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
@@ -238,6 +240,26 @@ def _shows_growth(narrow: Fit) -> bool:
     wider = Model(narrow.model.spacecraft, narrow.model.record, unequal=True)
     which = _places(wider, ("growth",))
     return bool(which) and _shown(narrow, wider, _begun(narrow, wider), which)
+
+
+def _grown_a_little(narrow: Fit) -> Fit:
+    """A fit of three moments with dissipation that does not show, by one step of least squares.
+
+    So small a growth is linear. Left out it would be taken as exactly known: what is known together with it would then
+    be off by more than its sigma.
+    """
+    wider = Model(narrow.model.spacecraft, narrow.model.record, unequal=True)
+    which = _places(wider, ("growth",))
+    if not which:
+        return narrow
+    at, used, units = _begun(narrow, wider), narrow.used, units_of(wider)
+    slopes = np.insert(narrow.jacobian, which[0], jacobian(wider, at, which)[:, 0], axis=1)
+    weights = 1.0 / narrow.noise[narrow.model.signal[used]]
+    rows, nominal = wider.prior
+    stacked = np.concatenate([slopes[used] * weights[:, None], rows]) * units
+    target = np.concatenate([narrow.residuals[used] * weights, nominal - rows @ at])
+    values = at + units * np.linalg.lstsq(stacked, target, rcond=1e-13)[0]
+    return _as_noisy(wider, values, narrow.noise, used, slopes)
 
 
 def _begun(narrow: Fit, wider: Model) -> Vector:
@@ -342,8 +364,13 @@ def _settled(model: Model, values: Vector) -> Fit:
         if (used == before[1]).all() and (np.abs(noise - before[0]) < STILL * noise).all():
             break
         values, _ = search(model, values, noise, used, robust=False)
-    left = residuals(model, values)
     slopes = jacobian(model, values, range(len(values)), one_sided=work.exhausted())
+    return _as_noisy(model, values, noise, used, slopes)
+
+
+def _as_noisy(model: Model, values: Vector, noise: Vector, used: NDArray[np.bool_], slopes: Matrix) -> Fit:
+    """The fit at some values, its noise corrected for what the fit takes of it."""
+    left, floor = residuals(model, values), least(model)
     for _ in range(ADJUSTED):
         scaled = slopes[used] / noise[model.signal[used], None]
         covariance = covariance_of(model, scaled)

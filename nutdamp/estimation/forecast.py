@@ -18,10 +18,10 @@ import numpy as np
 from nutdamp.common import results
 from nutdamp.common.numerics import finite
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.fit import Fit, estimated
+from nutdamp.estimation.fit import GROWS, Fit, estimated
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import AXIS, SUN_PULSE, Record
 from nutdamp.estimation.results import Carried, Estimate, carried, estimates, moving, posterior, replaced
+from nutdamp.estimation.signals import AXIS, CROSSING, DIRECTION, GYROS, QUATERNION, SEEN, SUN_PULSE, Record, Vector
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.study import Results, run
 from nutdamp.physics import attitude
@@ -99,6 +99,16 @@ class Outlook:
         best = min(self.probes, key=lambda prospect: prospect.nutation, default=None)
         return best if best is not None and self._pays(best) else None
 
+    @property
+    def thrifty(self) -> Prospect | None:
+        """The probe pulse that lowers the nutation most per propellant, of those that pay; None if unknown."""
+        rated = [prospect for prospect in self.probes if self._pays(prospect) and self.gain(prospect) is not None]
+        return max(rated, key=lambda prospect: self.gain(prospect) or 0.0, default=None)
+
+    def gain(self, prospect: Prospect) -> float | None:
+        """Nutation, rad, by which a kg of a probe pulse lowers that of now; None where it takes no known propellant."""
+        return (self.now.nutation - prospect.nutation) / prospect.propellant if prospect.propellant else None
+
     def _pays(self, prospect: Prospect) -> bool:
         return not self.enough and prospect.nutation < PAYS * self.now.nutation
 
@@ -172,25 +182,49 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
         fired = Schedule((channel_pulse(channel, 0.5 * length, on_time),))
     interval = max(model.record.interval, length / MOST_SAMPLES)
     times = np.asarray(interval * np.arange(max(math.floor(length / interval), 8) + 1), dtype=np.float64)
-    samples = {name: np.zeros(len(times)) for name in model.record.signals}
-    if model.record.has(*AXIS):
-        axis = attitude.rotate(body.initial.quaternion, np.array([0.0, 0.0, math.copysign(1.0, body.spin)]))
-        samples |= {name: np.full(len(times), part) for name, part in zip(AXIS, axis, strict=True)}
+    grown = fitted.index("growth")
+    # Of three moments a growth takes integrations, which one that does not show is not worth.
+    growing = grown is not None and (
+        not model.unequal or abs(float(fitted.values[grown])) > GROWS * float(fitted.sigmas[grown])
+    )
+
+    def of(record: Record) -> tuple[Model, dict[str, float]]:
+        imagined = Model(body, record, unequal=model.unequal, growing=growing)
+        values = {parameter.name: parameter.file for parameter in imagined.parameters}
+        known = {name: value for name, value in fitted.named.items() if not name.startswith(("omega", "att"))}
+        return imagined, values | {name: value for name, value in known.items() if name in values}
+
     sun = np.empty(0)
     if SUN_PULSE in model.signals:
         sun = np.arange(0.0, length, 2.0 * math.pi / abs(body.spin))
-    if not model.record.signals:
+    if model.record.signals:
+        still, values = of(Record(times, {GYROS[2]: np.zeros(len(times))}))
+        samples = _samples(model, still.motion(values, times)[1])
+    else:
         times, samples = np.empty(0), {}
-    record = Record(times, samples, sun, model.record.sun_step, fired)
-    growing = fitted.index("growth") is not None
-    imagined = Model(body, record, unequal=model.unequal, growing=growing)
-    values = {parameter.name: parameter.file for parameter in imagined.parameters}
-    values |= {
-        name: value for name, value in fitted.named.items() if name in values and not name.startswith(("omega", "att"))
-    }
+    imagined, values = of(Record(times, samples, sun, model.record.sun_step, fired))
     thinned = math.sqrt(model.record.interval / interval)
     noise = np.array([fitted.noise[model.signals.index(name)] * thinned for name in imagined.signals])
     return estimated(imagined, np.array([values[parameter.name] for parameter in imagined.parameters]), noise)
+
+
+def _samples(model: Model, quaternion: Vector) -> dict[str, Vector]:
+    """Signals (n,) of a record of attitudes (n, 4), as often there as in the record of the model."""
+    samples, count = dict[str, Vector](), len(quaternion)
+    sense = model.spacecraft.sense
+    axis = attitude.rotate(quaternion, sense * model.spacecraft.inertia.axes[:, 2])
+    for kind in model.record.kinds:
+        times, rows = kind.samples(model.record)
+        there = np.diff(np.floor(np.arange(count + 1) * len(times) / len(model.record.times))) > 0.0
+        table = {name: np.zeros(count) for name in kind.columns}
+        if kind.name == CROSSING:
+            ways = rows[np.arange(count) % len(rows), len(SEEN) :]
+            seen = attitude.rotate(attitude.conjugate(quaternion), ways)
+            table = dict(zip((*SEEN, *DIRECTION), np.column_stack([seen, ways]).T, strict=True))
+        elif kind.columns in (AXIS, QUATERNION):
+            table = dict(zip(kind.columns, (axis if kind.columns == AXIS else quaternion).T, strict=True))
+        samples |= {name: np.where(there, values, math.nan) for name, values in table.items()}
+    return samples
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,6 +3,8 @@
 A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
 spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
 
+Crossings and Sun aspect angles come too seldom for a spectrum: there each C/A that the file allows is tried.
+
 Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is known but for multiples
 of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
 """
@@ -16,8 +18,24 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Model, Values, Vector
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, RATIO, Record
+from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import RATIO
+from nutdamp.estimation.search import scales_of
+from nutdamp.estimation.signals import (
+    ACCELERATION,
+    AXIS,
+    BODY,
+    DIRECTION,
+    GYROS,
+    KIND,
+    QUATERNION,
+    SEEN,
+    SPACE,
+    Record,
+    Values,
+    Vector,
+    wrapped,
+)
 from nutdamp.physics import attitude
 
 if TYPE_CHECKING:
@@ -48,33 +66,106 @@ FLAT = 0.1
 TURNS = 8
 """Starting values of the angle by which the body is turned about its axis."""
 
+TRIED = 60
+"""Values of C/A that are tried at most where no spectrum shows the nutation."""
+
+SLIP = 1.5
+"""Phase, rad, by which the nutation of two of them differs at the end of a record."""
+
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
     """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
     spin = _spin(model)
     yield from _starts(model, share, spin)
     # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
-    if not model.record.has(GYROS[2]) and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
+    if _by_pulses(model) and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
         yield from _starts(model, share, model.spacecraft.spin)
 
 
 def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float]]:
     of_file = {each.name: each.file for each in model.parameters}
     cone = _cone(model, share)
-    if cone is not None and len(model.record.sun_pulses) and not model.record.has(GYROS[2]):
-        # The Sun goes round a sensor once a turn of the body about its axis and of the axis about H.
-        spin -= math.copysign(cone.rate * (1.0 - cone.cosine), spin)
+    if cone is not None and model.record.shows_spin and not model.record.has(GYROS[2]):
+        # A direction goes round a sensor once a turn of the body about its axis and of the axis about H.
+        spin -= model.spacecraft.sense * cone.rate * (1.0 - cone.cosine)
     if "omega_3" in of_file:
         of_file["omega_3"] = spin
     rate = _peak(model, spin, share)
     linear = of_file | ({} if rate is None else _moments(model, rate, spin))
     if model.record.has(*AXIS):
         linear |= _towards(model, np.nanmean(_axes(model.record), axis=0))
-    for turn in range(TURNS) if "attitude_3" in of_file else (0,):
-        turned = {"attitude_3": 2.0 * math.pi * turn / TURNS} if "attitude_3" in of_file else {}
+    ratios = [linear[RATIO]] if rate is not None or not _seldom(model) else _ratios(model, spin)
+    angles = [2.0 * math.pi * turn / TURNS for turn in range(TURNS)] if "attitude_3" in of_file else []
+    if _seen_around(model) is not None:
+        angles = [_around(model)[1]]
+    for turned in [{"attitude_3": angle} for angle in angles] or [{}]:
         if cone is not None:
             yield _on_cone(model, of_file | turned, spin, cone)
-        yield _linear(model, linear | turned)
+        for ratio in ratios:
+            values = _linear(model, linear | turned | {RATIO: ratio})
+            yield values
+            if _seldom(model) and model.record.shows_spin:
+                axial = _axial_rate(model, ratio, spin)
+                size = math.hypot(values["omega_1"], values["omega_2"])
+                less = math.copysign(math.hypot(axial, size), axial) - axial
+                yield _linear(model, values | {"omega_3": spin - less})
+
+
+def _seldom(model: Model) -> bool:
+    """True where only signals that come too seldom for a spectrum show a nutation."""
+    return not any(KIND[name].nutation for name in model.signals if name == "axis" or KIND[name].nutation == BODY)
+
+
+def _ratios(model: Model, spin: float) -> Vector:
+    """The values of C/A that the file allows, so near to each other that one of them leads to the least."""
+    _, low, high = _range(model)
+    count = math.ceil((high - low) * abs(spin) * model.record.length / SLIP) + 1
+    return np.linspace(low, high, min(count, TRIED))
+
+
+def _by_pulses(model: Model) -> bool:
+    """True where Sun pulses alone show the spin."""
+    return len(model.record.sun_pulses) > 1 and not model.record.has(GYROS[2]) and _seen_around(model) is None
+
+
+def _seen_around(model: Model) -> tuple[Vector, Vector] | None:
+    """Times (n,) s and angles (n,) rad by which the body is turned about its axis against the file, near enough.
+
+    From the azimuths of known directions: those that crossed, or one across the axis that quaternions turn.
+    """
+    record, reference = model.record, model.reference.quaternion
+    of_file = attitude.from_matrix(model.spacecraft.inertia.axes)
+    times, rows = record.samples((*SEEN, *DIRECTION))
+    if len(times):
+        shown, there = rows[:, :3], rows[:, 3:]
+    else:
+        times, rows = record.samples(QUATERNION)
+        if not len(times):
+            return None
+        there = np.broadcast_to(attitude.rotate(reference, np.array([1.0, 0.0, 0.0])), (len(times), 3))
+        shown = attitude.rotate(attitude.conjugate(rows), there)
+    shown = attitude.rotate(attitude.conjugate(of_file), shown)
+    before = attitude.rotate(attitude.conjugate(reference), there)
+    return times, np.arctan2(before[:, 1], before[:, 0]) - np.arctan2(shown[:, 1], shown[:, 0])
+
+
+def _around(model: Model) -> tuple[float, float]:
+    """Rate (rad/s) at which known directions go round the body, and the turn of the body at the start, rad."""
+    seen = _seen_around(model)
+    assert seen is not None
+    times, angles = seen
+    spin = model.spacecraft.spin
+    gyro = model.record.samples(GYROS[2:])[1]
+    if len(gyro):
+        spin = float(np.median(gyro))
+    # Turns between two samples by the spin as it is known; then a line through all.
+    steps = spin * np.diff(times)
+    steps = steps + wrapped(np.diff(angles) - steps)
+    turned = angles[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    if len(times) < 2:
+        return spin, float(angles[0] - spin * (times[0] - model.start))
+    rate, turn = np.polyfit(times - model.start, turned, 1)
+    return float(rate), float(turn)
 
 
 def _spin(model: Model) -> float:
@@ -82,6 +173,8 @@ def _spin(model: Model) -> float:
     record, spin = model.record, model.spacecraft.spin
     if record.has(GYROS[2]) and np.isfinite(record.signals[GYROS[2]]).any():
         return float(np.nanmedian(record.signals[GYROS[2]]))
+    if _seen_around(model) is not None:
+        return _around(model)[0]
     if len(record.sun_pulses) > 1:
         return math.copysign(spin_of(record.sun_pulses)[0], spin)
     return spin
@@ -116,17 +209,18 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
     """The rate aω3 at which a nutation turns in the body, rad/s; None where no signal shows it."""
     record, body = model.record, model.spacecraft
     expected = body.inertia.nutation_rate(spin)
+    most = abs(spin) if body.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
     count = max(int(share * len(record.times)), min(len(record.times), 16))
     times = record.times[: min(count, LONGEST_SPECTRUM)]
     signals = {name: values[: len(times)] for name, values in record.signals.items()}
     if record.has(*GYROS[:2]):
-        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, abs(spin), -1.0)
+        return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, most, -1.0)
     for name in (*GYROS[:2], ACCELERATION):
         if name in signals:
-            turning = _strongest(times, signals[name], None, expected, abs(spin), 1.0)
+            turning = _strongest(times, signals[name], None, expected, most, 1.0)
             return None if turning is None else math.copysign(turning, expected)
     cone = _cone(model, share)
-    return None if cone is None else spin - math.copysign(cone.rate * cone.cosine, spin)
+    return None if cone is None else spin - body.sense * cone.rate * cone.cosine
 
 
 class _Cone(NamedTuple):
@@ -167,9 +261,9 @@ def _cone(model: Model, share: float) -> _Cone | None:
     first /= np.linalg.norm(first)
     second = np.cross(momentum, first)
     x, y = axis @ first, axis @ second
-    # In the sense of H, with |H|/A = Cω3/(A cos θ).
+    # In the sense of H, with |H|/A = H3/(A cos θ).
     height = float(momentum @ mean)
-    pace = abs(body.spin) / max(height, FLAT)
+    pace = abs(body.axial) / body.inertia.C / max(height, FLAT)
     rate = _strongest(times, x, y, body.inertia.C / body.inertia.A * pace, MOST_TURNED * pace, 1.0)
     if rate is None:
         return None
@@ -180,7 +274,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
 
 def _on_cone(model: Model, values: Values, spin: float, cone: _Cone) -> dict[str, float]:
     """Values by which the axis describes a cone: ω is that of the axis about H, besides what is along the axis."""
-    moments = _moments(model, spin - math.copysign(cone.rate * cone.cosine, spin), spin)
+    moments = _moments(model, spin - model.spacecraft.sense * cone.rate * cone.cosine, spin)
     values = {**values, **moments, **_towards(model, cone.begin)}
     across = cone.rate * (cone.momentum - cone.cosine * cone.begin)
     x, y, _ = attitude.rotate(attitude.conjugate(model.turned(values)), across)
@@ -224,7 +318,10 @@ def _strongest(
 def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
     """A and C that give a body rate, each moved as far as the file's tolerances share it; nothing if impossible."""
     inertia = model.spacecraft.inertia
-    wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
+    if inertia.wheel == 0.0:
+        wanted = inertia.C / inertia.A - (rate - inertia.nutation_rate(spin)) / spin
+    else:  # of the A at which ω3 - H3/A is the rate
+        wanted = inertia.C * (spin - rate) / float(inertia.axial(spin))
     wanted = min(max(wanted, 0.01), 1.999)
     A, ratio = model.parameter("A"), model.parameter(RATIO)
     assert ratio is not None
@@ -237,7 +334,7 @@ def _moments(model: Model, rate: float, spin: float) -> dict[str, float]:
 
 def _towards(model: Model, axis: Vector) -> dict[str, float]:
     """The attitude turned the shortest way so that the spin axis is along an ``axis`` (3,), of any length."""
-    sense = math.copysign(1.0, model.spacecraft.spin)
+    sense = model.spacecraft.sense
     wanted = sense * attitude.rotate(attitude.conjugate(model.reference.quaternion), axis / np.linalg.norm(axis))
     across = np.cross([0.0, 0.0, 1.0], wanted)
     size = float(np.linalg.norm(across))
@@ -248,18 +345,20 @@ def _towards(model: Model, axis: Vector) -> dict[str, float]:
 
 def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     """The transverse rates, offsets and tilts by linear least squares, everything else as it is."""
-    names = ["omega_1", "omega_2", *(name for name in values if name.startswith(("bias", "attitude_1", "attitude_2")))]
+    offsets = ("bias", "attitude") if _seen_around(model) is not None else ("bias", "attitude_1", "attitude_2")
+    names = ["omega_1", "omega_2", *(name for name in values if name.startswith(offsets))]
     base = values | {"omega_1": 0.0, "omega_2": 0.0}
     steps = {name: SMALL * abs(values.get("omega_3", model.spacecraft.spin)) for name in names[:2]}
     steps |= dict.fromkeys(names[2:], SMALL)
     at_rest = model.predicted(base)
     columns = [(model.predicted(base | {name: base[name] + steps[name]}) - at_rest) / steps[name] for name in names]
-    weights = np.ones(len(at_rest))
-    for index in range(len(model.signals)):
-        rows = model.signal == index
-        weights[rows] = 1.0 / (float(np.ptp(model.measured[rows])) or 1.0)
-    matrix = np.column_stack(columns) * weights[:, None]
-    solved = np.linalg.lstsq(matrix, (model.measured - at_rest) * weights, rcond=1e-10)[0]
+    weights = 0.1 / scales_of(model)[model.signal]
+    # Of one direction the attitude is not told about it.
+    known = {each.name: 1.0 / each.prior for each in model.parameters if each.name.startswith("attitude")}
+    held = np.array([known.get(name, 0.0) for name in names])
+    matrix = np.concatenate([np.column_stack(columns) * weights[:, None], np.diag(held)])
+    target = np.concatenate([(model.measured - at_rest) * weights, -held * [base[name] for name in names]])
+    solved = np.linalg.lstsq(matrix, target, rcond=1e-10)[0]
     return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}
 
 
@@ -286,9 +385,10 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
         return []
     step = 2.0 * math.pi / (abs(_spin_of(model, values)) * interval(model))
     # a -> a + k step; of one transverse signal also a -> -a + k step.
-    one_sided = len(_transverse(model)) == 1 and "axis" not in model.signals
+    one_sided = len(_transverse(model)) == 1 and not any(KIND[name].nutation == SPACE for name in model.signals)
+    mirrored = [(2.0 - values[at], False)] * one_sided + [(-values[at], False)] * _seldom(model)
     ratios = []
-    for begin, itself in ((values[at], True), *[(2.0 - values[at], False)] * one_sided):
+    for begin, itself in ((values[at], True), *mirrored):
         nearest = round((model.parameters[at].file - begin) / step)
         ratios += [
             begin + k * step for k in range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1) if k != 0 or not itself
@@ -312,7 +412,13 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     at, low, high = _range(model)
     counts = np.bincount(model.signal)
     costs = [2.0 * float(counts @ np.log(fitted.noise)) for fitted in fits]
-    alike = [fitted for fitted, cost in zip(fits, costs, strict=True) if cost < min(costs) + ALIKE]
+    alike: list[Fit] = []
+    for index in np.argsort(costs):
+        fitted = fits[index]
+        # A search from one value may end at that of another.
+        again = any(abs(fitted.values[at] - other.values[at]) < other.sigmas[at] for other in alike)
+        if costs[index] < min(costs) + ALIKE and not again:
+            alike.append(fitted)
     left = [fitted for fitted in alike if low < fitted.values[at] < high]
     if not left and too_slow(model, alike[0].values):
         raise Infeasible(
@@ -338,19 +444,26 @@ def too_slow(model: Model, values: Vector) -> bool:
 
 def nutation_rate(model: Model, values: Vector) -> float:
     """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
-    ratio = float(values[_range(model)[0]])
-    return (1.0 - ratio if _transverse(model) else ratio) * _spin_of(model, values)
+    spin = _spin_of(model, values)
+    axial = _axial_rate(model, float(values[_range(model)[0]]), spin)
+    return spin - axial if _transverse(model) else axial
+
+
+def _axial_rate(model: Model, ratio: float, spin: float) -> float:
+    """H3/A in rad/s at a ``ratio`` C/A and a ``spin``."""
+    inertia = model.spacecraft.inertia
+    return ratio * (spin + inertia.wheel / inertia.C)
 
 
 def interval(model: Model) -> float:
     """Usual time between the samples of the signal that is sampled fastest of those that show the nutation, s."""
-    shown = [name in _transverse(model) or name == "axis" for name in model.signals]
-    steps = [np.diff(model.times[model.signal == index]) for index in np.flatnonzero(shown)]
+    shown = [index for index, name in enumerate(model.signals) if KIND[name].nutation]
+    steps = [np.diff(model.times[model.signal == index][: len(model.samples[index])]) for index in shown]
     return min((float(np.median(gaps)) for gaps in steps if len(gaps)), default=model.record.interval)
 
 
 def _transverse(model: Model) -> list[str]:
-    return [name for name in model.signals if name in (*GYROS[:2], ACCELERATION)]
+    return [name for name in model.signals if KIND[name].nutation == BODY]
 
 
 def _spin_of(model: Model, values: Vector) -> float:

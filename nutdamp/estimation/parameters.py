@@ -1,98 +1,31 @@
-"""Telemetry record with the pulses fired during it, and the parameters fitted to it.
-
-Each parameter has its value in the file and the tolerance there.
-"""
+"""Parameters that are fitted to a record, each with its value in the file and the tolerance there."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.estimation.signals import (
+    ACCELERATION,
+    APART,
+    DIRECTION,
+    GYROS,
+    KIND,
+    KINDS,
+    SUN_ASPECT,
+    Record,
+    quantisation,
+)
 from nutdamp.montecarlo.inputs import SPREAD
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.spacecraft.tolerances import Tolerance
 
 Vector = NDArray[np.float64]
-
-GYROS = ("omega_1", "omega_2", "omega_3")
-AXIS = ("axis_x", "axis_y", "axis_z")
-ACCELERATION = "acceleration"
-SUN_PULSE = "sun_pulse"
-
-UNITS = {**dict.fromkeys(GYROS, "rad/s"), "axis": "rad", ACCELERATION: "m/s²", SUN_PULSE: "s"}
-"""Of the signals, as they are compared with a model."""
-
-STEPS = 4000
-"""Values of a signal from which the step of its quantisation is found, at most."""
-
-MULTIPLES = 0.9
-"""Share of the differences of values that are multiples of a step, for it to be one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Record:
-    """Telemetry: ``signals`` by name, (n,) each, at ``times`` (n,) s that rise; NaN where there is no sample.
-
-    Body rates (rad/s) are in the axes of the file, ``axis_x``, ``axis_y``, ``axis_z`` the inertial unit vector along
-    the spin axis, ``acceleration`` is m/s². ``sun_pulses`` (k,) s are the times of Sun pulses, known to within
-    ``sun_step`` s (full width). ``schedule`` was fired meanwhile. All times count from t = 0 of the file.
-    """
-
-    times: Vector
-    signals: Mapping[str, Vector] = field(default_factory=dict)
-    sun_pulses: Vector = field(default_factory=lambda: np.empty(0))
-    sun_step: float = 0.0
-    schedule: Schedule = field(default_factory=Schedule)
-
-    @property
-    def start(self) -> float:
-        """Time at which it begins, s."""
-        return float(min([*self.times[:1], *self.sun_pulses[:1]]))
-
-    @property
-    def end(self) -> float:
-        """Time at which it ends, s."""
-        return float(max([*self.times[-1:], *self.sun_pulses[-1:]]))
-
-    @property
-    def length(self) -> float:
-        """Its length, s."""
-        return self.end - self.start
-
-    @property
-    def interval(self) -> float:
-        """Usual time between two samples, s; of Sun pulses where there is nothing else."""
-        times = self.times if len(self.times) > 1 else self.sun_pulses
-        return float(np.median(np.diff(times)))
-
-    @property
-    def fired(self) -> tuple[Pulse, ...]:
-        """The pulses of the schedule whose thrust falls in the record, wholly or in part."""
-        return tuple(pulse for pulse in self.schedule if pulse.over > self.start and pulse.thrust[0] < self.end)
-
-    def has(self, *names: str) -> bool:
-        """True where all of these signals are there."""
-        return all(name in self.signals for name in names)
-
-
-def quantisation(values: Vector) -> float:
-    """Step of which the differences of the values (n,) are multiples, but for some; 0 where there is none."""
-    distinct = np.unique(values[np.isfinite(values)][:STEPS])
-    gaps = np.diff(distinct)
-    gaps = gaps[gaps > 1e-9 * np.abs(distinct).max(initial=0.0)]
-    if not len(gaps):
-        return 0.0
-    multiples = gaps / gaps.min()
-    return float(gaps.min()) if np.mean(np.abs(multiples - np.rint(multiples)) < 1e-2) > MULTIPLES else 0.0
-
-
 Matrix = NDArray[np.float64]
 
 RATIO = "C/A"
@@ -102,7 +35,7 @@ BIAS = math.radians(0.02)
 """Standard deviation of the bias of a gyro, rad/s, where the file names none (dispersions.sensor_bias)."""
 
 TILT = math.radians(1.0)
-"""Standard deviation of each tilt of the gyros, and of the observed axis, from the principal axes, rad."""
+"""Standard deviation of each tilt of the gyros, and of the attitude sensors, from the principal axes, rad."""
 
 THRUST = 0.5
 """Standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise."""
@@ -155,7 +88,8 @@ def in_moments(spacecraft: Spacecraft, values: Mapping[str, float]) -> tuple[flo
     """A and C (kg m²) of the ``values`` of parameters."""
     of_A, of_C = _of_moments(spacecraft)
     ratio = values[RATIO]
-    if of_A[1] > 0.0 and of_C[1] == 0.0:
+    # Of a body with a wheel it is A that C/A changes where neither has a tolerance: despun, C does not matter.
+    if of_C[1] == 0.0 and (of_A[1] > 0.0 or spacecraft.inertia.wheel != 0.0):
         return of_C[0] / ratio, of_C[0]
     A = values.get("A", of_A[0])
     return A, ratio * A
@@ -197,26 +131,29 @@ def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[floa
 
 
 def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -> Iterator[Parameter]:
-    given, spin = spacecraft.dispersions, float(spacecraft.omega0[2])
+    given, spin, step = spacecraft.dispersions, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
     yield from moments(spacecraft)
+    if given is not None and given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
+        wheel, sigma = prior_of(given.wheel_momentum, spacecraft.inertia.wheel)
+        yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
-        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, TINY * abs(spin))
-    if shows_spin(record):
-        yield Parameter("omega_3", "rad/s", spin, math.inf, TINY * abs(spin))
+        yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step)
+    if record.shows_spin:
+        yield Parameter("omega_3", "rad/s", spin, math.inf, step)
     elif given is not None and given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
-        yield Parameter("omega_3", "rad/s", mean, sigma, TINY * abs(spin))
-    if growing and spacecraft.inertia.a != 0.0:
+        yield Parameter("omega_3", "rad/s", mean, sigma, step)
+    if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
         yield Parameter("growth", "1/s", spacecraft.growth, math.inf, 1e-5 / max(record.length, 1e-3))
-    if record.has(*AXIS) or len(record.sun_pulses):
+    if any(kind.attitude for kind in record.kinds):
         yield from _attitude(spacecraft, record)
     yield from _gyros(spacecraft, record)
-    if record.has(*AXIS):
+    if any(kind.wobble for kind in record.kinds):
         for number in (1, 2):
             yield Parameter(f"wobble_{number}", "rad", 0.0, TILT, TINY)
     if record.has(ACCELERATION):
         size = 1e-6 * spin * spin
-        yield Parameter("bias_acceleration", UNITS[ACCELERATION], 0.0, math.inf, size)
+        yield Parameter("bias_acceleration", KIND[ACCELERATION].unit, 0.0, math.inf, size)
     if unequal:
         first, second, _ = spacecraft.inertia.moments
         yield Parameter("unequal_1", "", (first - second) / (first + second), math.inf, 1e-6)
@@ -226,24 +163,28 @@ def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -
 
 def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Turns of the attitude at the start about body axes; the last shows only beside what turns with the body."""
-    seen, given = record.has(*AXIS), spacecraft.dispersions
+    seen, given = _tells_attitude(spacecraft, record), spacecraft.dispersions
     sigma = math.inf
     if not seen:
         sigma = 0.0 if given is None or given.attitude is None else prior_of(given.attitude, 0.0)[1]
+        # The file has the attitude at t = 0: where on its cone the axis is as the record begins is less sure.
+        turn = min(2.0 * math.pi / spacecraft.inertial_period * abs(record.start), math.pi)
+        sigma = math.hypot(sigma, 2.0 * math.sin(0.5 * turn) * spacecraft.nutation) if sigma > 0.0 else 0.0
     for number in (1, 2) if sigma > 0.0 else ():
         yield Parameter(f"attitude_{number}", "rad", 0.0, sigma, TINY)
-    if shows_turn(record):
+    if record.shows_turn:
         yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
 
 
-def shows_turn(record: Record) -> bool:
-    """True where a signal shows how the body is turned about its axis."""
-    return len(record.sun_pulses) > 0 or any(record.has(name) for name in (*GYROS[:2], ACCELERATION))
-
-
-def shows_spin(record: Record) -> bool:
-    """True where a signal shows ω3."""
-    return record.has(GYROS[2]) or len(record.sun_pulses) > 0
+def _tells_attitude(spacecraft: Spacecraft, record: Record) -> bool:
+    """True for a record of the axis, or of two directions: of one the attitude may be turned about it."""
+    if record.has("axis_x"):
+        return True
+    directions = [record.samples(DIRECTION)[1]]
+    if record.has(SUN_ASPECT) and spacecraft.sun is not None:
+        directions.append(spacecraft.sun[None, :])
+    every = np.concatenate(directions)
+    return len(every) > 0 and bool(np.linalg.norm(np.cross(every, every[0]), axis=1).max() > APART)
 
 
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
@@ -298,5 +239,6 @@ def untold(record: Record) -> Iterator[str]:
         yield "a coast fixes C/A only, never A and C apart: what it does not fix stays at the tolerances of the file"
     if not record.has(GYROS[2]) and (record.has(GYROS[0]) or record.has(GYROS[1])):
         yield "without omega_3 a misalignment of the gyros times the spin counts as their bias"
-    if not shows_spin(record):
-        yield f"no signal shows the spin (omega_3 or {SUN_PULSE}): it is that of the file"
+    if not record.shows_spin:
+        shown = ", ".join(kind.name for kind in KINDS if kind.spin)
+        yield f"no signal shows the spin ({shown}): it is that of the file"

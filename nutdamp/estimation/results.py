@@ -15,12 +15,16 @@ import numpy as np
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import step
 from nutdamp.estimation.fit import KEPT, Fit
-from nutdamp.estimation.model import OF_SENSORS, Body, Matrix, Values, Vector
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, shows_spin, shows_turn, thrust_prior
-from nutdamp.physics import attitude, triaxial
+from nutdamp.estimation.model import OF_SENSORS, Body
+from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, thrust_prior
+from nutdamp.estimation.signals import Matrix, Values, Vector
+from nutdamp.physics import attitude
 from nutdamp.physics.triaxial import arc_cones
-from nutdamp.spacecraft.model import Inertia, Spacecraft, SpinState
+from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
+
+WHEEL = "wheel momentum"
+"""Input of a wheel that is estimated."""
 
 DEG = math.pi / 180.0
 
@@ -99,7 +103,9 @@ class Carried:
     def factors(self) -> dict[str, tuple[float, float]]:
         """Thrust factors and their sigmas by thruster."""
         rows = zip(self.names, self.values.tolist(), self.sigmas.tolist(), strict=True)
-        return {name.removeprefix("thrust "): (value, sigma) for name, value, sigma in rows if " " in name}
+        return {
+            name.removeprefix("thrust "): (value, sigma) for name, value, sigma in rows if name.startswith("thrust ")
+        }
 
     @property
     def quaternion(self) -> Vector:
@@ -123,12 +129,14 @@ def carried(fitted: Fit, time: float) -> Carried:
         kind, _, name = parameter.name.partition(" ")
         if kind == "thrust" and name in channels and _calibrated(fitted, name):
             factors |= {f"thrust {member.name}": parameter.name for member in channels[name].thrusters}
-    names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *factors)
+    more = {WHEEL: "wheel"} if fitted.index("wheel") is not None else {}
+    more |= factors
+    names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *more)
 
     def inputs(values: Values) -> Vector:
         body, state = model.at(values, time)
         rates = body.axes @ state.rates
-        return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in factors.values())])
+        return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in more.values())])
 
     slopes, tilt = derivatives(fitted, inputs), None
     if fitted.index("attitude_1") is not None:
@@ -162,7 +170,7 @@ def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
     """The ``spacecraft`` of the file with moments, motion and attitude of the estimate, and nothing else of it."""
     return replace(
         spacecraft,
-        inertia=Inertia(known.body.moments, known.body.axes),
+        inertia=known.body.inertia,
         omega0=known.state.rates,
         attitude=None if spacecraft.attitude is None else replace(spacecraft.attitude, quaternion=known.quaternion),
     )
@@ -179,6 +187,7 @@ def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
         of_file,
         A=of_A,
         C=of_C,
+        wheel_momentum=(Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum),
         omega0=(first, second, third),
         thrust={**of_file.thrust, **thrust},
         attitude=of_file.attitude if known.tilt is None else Tolerance("normal", known.tilt),
@@ -225,7 +234,7 @@ def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
 
 def _axis_covariance(fitted: Fit, time: float) -> Matrix:
     """Covariance (3, 3) of the inertial unit vector along the spin axis."""
-    sense = math.copysign(1.0, fitted.model.spacecraft.spin)
+    sense = fitted.model.spacecraft.sense
 
     def axis(values: Values) -> Vector:
         _, state = fitted.model.at(values, time)
@@ -249,12 +258,13 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
         body, state = model.at(values, time)
         x, y = _transverse((body, state))
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
-        nutation = arc_cones(body.moments, state.rates, math.copysign(1.0, state.spin)).nutation
+        sense = math.copysign(1.0, body.inertia.axial(state.spin))
+        nutation = arc_cones(body.moments, state.rates, sense, body.wheel).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
     slopes = derivatives(fitted, motion)
     values, sigmas = motion(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
-    if not shows_turn(model.record):
+    if not model.record.shows_turn:
         sigmas[3] = math.inf
     omega = complex(*spacecraft.rates[:2])
     file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
@@ -303,8 +313,13 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
     for (key, label, unit, file, prior), value, sigma in zip(rows, values, sigmas, strict=True):
         if sigma > 0.0:
             yield Estimate(key, label, unit, 1.0, float(value), float(sigma), file, prior)
-    if shows_turn(fitted.model.record) and not shows_spin(fitted.model.record):
+    if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
         yield _rate(fitted)
+    if fitted.index("wheel") is not None:
+        assert given is not None
+        assert given.wheel_momentum is not None
+        known = prior_of(given.wheel_momentum, inertia.wheel)[1]
+        yield Estimate("wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known)
     if fitted.index("growth") is not None:
         value, sigma = _at(fitted, "growth")
         yield Estimate("growth", "growth 1/τ", "1/s", 1.0, value, sigma, spacecraft.growth, None)
@@ -320,12 +335,12 @@ def _rate(fitted: Fit) -> Estimate:
 
     def rate(values: Values) -> Vector:
         body = fitted.model.body(values)
-        return np.array([triaxial.body_nutation_rate(body.moments, body.state.spin)])
+        return np.array([body.inertia.nutation_rate(body.state.spin)])
 
     slopes = derivatives(fitted, rate)
     value, sigma = float(rate(fitted.named)[0]), math.sqrt(float((slopes @ fitted.covariance @ slopes.T)[0, 0]))
     inertia, spin = fitted.model.spacecraft.inertia, fitted.model.spacecraft.spin
-    file = triaxial.body_nutation_rate(inertia.moments, spin)
+    file = inertia.nutation_rate(spin)
     return Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, value, sigma, file, None)
 
 
@@ -393,10 +408,11 @@ def doubts(fitted: Fit) -> Iterator[str]:
             f"the transverse moments of inertia differ by {apart:.2g} %, and in the file they are equal: all else is "
             "estimated with what they are; give the tensor"
         )
-    if not shows_turn(fitted.model.record):
+    if not fitted.model.record.shows_turn:
         yield (
-            "the axis alone does not show how the body is turned about it: the phase, and so the firing times of a "
-            "plan, rest on the attitude of the file; omega_1 or omega_2, an acceleration or Sun pulses would show it"
+            f"{' and '.join(fitted.model.signals)} alone does not show how the body is turned about its axis: the "
+            "phase, and so the firing times of a plan, rest on the attitude of the file; omega_1 or omega_2, an "
+            "acceleration, Sun pulses, crossings or quaternions would show it"
         )
     yield from _of_residuals(fitted)
     yield from _of_schedule(fitted)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.model import Matrix, Model, Vector
-from nutdamp.estimation.parameters import SUN_PULSE, quantisation
+from nutdamp.estimation.model import Model
+from nutdamp.estimation.signals import KIND, SUN_PULSE, Matrix, Vector, quantisation
 
 NORMAL_MAD = 1.4826
 """Standard deviation of normal numbers over their median magnitude."""
@@ -42,8 +42,8 @@ def least(model: Model) -> Vector:
     sigmas = []
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
-        step = model.record.sun_step if name == SUN_PULSE else 0.0 if name == "axis" else quantisation(values)
-        size = {"axis": 1.0, SUN_PULSE: 1.0 / abs(model.spacecraft.spin)}.get(name, float(np.abs(values).max()))
+        step = model.record.sun_step if name == SUN_PULSE else 0.0 if KIND[name].off else quantisation(values)
+        size = _spin_periods(model, name) if KIND[name].off else float(np.abs(values).max())
         sigmas.append(max(step / math.sqrt(12.0), ROUNDING * size))
     return np.array(sigmas)
 
@@ -86,17 +86,21 @@ def scales_of(model: Model) -> Vector:
     for index, name in enumerate(model.signals):
         values = model.measured[model.signal == index]
         spread = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
-        scales.append(0.1 * spread or {"axis": 1e-3, SUN_PULSE: 0.01 / abs(model.spacecraft.spin)}.get(name, 1e-4))
+        scales.append(0.1 * spread or KIND[name].spread * _spin_periods(model, name))
     return np.array(scales)
+
+
+def _spin_periods(model: Model, name: str) -> float:
+    """One radian of the spin, s, of times; else 1."""
+    return 1.0 / abs(model.spacecraft.spin) if KIND[name].unit == "s" else 1.0
 
 
 def share_left(model: Model, values: Vector) -> float:
     """Least share of a signal's own variation that the residuals still have."""
     left = residuals(model, values)
     shares = []
-    for index, name in enumerate(model.signals):
+    for index, shown in enumerate(model.samples):
         rows = model.signal == index
-        shown = model.measured[rows, None] if name != "axis" else model.axes
         varied = float(np.median(np.linalg.norm(shown - np.median(shown, axis=0), axis=1)))
         if varied > 0.0:
             shares.append(float(np.median(np.abs(left[rows]))) / varied)
@@ -121,8 +125,7 @@ def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: b
 
 def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
-    spin = abs(model.spacecraft.spin)
-    usual = {"rad/s": 1e-2 * spin, "1/s": 0.1 / max(model.record.length, 1e-9)}
+    usual = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
     return np.array(
         [
             parameter.prior if math.isfinite(parameter.prior) else usual.get(parameter.unit, 1e-2)

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.errors import BadRequest, CannotWrite
-from nutdamp.figures import geometry, history, sphere, style
+from nutdamp.errors import CannotWrite
+from nutdamp.figures import geometry, history, image, sphere, style
 from nutdamp.figures.style import INK, MOTION
 from nutdamp.flight.propagation import Flight
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -54,10 +54,7 @@ def film_format(path: str) -> str:
 
     Raises BadRequest for others, MissingExtra without matplotlib, CannotWrite for mp4 without ffmpeg.
     """
-    ending = "gif" if path == "-" else Path(path).suffix.lstrip(".").lower()
-    if ending not in FORMATS:
-        raise BadRequest(f"--output {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
-    style.require()
+    ending = image.ending(path, "--output", FORMATS)
     if ending == "mp4" and shutil.which("ffmpeg") is None:
         raise CannotWrite(path, "mp4 is made by ffmpeg, which is not installed; install it, or name a .gif")
     return ending

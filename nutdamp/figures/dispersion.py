@@ -61,38 +61,29 @@ PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
 
 
-@style.styled
 def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
     """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
-    body, model = results.study.model.spacecraft, results.study.model
-    panels = PANELS[name]
+    return _figure(name, results, f"{scheme} by {model_name([results.study.model.schedule])}")
+
+
+def loop_cases_figure(results: LoopResults) -> Figure:
+    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
+    return _figure("cases", results, "closed loop by real pulse widths")
+
+
+@style.styled
+def _figure(name: str, results: Results | LoopResults, how: str) -> Figure:
+    panels, body, share = PANELS[name], results.study.model.spacecraft, results.met_fraction
     figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
     axes = list(figure.subplots(1, panels, squeeze=False)[0])
     if name != "momentum":
         _cases(axes[:2], results, body)
-    if name != "cases":
+    if isinstance(results, Results) and name != "cases":
         _momentum(axes[-1], results)
     style.legend(figure, axes, 2 if name == "momentum" else 8)
-    _head(figure, results, body, f"{scheme} by {model_name([model.schedule])}, {results.done:,} dispersed cases")
-    return figure
-
-
-@style.styled
-def loop_cases_figure(results: LoopResults) -> Figure:
-    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
-    figure = style.sheet(7.4, 3.9)
-    axes = list(figure.subplots(1, 2))
-    _cases(axes, results, results.study.spacecraft)
-    style.legend(figure, axes)
-    how = f"closed loop by real pulse widths, {results.done:,} dispersed cases"
-    _head(figure, results, results.study.spacecraft, how)
-    return figure
-
-
-def _head(figure: Figure, results: Results | LoopResults, body: Spacecraft, text: str) -> None:
-    share = results.met_fraction
     verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
-    style.heading(figure, body, text + verdict)
+    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases{verdict}")
+    return figure
 
 
 def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft) -> None:
@@ -174,9 +165,7 @@ def ellipse(points: Vector, share: float) -> Vector:
     sizes = np.sqrt(np.maximum(variances, 0.0))
     along = (points - middle) @ vectors
     away = np.hypot(*np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 0.0).T)
-    turn = np.linspace(0.0, 2.0 * math.pi, 121)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)]) * sizes * float(np.quantile(away, share))
-    return np.asarray(middle + circle @ vectors.T)
+    return np.asarray(middle + geometry.circle() * sizes * float(np.quantile(away, share)) @ vectors.T)
 
 
 def _momentum(axes: Axes, results: Results) -> None:
@@ -210,8 +199,7 @@ def _momentum(axes: Axes, results: Results) -> None:
     axes.plot(*around.T, color=MOMENTUM, linewidth=1.5, label=held)
     shown = [points, around]
     if limit is not None and limit <= FAR * widest:
-        turn = np.linspace(0.0, 2.0 * math.pi, 121)
-        shown.append(limit * np.column_stack([np.cos(turn), np.sin(turn)]))
+        shown.append(limit * geometry.circle())
         axes.plot(*shown[-1].T, **style.LIMIT)
     style.square(axes, np.vstack(shown), margin=0.08)
     if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.physics import attitude, triaxial
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
+
+Item = TypeVar("Item")
 
 ROWS_A_TURN = 60
 """Rows in a nutation period from which a polygon looks like the curve."""
@@ -125,20 +127,27 @@ def blocks(flight: Flight, until: float, channel: str | None = None) -> list[Fir
 
     These begin within `CLOSE` of the time shown one after the other, `MANY` at least.
     """
-    groups: list[list[tuple[int, Pulse]]] = []
-    for number, pulse in enumerate(flight.schedule, start=1):
-        if pulse.start > until or channel not in (None, pulse.channel):
-            continue
-        if groups and pulse.start - groups[-1][-1][1].start < CLOSE * until:
-            groups[-1].append((number, pulse))
-        else:
-            groups.append([(number, pulse)])
+    firings = [
+        (number, pulse)
+        for number, pulse in enumerate(flight.schedule, start=1)
+        if pulse.start <= until and channel in (None, pulse.channel)
+    ]
     fired = []
-    for group in groups:
-        for part in [group] if len(group) >= MANY else [[firing] for firing in group]:
-            ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
-            fired.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
+    for part in runs(firings, lambda one, next_: next_[1].start - one[1].start < CLOSE * until, MANY):
+        ends, on = max(pulse.end for _, pulse in part), sum(pulse.on_time for _, pulse in part)
+        fired.append(FiredBlock(part[0][0], part[-1][0], len(part), part[0][1].start, ends, on))
     return fired
+
+
+def runs(items: Sequence[Item], near: Callable[[Item, Item], bool], least: int) -> list[list[Item]]:
+    """Items together where each is ``near`` the one before and there are ``least`` of them; all others alone."""
+    groups: list[list[Item]] = []
+    for item in items:
+        if groups and near(groups[-1][-1], item):
+            groups[-1].append(item)
+        else:
+            groups.append([item])
+    return [part for group in groups for part in ([group] if len(group) >= least else [[alone] for alone in group])]
 
 
 def sky_plane(flight: Flight, momentum: Vector) -> Vector:
@@ -180,6 +189,12 @@ def on_sky(plane: Vector, directions: Vector) -> Vector:
 def pole_path(track: Track) -> Vector:
     """(n, 2): ω1 and ω2 in deg/s, the pole curve (Magnus 1970 fig. 5)."""
     return np.asarray(np.degrees(track.rates[:, :2]), dtype=np.float64)
+
+
+def pole_note(flight: Flight) -> str:
+    """Words behind the names of the axes of the pole curve; empty where they are those of the file."""
+    body = flight.spacecraft
+    return ", principal axes" * (not body.inertia.aligned) + ", spin about −3" * (body.spin < 0.0)
 
 
 def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
@@ -244,6 +259,15 @@ def hull(points: Vector) -> Vector:
     return np.array(sides)
 
 
+def ticks(low: float, high: float, most: int) -> list[float]:
+    """At most ``most`` round numbers from ``low`` to ``high``, a step of 1, 2 or 5 times a power of ten apart."""
+    rough = (high - low) / max(most, 1)
+    decade = 10.0 ** math.floor(math.log10(rough))
+    step = next(unit * decade for unit in (1.0, 2.0, 5.0, 10.0, 20.0) if unit * decade >= rough * (1 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [count * step + 0.0 for count in range(first, last + 1)]
+
+
 class DrawnCones(NamedTuple):
     """Body cone and space cone at one moment, as unit vectors in the inertial frame.
 
@@ -301,10 +325,14 @@ def around(axis: Vector, start: Vector) -> Vector:
     square = start - axis * (axis @ start)
     if np.linalg.norm(square) < NO_CONE:
         return np.empty((0, 3))
-    turn = np.linspace(0.0, 2 * math.pi, RIM)[:, None]
-    return np.asarray(
-        axis * (axis @ start) + np.cos(turn) * square + np.sin(turn) * np.cross(axis, square), dtype=np.float64
-    )
+    cosine, sine = circle().T[..., None]
+    return np.asarray(axis * (axis @ start) + cosine * square + sine * np.cross(axis, square), dtype=np.float64)
+
+
+def circle(count: int = RIM) -> Vector:
+    """``count`` points (n, 2) from (1, 0) once around the unit circle, back to where they began."""
+    turn = np.linspace(0.0, 2.0 * math.pi, count)
+    return np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def closed(spacecraft: Spacecraft, until: float) -> list[tuple[float, float]]:

@@ -46,10 +46,15 @@ CHANGES = 1e-3
 
 def heights(flight: Flight, track: Track) -> list[float]:
     """Height of each panel, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
-    rows = len(geometry.channels_fired(flight))
     spin = track.rates[:, 2]
     changes = float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max())
-    return [1.9, *([0.3 + 0.36 * rows] * bool(rows)), 1.5, *([0.9] * changes)]
+    return [1.9, *firings_height(flight), 1.5, *([0.9] * changes)]
+
+
+def firings_height(flight: Flight) -> list[float]:
+    """Inches of the panel of `firings`, for each row a bar, its number, and room; empty where nothing fires."""
+    rows = len(geometry.channels_fired(flight))
+    return [0.3 + 0.36 * rows] * bool(rows)
 
 
 def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
@@ -88,10 +93,8 @@ def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
         axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
         axes.axhline(limit, **style.LIMIT)
     axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
-    _finish(axes, flight, track, "θ, ° (log)")
-    axes.set_yscale("log")
-    axes.set_ylim(low, 2.0 * (most if limit is None else max(most, limit)))
-    style.log_axis(axes.yaxis)
+    _bands(axes, flight, track)
+    style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
     text, colour = _verdict(flight)
     last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
     axes.set_title(last + text, loc="right", color=colour, **style.NOTE)
@@ -118,7 +121,9 @@ def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
     axes.plot(track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2")
     half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
     axes.set_ylim(-half, half)
-    _finish(axes, flight, track, "ω1, ω2, °/s")
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω1, ω2, °/s")
+    axes.grid()
 
 
 def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
@@ -126,19 +131,19 @@ def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
     spin = np.degrees(track.rates[:, 2])
     axes.plot(track.t, spin, color=MOTION, label="_ω3")
     axes.margins(y=0.12)
-    _finish(axes, flight, track, "ω3, °/s")
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω3, °/s")
+    axes.grid()
     axes.locator_params(axis="y", nbins=3)
 
 
-def _finish(axes: Axes, flight: Flight, track: Track, name: str) -> None:
-    """Time axis, bands of the firings, and the quantity."""
+def _bands(axes: Axes, flight: Flight, track: Track) -> None:
+    """Time axis, and bands of the firings."""
     until = float(track.t[-1])
     axes.set_xlim(-EDGE * until, until)
     look: dict[str, Any] = {"facecolor": (PULSE, 0.25), "edgecolor": PULSE, "linewidth": 0.6, "zorder": 0.5}
     for number, block in enumerate(geometry.blocks(flight, until)):
         axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
-    axes.set_ylabel(name)
-    axes.grid()
 
 
 def firings(axes: Axes, flight: Flight, until: float) -> None:

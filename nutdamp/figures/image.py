@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "svg", "pdf")
+
+POINTS = 72.0
+"""Units of an SVG in an inch."""
 
 LONG = 30
 """Points of a polyline from which an inline SVG has it in tenths of a point, half a pixel at four times its size."""
@@ -34,14 +38,14 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def ending(path: str) -> str:
-    """The format of a picture by the ending of its file, png for standard output.
+def ending(path: str, option: str = "--plot", formats: Sequence[str] = FORMATS) -> str:
+    """The format of a picture by the ending of its file, the first of ``formats`` for standard output.
 
     Raises BadRequest for other endings, MissingExtra without matplotlib.
     """
-    suffix = "png" if path == "-" else Path(path).suffix.lstrip(".").lower()
-    if suffix not in FORMATS:
-        raise BadRequest(f"--plot {path}: the ending says the format; use one of .{', .'.join(FORMATS)}")
+    suffix = formats[0] if path == "-" else Path(path).suffix.lstrip(".").lower()
+    if suffix not in formats:
+        raise BadRequest(f"{option} {path}: the ending says the format; use one of .{', .'.join(formats)}")
     style.require()
     return suffix
 
@@ -112,3 +116,21 @@ def svg(figure: Figure) -> str:
     text = re.sub(r'<path d="[^"]*"([^>]*)/>(?:</g><g><path d="[^"]*"\1/>)+', _joined, text)
     mark = "n" + hashlib.sha256(text.encode()).hexdigest()[:8] + "-"
     return re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{mark}", text)
+
+
+def untitled_svg(figure: Figure) -> str:
+    """The SVG of a figure without the line above it, which breaks where it must as text of the page."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    title = figure._suptitle  # type: ignore[attr-defined]  # there is no other way to it
+    if title is None:
+        return svg(figure)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+    figure.set_layout_engine("none")  # which would move the panels to where the title was
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    top = POINTS * (figure.get_figheight() - title.get_window_extent(renderer).y0 / figure.dpi)
+    title.set_visible(False)
+    box = f"0 {top:.1f} {POINTS * figure.get_figwidth():.1f} {POINTS * figure.get_figheight() - top:.1f}"
+    return re.sub(r'(?<=\bviewBox=")[^"]*', box, svg(figure), count=1)

@@ -12,7 +12,7 @@ from nutdamp.control_loop.budget import DAY, Budget, HeldNutation
 from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.control_loop.sensor import Signal
 from nutdamp.figures import labels, style
-from nutdamp.figures.history import TIME, firings
+from nutdamp.figures.history import EDGE, TIME, firings, firings_height
 from nutdamp.figures.overview import title
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.spacecraft.equipment import GYRO
@@ -29,9 +29,6 @@ SAMPLES = 3000
 
 BLOCK = 4096
 """Samples evaluated together."""
-
-ROW = 0.36
-"""Inches from one row of firings to the next: a bar, its number, and room."""
 
 DECADES = 5.0
 """Largest number of decades of the nutation on its log axis."""
@@ -56,28 +53,24 @@ def loop_figure(plan: LoopPlan) -> Figure:
     """Signal of the sensor, nutation with thresholds, and firings: the whole run, and beside it its first seconds."""
     run = plan.flown_run
     spans = [run.until, first_seconds(plan)] if first_seconds(plan) < SHORT * run.until else [run.until]
-    names = len({firing.pulse.channel for firing in run.fired})
-    heights = [1.8, 1.8, *([0.3 + ROW * names] * bool(names))]
+    heights = [1.8, 1.8, *firings_height(run.flight)]
     figure = style.sheet(7.4 if len(spans) == 1 else 10.4, 1.8 + sum(heights))
     shape: dict[str, Any] = {"height_ratios": heights, "width_ratios": [1.5, 1.0][: len(spans)]}
     panels = figure.subplots(len(heights), len(spans), squeeze=False, sharex="col", **shape)
     for column, until in zip(panels.T, spans, strict=True):
         _signal(column[0], plan, until)
         _nutation(column[1], plan, until)
-        if names:
+        if run.fired:
             firings(column[2], run.flight, until)
-        column[0].set_xlim(-0.012 * until, until)
+        column[0].set_xlim(-EDGE * until, until)
         column[-1].set_xlabel(TIME)
     if len(spans) > 1:
         panels[0, 1].set_title(f"The first {style.number(spans[1])} s")
     style.legend(figure, list(panels.ravel()))
-    style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{_loop(plan)}")
+    loop = described(run.loop, thresholds=False).replace(" deg", "°")
+    style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
     labels.settle(figure)
     return figure
-
-
-def _loop(plan: LoopPlan) -> str:
-    return described(plan.flown_run.loop, thresholds=False).replace(" deg", "°")
 
 
 def first_seconds(plan: LoopPlan) -> float:
@@ -136,11 +129,7 @@ def _nutation(axes: Axes, plan: LoopPlan, until: float) -> None:
     axes.axhline(start, color=GREY, linewidth=0.9, linestyle="--", label="start")
     if stop > 0.0:
         axes.axhline(stop, color=GREY, linewidth=0.9, linestyle=":", label="stop")
-    axes.set_yscale("log")
-    axes.set_ylim(low, 2.0 * most)
-    style.log_axis(axes.yaxis)
-    axes.set_ylabel("θ, ° (log)")
-    axes.grid()
+    style.log_angles(axes, low, 2.0 * most)
 
 
 @style.styled
@@ -156,25 +145,19 @@ def budget_figure(budget: Budget) -> Figure:
     axes.plot(times / seconds, free, color=INK, label="no firing")
     for row, (colour, line) in zip(held, LINES, strict=False):
         drawn, angles = _sawtooth(body.growth, row, size)
-        axes.plot(drawn / seconds, angles, color=colour, linestyle=line, label=_named(row))
+        name = f"{style.angle(row.thresholds.start)} to {style.angle(row.thresholds.stop)}"
+        axes.plot(drawn / seconds, angles, color=colour, linestyle=line, label=name)
     if budget.largest is not None:
         axes.axhline(math.degrees(budget.largest), **{**style.LIMIT, "label": "largest allowed"})
     lows = [math.degrees(row.cycle.low) for row in held if row.cycle is not None]
     highest = [math.degrees(row.cycle.largest) for row in held if row.cycle is not None]
     top = max([*highest, math.degrees(budget.largest or 0.0), float(free[0])])
-    axes.set_yscale("log")
-    axes.set_ylim(0.5 * min([*lows, max(float(free.min()), 1e-3 * top)]), 3.0 * top)
-    style.log_axis(axes.yaxis)
-    axes.set(xlabel=f"time, {unit}", ylabel="θ, ° (log)", xlim=(0.0, size / seconds))
-    axes.grid()
+    style.log_angles(axes, 0.5 * min([*lows, max(float(free.min()), 1e-3 * top)]), 3.0 * top)
+    axes.set(xlabel=f"time, {unit}", xlim=(0.0, size / seconds))
     style.legend(figure, [axes])
     how = "held by the limit cycle of the loop" if held else "without firing"
     style.heading(figure, body, f"nutation under dissipation, {how}")
     return figure
-
-
-def _named(row: HeldNutation) -> str:
-    return f"{style.angle(row.thresholds.start)} to {style.angle(row.thresholds.stop)}"
 
 
 def _shown(budget: Budget, held: Sequence[HeldNutation]) -> float:

@@ -63,11 +63,8 @@ def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     _path(axes, flight, track, rates)
     arrows = _directions(axes, flight, size)
     style.square(axes, rates, margin=0.45 if arrows else 0.12, centre=True)
-    body = flight.spacecraft
-    note = "" if body.inertia.aligned else ", principal axes"
-    note += ", spin about −3" if body.spin < 0.0 else ""
     title = "Pole curve: ω in the body" + ("\narrows: torque of the channels" if arrows else "")
-    axes.set(xlabel=f"ω1, °/s{note}", ylabel="ω2, °/s", title=title)
+    axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
 
 
 def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
@@ -188,13 +185,7 @@ def together(places: Sequence[Vector], width: float) -> list[list[int]]:
     numbered = style.thinned(len(places), NUMBERED)
     if len(numbered) < len(places):
         return [[number] for number in numbered]
-    groups: list[list[int]] = []
-    for number in numbered:
-        if groups and np.hypot(*(places[number] - places[groups[-1][-1]])) < NEAR * width:
-            groups[-1].append(number)
-        else:
-            groups.append([number])
-    return [part for group in groups for part in ([group] if len(group) >= CROWD else [[alone] for alone in group])]
+    return geometry.runs(numbered, lambda a, b: bool(np.hypot(*(places[b] - places[a])) < NEAR * width), CROWD)
 
 
 def _refined(rows: Vector) -> Vector:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,8 +35,8 @@ SPACE, BODY = 0.28, 0.15
 RIM = 0.7
 """Width of rims and edges of cones, points: thinner than the path of the spin axis, which shares their colour."""
 
-MARKS = "+os"
-"""Marks of H, ω and the spin axis in the plane picture."""
+DIRECTIONS = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"))
+"""Marks in the plane picture, colours and names of the three directions that lie in one plane."""
 
 HIDDEN = 0.04
 """Share of the space cone below which the body cone lies under the marks of spin axis and ω."""
@@ -105,7 +104,7 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
         place = looked.seen(target)[0]
         axes.plot(*place.T, label="_target", **style.TARGET)
         labels.add(axes, "target", place[0], INK, role="vital")
-    _name_tips(axes, rolling, lambda direction: looked.seen(direction)[0][0])
+    _name_tips(axes, looked.seen(_directions(rolling))[0])
     name_lines(axes, rolling, fired=fired)
     frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, *aimed(flight)]))
     much = looked.magnified
@@ -116,11 +115,10 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
     """The sphere, where nothing is magnified, and the path of H."""
     if looked.magnified == 1.0:
-        turn = np.linspace(0.0, 2 * math.pi, 181)
-        axes.plot(np.cos(turn), np.sin(turn), color=GREY, linewidth=0.7)
+        circle = geometry.circle(181)
+        axes.plot(*circle.T, color=GREY, linewidth=0.7)
         for height in (0.0, 0.5, math.sqrt(0.75)):
-            radius = math.sqrt(1.0 - height * height)
-            ring = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full_like(turn, height)])
+            ring = np.insert(math.sqrt(1.0 - height * height) * circle, 2, height, axis=1)
             draw_line(axes, looked, ring @ looked.plane, FAINT, 0.6, back=False)
     momentum, _ = looked.seen(track.momentum / np.linalg.norm(track.momentum, axis=1, keepdims=True))
     axes.plot(*geometry.once(momentum).T, **style.PATH_OF_H)
@@ -145,8 +143,7 @@ def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
     for rim, within, colour, alpha in _rims(rolling):
         if len(rim):
             _cone(axes, looked, rim, within, (colour, alpha))
-    for direction, colour, _ in _directions(rolling):
-        tip = looked.seen(direction)[0][0]
+    for tip, (_, colour, _) in zip(looked.seen(_directions(rolling))[0], DIRECTIONS, strict=True):
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
 
@@ -171,13 +168,13 @@ def _hidden(rolling: DrawnCones) -> str:
 
 def name_directions(axes: Axes) -> None:
     """The marks of `draw_circles` for the legend."""
-    named = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"), ("D", MOTION, "body axis 1"))
-    for mark, colour, name in named:
+    for mark, colour, name in (*DIRECTIONS, ("D", MOTION, "body axis 1")):
         axes.plot([], [], mark, color=colour, markersize=5, markeredgewidth=1.4, label=name)
 
 
-def _directions(rolling: DrawnCones) -> tuple[tuple[Vector, str, str], ...]:
-    return (rolling.momentum, MOMENTUM, "H"), (rolling.rotation, INK, "ω"), (rolling.axis, MOTION, "spin axis")
+def _directions(rolling: DrawnCones) -> Vector:
+    """(3, 3): the `DIRECTIONS` at one moment."""
+    return np.array([rolling.momentum, rolling.rotation, rolling.axis])
 
 
 def aimed(flight: Flight) -> Vector:
@@ -185,11 +182,9 @@ def aimed(flight: Flight) -> Vector:
     return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
 
 
-def _name_tips(axes: Axes, rolling: DrawnCones, place: Callable[[Vector], Vector]) -> None:
-    """The names of the three directions at the tips of their arrows, each in the colour of its own."""
-    named = _directions(rolling)
-    tips = np.array([place(direction) for direction, _, _ in named])
-    for number, (_, colour, name) in enumerate(named):
+def _name_tips(axes: Axes, tips: Vector) -> None:
+    """The names of the `DIRECTIONS` at the ``tips`` (3, 2) of their arrows, each in the colour of its own."""
+    for number, (_, colour, name) in enumerate(DIRECTIONS):
         meant = labels.Meant(tips[[number]], np.delete(tips, number, axis=0))
         labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
 
@@ -221,11 +216,7 @@ def frame(axes: Axes, looked: View, directions: Vector) -> None:
     points = np.vstack([[[0.0, 0.0]], looked.seen(unit)[0]])
     if looked.magnified == 1.0:
         points = np.vstack([points, [[-1.0, -1.0], [1.0, 1.0]]])
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = 0.5 * (low + high), 0.56 * float((high - low).max())
-    axes.set_xlim(middle[0] - half, middle[0] + half)
-    axes.set_ylim(middle[1] - half, middle[1] + half)
-    axes.set_aspect("equal", adjustable="box")
+    style.square(axes, points, margin=0.12)
     axes.set_axis_off()
 
 
@@ -238,7 +229,7 @@ def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:
             axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
             if within is not rim:  # a rim that does not close: its filled circle has its own outline
                 axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
-    places = geometry.on_sky(plane, np.array([rolling.momentum, rolling.rotation, rolling.axis]))
+    places = geometry.on_sky(plane, _directions(rolling))
     axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
-    for place, mark, (_, colour, _) in zip(places, MARKS, _directions(rolling), strict=True):
+    for place, (mark, colour, _) in zip(places, DIRECTIONS, strict=True):
         axes.plot(*place, mark, color=colour, markersize=8 if mark == "+" else 4.5, markeredgewidth=1.4)

@@ -198,6 +198,15 @@ def log_axis(axis: Axis) -> None:
     axis.set_minor_formatter("")
 
 
+def log_angles(axes: Axes, low: float, high: float) -> None:
+    """Log axis of the nutation, degrees."""
+    axes.set_yscale("log")
+    axes.set_ylim(low, high)
+    log_axis(axes.yaxis)
+    axes.set_ylabel("θ, ° (log)")
+    axes.grid()
+
+
 def number(value: float) -> str:
     """A number with `FIGURES` significant figures."""
     return digits(value, FIGURES)

@@ -109,7 +109,7 @@ def _names(facts: Facts, key: str, chosen: list[str | int], thrusters: list[str]
         return [f"{key.replace('_', ' ')} {axis}" for axis in (1, 2)]
     if letters:
         return [f"{word} {letter}" for letter in letters]
-    spaced = key.startswith(("tank_", "sensor_", "timing_"))
+    spaced = key.startswith(("tank_", "sensor_", "timing_", "wheel_"))
     return [key.replace("_", " ", 1) if spaced else key]
 
 

@@ -162,8 +162,11 @@ def motion_edits(tree: Node, later: Later) -> Edits:
 
 
 def inertia_edits(tree: Node, later: Later) -> Edits:
-    """Moments of inertia."""
+    """Moments of inertia, and the momentum of a wheel."""
     inertia = later.after.inertia
+    if inertia.wheel != later.before.inertia.wheel:
+        given = tree.get("wheel", "momentum")
+        yield ("wheel", "momentum"), as_before(given, inertia.wheel, "momentum", "N m s")
     if tree.get("inertia", "tensor") is None and inertia.symmetric:
         for key, value in (("A", inertia.A), ("C", inertia.C)):
             yield ("inertia", key), as_before(tree.get("inertia", key), value, "inertia", "kg m^2")

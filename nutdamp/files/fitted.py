@@ -9,8 +9,8 @@ from dataclasses import replace
 
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import Fit
-from nutdamp.estimation.parameters import ACCELERATION
-from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, Carried, correlations, replaced
+from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
+from nutdamp.estimation.signals import ACCELERATION
 from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits
 from nutdamp.files.overrides import Setting
 from nutdamp.files.reader import Source
@@ -58,7 +58,7 @@ def notes(fit: Fit, carried: Carried) -> Iterator[str]:
     growth = fit.index("growth")
     if growth is not None:
         value, sigma = float(fit.values[growth]), float(fit.sigmas[growth])
-        if abs(value) > SEEN * sigma and not _grows_so(carried, value):
+        if abs(value) > SEEN * sigma and not (carried.body.wheel or _grows_so(carried, value)):
             way = "grows" if value > 0.0 else "decays"
             yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
     for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("delay ")):
@@ -100,7 +100,9 @@ def _edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
-    """True where dissipation lets the nutation of such a body grow (or decay) at this rate."""
+    """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a wheel not known."""
+    if carried.body.wheel:
+        return False
     first, second, third = carried.body.moments
     return (0.5 * (first + second) - third) * growth > 0.0
 
@@ -146,6 +148,8 @@ def _dispersions(fit: Fit, carried: Carried) -> Edits:
             yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
     rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
     yield ("dispersions", "omega0"), f"[{rates}]"
+    if WHEEL in sigmas:
+        yield ("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}"
     factors, given = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         before = {} if given is None else given.thrust

@@ -1,15 +1,17 @@
 """Telemetry from CSV files: times, and measurements of the motion; an empty cell is a missing sample.
 
 Columns: t_s (from t = 0 of the spacecraft file) or utc; omega_1_rad_s to omega_3_rad_s (or _deg_s); axis_ra_deg and
-axis_dec_deg, or axis_x, axis_y, axis_z; acceleration_m_s2; sun_pulse, 1 from the sample on that has seen one. A track
-of ``simulate --csv`` is such a file. An attitude history (AEM) gives the axis, and the rates where it has them.
+axis_dec_deg, or axis_x, axis_y, axis_z; q_w, q_x, q_y, q_z; acceleration_m_s2; crossing_azimuth_deg and
+crossing_elevation_deg of what is in the direction crossing_ra_deg, crossing_dec_deg, or else of the Sun;
+sun_aspect_deg; sun_pulse, 1 from the sample on that has seen one. A track of ``simulate --csv`` is such a file. An
+attitude history (AEM) gives the quaternions, and the rates where it has them.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, SUN_PULSE, Record
+from nutdamp.estimation.signals import (
+    ACCELERATION,
+    AXIS,
+    DIRECTION,
+    GYROS,
+    QUATERNION,
+    SEEN,
+    SUN_ASPECT,
+    SUN_PULSE,
+    Record,
+    of_quaternions,
+)
 from nutdamp.files.ccsds.history import is_history, read_history, record_of
 from nutdamp.files.tabular import HEADER as TRACK
 from nutdamp.files.tabular import Cells, Table
@@ -30,13 +43,20 @@ Vector = NDArray[np.float64]
 TIMES = ("t_s", "utc")
 RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS}
 ANGLES = ("axis_ra_deg", "axis_dec_deg")
-ACCELERATIONS = "acceleration_m_s2"
-MEASURED = (*RATES, *ANGLES, *AXIS, ACCELERATIONS, SUN_PULSE)
+CROSSED = ("crossing_azimuth_deg", "crossing_elevation_deg")
+TOWARDS = ("crossing_ra_deg", "crossing_dec_deg")
+ACCELERATIONS, ASPECTS = "acceleration_m_s2", "sun_aspect_deg"
+MEASURED = (*RATES, *ANGLES, *AXIS, *QUATERNION, ACCELERATIONS, *CROSSED, *TOWARDS, ASPECTS, SUN_PULSE)
 """Columns of samples."""
 
-UNIT = 0.01
-"""Deviation from length one that a measured axis may have."""
+LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-360.0, 360.0), CROSSED[1]: (-90.0, 90.0),
+          TOWARDS[0]: (-360.0, 360.0), TOWARDS[1]: (-90.0, 90.0), ASPECTS: (0.0, 180.0)}  # fmt: skip
+"""Least and largest angles of columns, deg."""
 
+UNIT = 0.01
+"""Deviation from length one that a measured axis or quaternion may have."""
+UNKNOWN = re.compile(r"omega|axis|accel|sun|rate|gyro|cross|q[_0-9]|(ra|dec)(_|$)", re.IGNORECASE)
+"""Names of columns that are meant to be measured."""
 
 SAME = 0.03
 """Part by which a ratio of rates may differ from that of two units."""
@@ -51,20 +71,20 @@ def read_telemetry(
     """
     if is_history(str(path)):
         history = read_history(str(path))
-        seen = np.empty(0) if sun_pulses is None else read_sun_pulses(sun_pulses, spacecraft)
         record = record_of(history, spacecraft, schedule or Schedule())
-        return replace(record, sun_pulses=seen), [f"{path}: {remark}" for remark in history.remarks]
+        if sun_pulses is not None:
+            record = _with_pulses(record, *read_sun_pulses(sun_pulses, spacecraft))
+        return record, [f"{path}: {remark}" for remark in history.remarks]
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_columns(table)
     rows = [(line, cells) for line, row in table.rows if (cells := table.cells(line, row)) is not None]
     table.check()
     times = _times(table, rows, spacecraft)
     columns = {name: _column(table, rows, name) for name in MEASURED if name in table.header}
-    for name in ANGLES:
-        if name in columns and np.nanmax(np.abs(columns[name]), initial=0.0) > (360.0 if name == ANGLES[0] else 90.0):
-            line = rows[int(np.nanargmax(np.abs(columns[name])))][0]
-            table.fault(line, name, f"expected an angle of at most {360 if name == ANGLES[0] else 90} deg")
-    signals = _signals(table, rows, columns)
+    _expect_angles(table, rows, columns)
+    _expect_whole(table, rows, columns, spacecraft)
+    table.check()
+    signals = _signals(table, rows, columns, spacecraft)
     _expect_unit(table, signals, spacecraft.spin)
     seen, step = _sun_column(table, rows, times, columns.get(SUN_PULSE))
     table.check()
@@ -72,18 +92,76 @@ def read_telemetry(
     if sun_pulses is not None:
         if len(seen):
             warnings.append(f"{table.name}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}")
-        seen, step = read_sun_pulses(sun_pulses, spacecraft), 0.0
+        record = Record(times, signals, schedule=schedule or Schedule())
+        return _with_pulses(record, *read_sun_pulses(sun_pulses, spacecraft)), warnings
     return Record(times, signals, seen, step, schedule or Schedule()), warnings
 
 
-def read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> Vector:
-    """Times (k,) s of Sun pulses in a CSV file with the column t_s or utc; raises CannotRead or FaultyFile."""
-    table = Table(path, TIMES, "Sun pulses")
+def _with_pulses(record: Record, pulses: Vector, aspects: Vector | None) -> Record:
+    """The record with Sun pulses, and Sun aspect angles (k,) at them among its samples."""
+    if aspects is None or not np.isfinite(aspects).any():
+        return replace(record, sun_pulses=pulses, sun_step=0.0)
+    times = np.union1d(record.times, pulses)
+    signals = {name: _spread(times, record.times, values) for name, values in record.signals.items()}
+    at_pulses = _spread(times, pulses, aspects)
+    before = signals.get(SUN_ASPECT, np.full(len(times), math.nan))
+    signals[SUN_ASPECT] = np.where(np.isfinite(at_pulses), at_pulses, before)
+    return replace(record, times=times, signals=signals, sun_pulses=pulses, sun_step=0.0)
+
+
+def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
+    """Values at some of the ``times`` (n,), NaN at the others."""
+    spread = np.full(len(times), math.nan)
+    spread[np.searchsorted(times, those)] = values
+    return spread
+
+
+def read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, Vector | None]:
+    """Times (k,) s of Sun pulses in a CSV file, and the Sun aspect angles (k,) rad if it has that column.
+
+    Raises CannotRead or FaultyFile.
+    """
+    table = Table(path, (*TIMES, ASPECTS), "Sun pulses")
     _expect_time(table)
     table.expect()
     rows = [(line, cells) for line, row in table.rows if (cells := table.cells(line, row)) is not None]
     table.check()
-    return _times(table, rows, spacecraft)
+    times, aspects = _times(table, rows, spacecraft), None
+    if ASPECTS in table.header:
+        columns = {ASPECTS: _column(table, rows, ASPECTS)}
+        _expect_angles(table, rows, columns)
+        table.check()
+        aspects = np.radians(columns[ASPECTS])
+    return times, aspects
+
+
+def _expect_angles(table: Table, rows: Sequence[tuple[int, Cells]], columns: Mapping[str, Vector]) -> None:
+    """A fault for the first angle of each column that is none."""
+    for name, (least, most) in LIMITS.items():
+        if name not in columns:
+            continue
+        wrong = np.flatnonzero((columns[name] < least) | (columns[name] > most))
+        if len(wrong):
+            table.fault(rows[wrong[0]][0], name, f"expected an angle of {least:g} to {most:g} deg")
+
+
+def _expect_whole(
+    table: Table, rows: Sequence[tuple[int, Cells]], columns: Mapping[str, Vector], spacecraft: Spacecraft
+) -> None:
+    """A fault for the first row that has a part of a direction or of a quaternion; for a direction that is not said."""
+    for group in (CROSSED, TOWARDS, QUATERNION):
+        if group[0] not in columns:
+            continue
+        there = np.isfinite([columns[name] for name in group])
+        wrong = np.flatnonzero(there.any(axis=0) & ~there.all(axis=0))
+        if len(wrong):
+            table.fault(rows[wrong[0]][0], group[0], f"expected all of {', '.join(group)}, or none")
+    if CROSSED[0] in columns:
+        told = np.isfinite(columns.get(TOWARDS[0], np.full(len(rows), math.nan)))
+        seen = np.isfinite(columns[CROSSED[0]])
+        if spacecraft.sun is None and (seen & ~told).any():
+            line = rows[int(np.flatnonzero(seen & ~told)[0])][0]
+            table.fault(line, TOWARDS[0], "no direction: that of the Sun needs the key sun in the spacecraft file")
 
 
 def _expect_time(table: Table) -> None:
@@ -100,17 +178,19 @@ def _expect_columns(table: Table) -> None:
     header = table.header
     measured = [name for name in MEASURED if name in header]
     for name in header:
-        if name not in table.known and re.match(r"omega|axis|accel|sun|rate|gyro|(ra|dec)(_|$)", name, re.IGNORECASE):
+        if name not in table.known and UNKNOWN.match(name):
             table.fault(1, name, f"{shown(name)} is no column of telemetry{_instead(name)}")
     if not measured and not table.faults:
         table.fault(1, "", f"no column of samples; expected some of {', '.join(MEASURED)}")
     for name in GYROS:
         if f"{name}_rad_s" in header and f"{name}_deg_s" in header:
             table.fault(1, f"{name}_deg_s", f"given twice, also as {name}_rad_s; remove one of them")
-    for group in (ANGLES, AXIS):
+    for group in (ANGLES, AXIS, QUATERNION, CROSSED, TOWARDS):
         missing = [name for name in group if name not in header]
         if 0 < len(missing) < len(group):
             table.fault(1, missing[0], f"the column is missing beside {next(name for name in group if name in header)}")
+    if TOWARDS[0] in header and CROSSED[0] not in header:
+        table.fault(1, CROSSED[0], f"the column is missing beside {TOWARDS[0]}")
     if set(ANGLES) & set(header) and set(AXIS) & set(header):
         table.fault(1, ANGLES[0], f"the axis is given twice, also as {', '.join(AXIS)}; remove one of them")
     table.expect()
@@ -125,7 +205,9 @@ def _instead(name: str) -> str:
         ("rate", rates),
         ("gyro", rates),
         ("accel", [ACCELERATIONS]),
-        ("sun", [SUN_PULSE]),
+        ("sun", [SUN_PULSE, ASPECTS]),
+        ("cross", [*CROSSED, *TOWARDS]),
+        ("q", list(QUATERNION)),
         ("", [*ANGLES, *AXIS]),
     ):
         if lowered.startswith(word):
@@ -178,34 +260,55 @@ def _column(table: Table, rows: list[tuple[int, Cells]], name: str) -> Vector:
     return values
 
 
-def _signals(table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector]) -> dict[str, Vector]:
-    """Measured body rates, axis and acceleration, in SI."""
+def _signals(
+    table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector], spacecraft: Spacecraft
+) -> dict[str, Vector]:
+    """Measured body rates, axis, attitude, directions and acceleration, in SI; quaternions go before the axis."""
     signals = {RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES}
     if ACCELERATIONS in columns:
         signals[ACCELERATION] = columns[ACCELERATIONS]
-    axis = None
+    if ASPECTS in columns:
+        signals[SUN_ASPECT] = np.radians(columns[ASPECTS])
     if ANGLES[0] in columns:
-        ascension, declination = (np.radians(columns[name]) for name in ANGLES)
-        across = np.cos(declination)
-        axis = np.column_stack([across * np.cos(ascension), across * np.sin(ascension), np.sin(declination)])
+        signals |= dict(zip(AXIS, _towards(columns, ANGLES).T, strict=True))
     elif AXIS[0] in columns:
-        axis = np.column_stack([columns[name] for name in AXIS])
-        sizes = np.linalg.norm(axis, axis=1)
-        wrong = np.flatnonzero(np.abs(sizes - 1.0) > UNIT)
-        if len(wrong):
-            table.fault(
-                rows[wrong[0]][0], AXIS[0], f"the axis has length {sizes[wrong[0]]:.4g}; expected a unit vector"
-            )
-        axis = axis / sizes[:, None]
-    if axis is not None:
-        signals |= dict(zip(AXIS, axis.T, strict=True))
+        signals |= dict(zip(AXIS, _unit(table, rows, columns, AXIS, "axis").T, strict=True))
+    if QUATERNION[0] in columns:
+        signals |= of_quaternions(_unit(table, rows, columns, QUATERNION, "quaternion"), spacecraft)
+    if CROSSED[0] in columns:
+        seen = _towards(columns, CROSSED)
+        to = np.full((len(rows), 3), math.nan)
+        if TOWARDS[0] in columns:
+            to = _towards(columns, TOWARDS)
+        if spacecraft.sun is not None:
+            to = np.where(np.isfinite(to), to, spacecraft.sun)
+        signals |= dict(zip((*SEEN, *DIRECTION), np.column_stack([seen, to]).T, strict=True))
     return {name: values for name, values in signals.items() if np.isfinite(values).any()}
+
+
+def _towards(columns: Mapping[str, Vector], names: Sequence[str]) -> Vector:
+    """Unit vectors (n, 3) by two columns of angles: about axis 3, and up from the plane across it."""
+    around, up = (np.radians(columns[name]) for name in names)
+    across = np.cos(up)
+    return np.column_stack([across * np.cos(around), across * np.sin(around), np.sin(up)])
+
+
+def _unit(
+    table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector], names: Sequence[str], what: str
+) -> Vector:
+    """Vectors (n, k) of length 1 by their columns; a fault for the first that has another length."""
+    vectors = np.column_stack([columns[name] for name in names])
+    sizes = np.linalg.norm(vectors, axis=1)
+    wrong = np.flatnonzero(np.abs(sizes - 1.0) > UNIT)
+    if len(wrong):
+        table.fault(rows[wrong[0]][0], names[0], f"the {what} has length {sizes[wrong[0]]:.4g}; expected 1")
+    return np.asarray(vectors / sizes[:, None])
 
 
 def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> None:
     """A fault where ω3 is so many times the spin of the file as one unit of rates is of another."""
     name = GYROS[2]
-    if name not in signals:
+    if name not in signals or spin == 0.0:
         return
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)

@@ -7,6 +7,9 @@ begin and end exactly; neither their times nor their impulses are rounded to nan
 
 The hub is integrated by Runge-Kutta-Fehlberg 7(8) at a fixed step, attitude in modified Rodrigues parameters (MRPs).
 At the default step the flight agrees with `propagation.flown` to some 1e-12 rad over hundreds of radians.
+
+A wheel is a balanced reaction wheel without motor torque, whose rotor adds its own axial moment to the hub: the rotor
+keeps its momentum I_w (ω3 + Ω) = h, and the hub turns about axis 3 as if it were not there.
 """
 
 from __future__ import annotations
@@ -31,6 +34,9 @@ TURN_TURNING = 0.05
 
 MOST_STEPS = 200_000
 """Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
+
+ROTOR = 0.01
+"""Axial moment of the rotor of a wheel, over that of the body: any will do."""
 
 ACCEPT_ALL = 1e30
 """Tolerance that no step fails, so that the integrator keeps its step."""
@@ -101,6 +107,7 @@ def default_step(spacecraft: Spacecraft, schedule: Schedule, until: float) -> fl
     )
     least = math.sqrt(float(moments.min()))
     pace = (math.sqrt(float(moments @ rates**2)) + pushes / least) / least
+    pace += abs(spacecraft.inertia.wheel) / float(moments.min())
     turning = [abs(disturbance.rate) for disturbance in spacecraft.disturbances if disturbance.rate != 0.0]
     angle, pace = (TURN_TURNING, pace + max(turning)) if turning else (TURN, pace)
     return angle / pace if pace > 0.0 else 1.0
@@ -156,12 +163,24 @@ class _Hub:
         initial = spacecraft.initial
         self._body = basilisk.spacecraft.Spacecraft()
         self._body.ModelTag = "body"
-        self._body.hub.IHubPntBc_B = np.diag(self._moments).tolist()
+        rotor = ROTOR * self._moments[2] if spacecraft.inertia.wheel else 0.0
+        self._body.hub.IHubPntBc_B = np.diag(self._moments + np.array([0.0, 0.0, rotor])).tolist()
         self._body.hub.omega_BN_BInit = _column(initial.rates)
         self._body.hub.sigma_BNInit = _column(_to_mrp(initial.quaternion))
         self._torque = basilisk.extForceTorque.ExtForceTorque()
         self._torque.ModelTag = "torque"
         self._body.addDynamicEffector(self._torque)
+        self._speed, self._wheel = 0.0, None
+        if rotor:
+            self._speed = spacecraft.inertia.wheel / rotor  # absolute, rad/s
+            turning = basilisk.reactionWheelStateEffector.RWConfigPayload()
+            turning.gsHat_B, turning.rWB_B = [[0.0], [0.0], [1.0]], [[0.0], [0.0], [0.0]]
+            turning.Js, turning.Omega = rotor, self._speed - float(initial.rates[2])
+            turning.RWModel, turning.u_max, turning.Omega_max = basilisk.messaging.BalancedWheels, -1.0, -1.0
+            self._wheel = basilisk.reactionWheelStateEffector.ReactionWheelStateEffector()
+            self._wheel.ModelTag = "wheel"
+            self._wheel.addReactionWheel(turning)
+            self._body.addStateEffector(self._wheel)
         # Kept here, as all its objects are: Basilisk's own hold on them is a plain pointer.
         self._integrator = basilisk.svIntegrators.svIntegratorRKF78(self._body)
         self._integrator.relTol = self._integrator.absTol = ACCEPT_ALL
@@ -170,11 +189,12 @@ class _Hub:
         self._simulation.bskLogger.setLogLevel(basilisk.bskLogging.BSK_ERROR)  # handed on to the models
         process = self._simulation.CreateNewProcess("flight")
         process.addTask(self._simulation.CreateNewTask("dynamics", self._period))
-        for model in (self._body, self._torque):
+        for model in (*([self._wheel] if rotor else []), self._body, self._torque):
             self._simulation.AddModelToTask("dynamics", model)
         self._simulation.InitializeSimulation()
         self._rates = self._body.dynManager.getStateObject(self._body.hub.nameOfHubOmega)
         self._attitude = self._body.dynManager.getStateObject(self._body.hub.nameOfHubSigma)
+        self._spun = self._wheel and self._body.dynManager.getStateObject(self._wheel.nameOfReactionWheelOmegasState)
 
     @property
     def motion(self) -> tuple[Vector, Vector]:
@@ -183,19 +203,25 @@ class _Hub:
 
     def kick(self, impulse: Vector) -> None:
         """An ideal impulse (3,) N m s: the rates jump by J/I."""
-        self._rates.setState(_column(np.ravel(self._rates.getState()) + impulse / self._moments))
+        self._set(np.ravel(self._rates.getState()) + impulse / self._moments, 1.0)
 
     def coast(self, duration: float, torque: Vector) -> float:
         """Fly on for ``duration`` s under a constant ``torque`` (3,) N m; returns the step taken, s."""
         steps = max(math.ceil(duration / self._longest), 1)
         unit = duration / (steps * self._period * 1e-9)
         self._torque.extTorquePntB_B = _column(torque * unit**2)
-        self._rates.setState(_column(np.ravel(self._rates.getState()) * unit))
+        self._set(np.ravel(self._rates.getState()), unit)
         self._clock += steps * self._period
         self._simulation.ConfigureStopTime(self._clock)
         self._simulation.ExecuteSimulation()
-        self._rates.setState(_column(np.ravel(self._rates.getState()) / unit))
+        self._set(np.ravel(self._rates.getState()) / unit, 1.0)
         return duration / steps
+
+    def _set(self, rates: Vector, unit: float) -> None:
+        """Set ``rates`` (3,) rad/s and the rotor's speed of its constant momentum, in a unit of time of ``unit`` s."""
+        self._rates.setState(_column(rates * unit))
+        if self._spun is not None:
+            self._spun.setState([[(self._speed - float(rates[2])) * unit]])
 
 
 class _Modules:
@@ -207,6 +233,8 @@ class _Modules:
             self.SimulationBaseClass: Any = import_module("Basilisk.utilities.SimulationBaseClass")
             self.bskLogging: Any = import_module("Basilisk.architecture.bskLogging")
             self.spacecraft: Any = import_module("Basilisk.simulation.spacecraft")
+            self.messaging: Any = import_module("Basilisk.architecture.messaging")
+            self.reactionWheelStateEffector: Any = import_module("Basilisk.simulation.reactionWheelStateEffector")
             self.extForceTorque: Any = import_module("Basilisk.simulation.extForceTorque")
             self.svIntegrators: Any = import_module("Basilisk.simulation.svIntegrators")
         except ImportError as reason:

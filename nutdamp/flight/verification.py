@@ -191,17 +191,21 @@ def integrate(spacecraft: Spacecraft, schedule: Schedule, times: Vector) -> tupl
         rows[now] = state
         if end > now:
             firing = [(pulse, push) for pulse in schedule if (push := pulse.push(now, end)) is not None]
-            burn = np.sum([_flow(*flow) for flow in firing], axis=0) if firing else (0.0, 0.0)
+            burn = np.sum([_flow(pulse, now, end) for pulse, _ in firing], axis=0) if firing else (0.0, 0.0)
             state = equations.solved(state, now, end, [push for _, push in firing], burn=(burn[0], burn[1])).y[:, -1]
         work.reach(end)
     return equations.motion(np.array([rows[time] for time in times.tolist()]))
 
 
-def _flow(pulse: Pulse, push: Push) -> tuple[float, float]:
-    """Flow of propellant, kg/s, at the start of a stretch of a pulse, and its slope, kg/s²."""
-    torque, slope = push
-    along = (pulse.propellant or 0.0) * pulse.impulse / float(pulse.impulse @ pulse.impulse)
-    return float(along @ torque), 0.0 if slope is None else float(along @ slope)
+def _flow(pulse: Pulse, start: float, end: float) -> tuple[float, float]:
+    """Flow of propellant, kg/s, at the start of a stretch of a pulse without an edge, and its slope, kg/s².
+
+    It goes by the share of the impulse, a parabola there, as thrusters whose torques cancel use propellant too.
+    """
+    times = np.array([start, 0.5 * (start + end), end])
+    before, middle, after = ((pulse.propellant or 0.0) * pulse.share(times)).tolist()
+    length = end - start
+    return (4.0 * middle - 3.0 * before - after) / length, 4.0 * (before - 2.0 * middle + after) / length**2
 
 
 SAMPLES = 201

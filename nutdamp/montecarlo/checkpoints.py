@@ -59,7 +59,7 @@ class Checkpoints:
         """Angle from H to the spin axis at t = 0, rad."""
         pairs = zip(self._initial.moments, self._initial.omega0, strict=True)
         first, second, axial = (np.asarray(moment * rate, dtype=np.float64) for moment, rate in pairs)
-        return _range(np.arctan2(np.hypot(first, second), np.abs(axial)))
+        return _range(np.arctan2(np.hypot(first, second), np.abs(axial + self._initial.wheel)))
 
     def nutation_after(self, counts: Sequence[int]) -> Iterator[Range]:
         """Nutation, rad, after the first ``counts`` pulses."""
@@ -71,10 +71,11 @@ class Checkpoints:
     def window(self, probability: float) -> Range | None:
         """Shifts (s) of all pulses with which the share ``probability`` of the cases complies, about none.
 
-        As far as half a turn of the spin, and no pulse before t = 0; None where too few comply without a shift.
+        As far as half a turn of spin or nutation, the faster, and no pulse before t = 0; None where too few comply
+        without a shift.
         """
         schedule = self.study.model.schedule
-        half, first = math.pi / abs(self.study.model.spacecraft.spin), min(pulse.loaded[0] for pulse in schedule)
+        half, first = math.pi / self.study.model.spacecraft.fastest, min(pulse.loaded[0] for pulse in schedule)
         if not self._complies(0.0, probability):
             return None
         return Range(-self._reach(-1.0, min(half, first), probability), self._reach(1.0, half, probability))

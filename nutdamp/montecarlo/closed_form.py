@@ -91,7 +91,7 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
     sheds = cases.sheds
     x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
     spin = cases.omega0[2]
-    z = C * spin + wheel
+    z = plus(C * spin, wheel)
     before = (x, y, z)
     phase: Cases = 0.0
     now: Cases = 0.0
@@ -102,7 +102,7 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
         coast = centre - now
         turn = _turned_on(turn, (x, y, z), coast * per_A)
         if growth == 0.0:
-            phase = phase + (a * spin - wheel * per_A) * coast
+            phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
         else:
             effect, turn = _slipped(turn, (x, y, z), growth, coast)
             phase = phase + (a * z * effect.turned - wheel * coast) / C
@@ -110,18 +110,18 @@ def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
             spin = (z - wheel) / C
         if sheds is not None:  # half before the pulse and half after it, the rates as they are
             x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin + wheel
-        rate = a * spin - wheel * per_A
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+        rate = plus(a * spin, times(-per_A, wheel))
         along, across, gained = _effective(impulse, rate, a / C, on_time, nodes[number], growth)
         cosine, sine = cos_sin(phase)
         x = x + along * cosine - across * sine
         y = y + along * sine + across * cosine
         if not (isinstance(gained, float) and gained == 0.0):
             spin = spin + gained / C
-            z = C * spin + wheel
+            z = plus(C * spin, wheel)
         if sheds is not None:
             x, y, A, C = _lighter(x, y, A, C, sheds[number])
-            a, per_A, z = 1.0 - C / A, 1.0 / A, C * spin + wheel
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
         now = centre
     after = (x, y, z) if turn is None else carried(turn, (x, y, z))
     return Ends(

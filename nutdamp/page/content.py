@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import math
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,10 +17,10 @@ from rich.console import Group
 from nutdamp import __version__
 from nutdamp.common import work
 from nutdamp.errors import printable
+from nutdamp.figures import dispersion, image, overview, trade
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import dotted
 from nutdamp.flight.verification import verify
-from nutdamp.page.background import assumptions, method_blocks
 from nutdamp.page.document import (
     UNCONTROLLED,
     Beside,
@@ -30,9 +32,9 @@ from nutdamp.page.document import (
     Listing,
     Page,
     PageSection,
+    Picture,
     Points,
     Prose,
-    RequirementBar,
     blocks_of,
     facts_of,
     plain,
@@ -41,23 +43,26 @@ from nutdamp.page.document import (
 )
 from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
-from nutdamp.page.pictures import dispersion_pictures, flight_pictures, trade_picture
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
 from nutdamp.planning.notes import plan_notes, reasons
 from nutdamp.planning.plan import Plan, unrounded
 from nutdamp.planning.recommendation import Standing
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions, glance
+from nutdamp.views import decisions, glance, guide
 from nutdamp.views.check import check_screen
+from nutdamp.views.guide import Formula, Topic
 from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
+from nutdamp.views.spacecraft import beyond_floors, turn_floor
 from nutdamp.views.text import mass, quantity, sentence
 from nutdamp.views.trade import apart, beats, front_parts
 from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from nutdamp.montecarlo.study import Results
 
 
@@ -115,23 +120,25 @@ def report_page(
             control=control,
             source=f"input {repeat.digest[:8]}" * bool(repeat.digest),
             state=_state(decided),
-            good=decided is not None and _good(decided),
-            met=None if decided is None else decided.met,
             headline=(headline.plain[:lead], headline.plain[lead:]),
-            verdict="" if decided is None else decisions.verdict(decided),
-            margins=() if decided is None else tuple(map(_margin, glance.requirement_rows(decided))),
-            facts=None if decided is None else facts_of("Final state, after the last pulse", glance.ends(decided)),
-            warnings=() if decided is None else tuple(_warnings(compared, decided)),
             notes=tuple(notes[: glance.NOTES]),
-            motion=()
-            if decided is None
-            else (moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
             contenders=tuple(_contender(compared, plan, decided) for plan in compared.plans),
-            sections=(),
             made_by=f"nutdamp {__version__}",
         )
+        if decided is not None:
+            page = replace(
+                page,
+                good=_good(decided),
+                met=decided.met,
+                verdict=decisions.verdict(decided),
+                margins=tuple(glance.requirement_rows(decided)),
+                facts=facts_of("Final state, after the last pulse", glance.ends(decided)),
+                warnings=(*(text(note) for note in remarks if severity(note) == WARNING), *_broken(decided.plan)),
+                motion=(moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
+            )
         task.reach(1.0)
-        return page.with_sections(_sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :]))
+        sections = _sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :])
+        return replace(page, sections=tuple(sections))
 
 
 def _sections(
@@ -185,16 +192,6 @@ def _broken(plan: Plan) -> list[str]:
     return broken_limits(plan.spacecraft, plan.pulses) if plan.from_file else []
 
 
-def _warnings(compared: Comparison, decided: Decision) -> Iterator[str]:
-    yield from (text(note) for note in glance.notes(compared, decided) if severity(note) == WARNING)
-    yield from _broken(decided.plan)
-
-
-def _margin(row: glance.RequirementRow) -> RequirementBar:
-    texts = (row.label, row.nominal, row.dispersed, row.limit, f"margin {row.margin}", row.verdict.plain)
-    return RequirementBar(texts, row.met, (100.0 * row.used[0], 100.0 * row.used[1]))
-
-
 def _contender(compared: Comparison, plan: Plan, decided: Decision | None) -> Contender:
     """One scheme with its cost, and the share of cases that comply or the verdict."""
     if not plan.feasible:
@@ -226,7 +223,7 @@ def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
     yield Prose(sentence(joined(reasons(compared))))
     table = scheme_table(compared, compared.recommended)
-    yield sheet(table.title, table, dots=DOTS)
+    yield sheet(table, dots=DOTS)
     chosen = compared.recommended
     own = [
         (plan.scheme, note)
@@ -267,10 +264,10 @@ def _background(
     yield Details("Spacecraft", tuple(blocks_of("What actuators and tolerances do", check_screen(body))))
     if decided is not None:
         ends = facts_of("Final state", decisions.end_facts(decided))
-        title, fired = f"Pulses of {decided.plan.scheme}", pulse_table(decided.plan.flight, phased=True)
-        yield Details("Pulses and final state, all values", (sheet(title, fired), ends))
-    yield Details("Method and symbols", tuple(method_blocks(compared)))
-    yield Details("Assumptions", (Points(tuple(("", text) for text in assumptions(compared))),))
+        fired = pulse_table(decided.plan.flight, scheme=decided.plan.scheme)
+        yield Details("Pulses and final state, all values", (sheet(fired), ends))
+    yield Details("Method and symbols", tuple(_method(compared)))
+    yield Details("Assumptions", (Points(tuple(("", limit) for limit in assumptions(compared))),))
     yield Details("Input file, and how to repeat the page", tuple(_repeat(repeat, dispersed)))
 
 
@@ -300,3 +297,132 @@ def _versions() -> Iterator[tuple[str, str]]:
             yield name, version(package)
         except PackageNotFoundError:
             yield name, "not installed"
+
+
+PICTURES = {
+    "motion": (
+        "Pole curve: the tip of the rotation vector ω in the body. Axis track: the spin axis in space, "
+        "with the places of the angular momentum H.",
+        "Pole curve in the body and track of the spin axis in space, with numbered pulses",
+    ),
+    "history": (
+        "Nutation on a log axis with what is required, the firings of each channel, and body rates over time.",
+        "Nutation, firings and body rates over time",
+    ),
+    "trade": (
+        "Each mark is a schedule for one of the end times tried, numbered along each front.",
+        "Cost of schedules over the end of the last pulse",
+    ),
+    "cases": (
+        "How many cases leave how much nutation, and how far H has moved.",
+        "Distribution of nutation and of the end of H",
+    ),
+    "momentum": (
+        "Where H ends in each case, with the ellipse that holds as many cases as must comply.",
+        "Scatter of the final angular momentum with ellipse",
+    ),
+}
+"""Captions and descriptions of the pictures."""
+
+
+def flight_pictures(plan: Plan) -> tuple[Picture, ...]:
+    """Motion and history of a plan, from its flight through the real widths; raises MissingExtra."""
+    flown, track = overview.shown(plan)
+    motion, history = (overview.flight_figure(name, flown, track) for name in ("motion", "history"))
+    narrow = overview.flight_figure("history", flown, track, narrow=True)
+    return _picture("motion", motion), _picture("history", history, narrow)
+
+
+def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
+    """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
+    draw = partial(trade.trade_figure, compared.spacecraft, fronts, compared.recommended)
+    return _picture("trade", draw(narrow=False), draw(narrow=True))
+
+
+def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:
+    """Distribution of the cases of a study, and where H ends; raises MissingExtra."""
+    names = ("cases", "momentum")
+    return tuple(_picture(name, dispersion.dispersion_figure(name, dispersed, scheme=scheme)) for name in names)
+
+
+def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture:
+    """A picture with its title as text of the page, and the ``narrow`` drawing for a phone."""
+    title = str(figure.get_label()) or figure.get_suptitle()
+    phone = "" if narrow is None else image.untitled_svg(narrow)
+    return Picture(image.untitled_svg(figure), title, *PICTURES[name], phone)
+
+
+EQUATIONS = ("1", "17", "18", "19")
+"""Equations of Magnus that every plan and flight rest on, as the guide numbers them."""
+
+
+def _method(compared: Comparison) -> Iterator[Block]:
+    """A paragraph on the method, the equations used with their symbols, the sources."""
+    unequal = "; with I1 ≠ I2 the true tensor moves freely in between" * (not compared.spacecraft.inertia.symmetric)
+    yield Prose(
+        f"Schemes plan on the nominal values of the input file ({', '.join(plan.scheme for plan in compared.plans)}). "
+        "Each schedule is then flown: Euler's equations with the true principal moments are integrated through the "
+        "real pulse widths by Taylor series, coasts of symmetric bodies as exact arcs. Recommendation, requirement and "
+        "verdict go by that flight. By M(17), the impulse sum, each pulse acts at its centre with its effective "
+        f"impulse{unequal}."
+    )
+    chosen = compared.recommended
+    topics = [guide.found(number) for number in EQUATIONS]
+    scheme = guide.found(chosen.scheme) if chosen is not None and chosen.scheme in guide.NAMES else None
+    lines = [line for topic in topics for line in _listed(topic, _formulas(topic)[-1])]
+    lines += [] if scheme is None else _listed(scheme, _formulas(scheme)[0])
+    yield Listing("Equations", "\n".join(lines))
+    symbols = _symbols(topics, scheme, " ".join([*lines, "θ"]))
+    yield FactList("Symbols", (*symbols, *_floors(compared.spacecraft)))
+    yield Points((("", guide.SOURCES[0]),))
+
+
+def _formulas(topic: Topic) -> list[Formula]:
+    """The formulas of a topic; the last one of a numbered equation is the one in use."""
+    return [block for block in topic.blocks if isinstance(block, Formula)]
+
+
+def _listed(topic: Topic, formula: Formula) -> list[str]:
+    return [f"{topic.name}  {topic.summary}", *(f"    {line}" for line in formula.lines), ""]
+
+
+def _symbols(topics: Sequence[Topic], scheme: Topic | None, listed: str) -> Iterator[tuple[str, str]]:
+    """Each symbol of the equations that are ``listed`` once, and those of the formula of the scheme, as it has them."""
+    rows = (row for topic in topics for row in topic.rows)
+    yield from {symbol: text for symbol, text in rows if symbol.removesuffix(")") in listed}.items()
+    if scheme is not None:
+        part = next(part for part in scheme.parts if any(isinstance(block, Formula) for block in part.blocks))
+        yield scheme.name, " ".join(block for block in part.blocks if isinstance(block, str))
+
+
+def _floors(body: Spacecraft) -> Iterator[tuple[str, str]]:
+    """The bounds that the impulses of plans are compared with."""
+    beyond = beyond_floors(body)
+    holds = f"no floor here, with {beyond}" if beyond else "no schedule that does so takes less"
+    yield "A|ω0|", f"{quantity(body.least_impulse, 'N m s')}, the impulse that takes out the nutation; {holds}"
+    if body.goal.axis is not None:
+        turning = quantity(body.turning_impulse, "N m s")
+        words = f"{turning}, the impulse that turns the spin by β, the angle from H to the target; {holds}"
+        yield turn_floor(body), words
+
+
+def _any_of(*schemes: str) -> Callable[[Comparison], bool]:
+    return lambda compared: any(plan.scheme in schemes for plan in compared.plans)
+
+
+CONDITIONS: dict[str, Callable[[Comparison], bool]] = {
+    "The closed forms hold": lambda compared: not compared.spacecraft.inertia.symmetric,
+    "Disturbances": lambda compared: bool(compared.spacecraft.disturbances),
+    "Energy dissipation": lambda compared: compared.spacecraft.dissipation is not None,
+    "`optimal`": _any_of("optimal"),
+    "Small angles are magnified": lambda _: False,
+    "`two-pulse`": _any_of("two-pulse", "half-cone", "rhumb-line"),
+}
+"""Beginnings of the limits of the guide that apply only to some comparisons, and to which."""
+
+
+def assumptions(compared: Comparison) -> Iterator[str]:
+    """Assumptions and limits of the guide that apply here."""
+    for limit in guide.limits():
+        if all(applies(compared) for begin, applies in CONDITIONS.items() if limit.startswith(begin)):
+            yield limit.replace("`", "")

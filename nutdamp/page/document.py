@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -18,12 +18,13 @@ from rich.text import Text
 
 from nutdamp.errors import BadRequest
 from nutdamp.views.tables import DataTable, Heading, Shared
-from nutdamp.views.text import MISSING, sentence
+from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
     from nutdamp.page.scales import Panel, Strip
     from nutdamp.page.workbench import Workbench
     from nutdamp.spacecraft.model import Vector
+    from nutdamp.views.glance import RequirementRow
 
 
 class Cell(NamedTuple):
@@ -64,15 +65,14 @@ class Sheet:
         return tuple(zip(*columns, strict=True))
 
     def _column(self, at: int, heading: Heading) -> list[Cell]:
-        texts = [row[at] for row in self.rows]
+        cells = [Cell(row[at], heading.number) for row in self.rows]
         if heading.name in self.bars:
-            return [Cell(text, heading.number, bar=number_in(text)) for text in texts]
+            return [cell._replace(bar=number_in(cell.text)) for cell in cells]
         if heading.name not in self.dots:
-            return [Cell(text, heading.number) for text in texts]
-        numbers = [number_in(text) for text in texts]
-        most = max((abs(number) for number in numbers if number is not None), default=0.0) or 1.0
-        places = [None if number is None else 100.0 * abs(number) / most for number in numbers]
-        return [Cell(text, heading.number, place) for text, place in zip(texts, places, strict=True)]
+            return cells
+        sizes = [(cell, number_in(cell.text)) for cell in cells]
+        most = max((abs(number) for _, number in sizes if number is not None), default=0.0) or 1.0
+        return [cell._replace(dot=None if number is None else 100.0 * abs(number) / most) for cell, number in sizes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,14 +238,6 @@ UNCONTROLLED = Control()
 """Configuration control of a page without any entry."""
 
 
-class RequirementBar(NamedTuple):
-    """One requirement as texts and as a bar: shares of its limit, of the nominal value and of the cases, in %."""
-
-    texts: tuple[str, ...]
-    met: bool
-    bar: tuple[float, float]
-
-
 class Contender(NamedTuple):
     """One scheme on the first screen: its texts; ``chosen``: it is the one to fly."""
 
@@ -266,22 +258,18 @@ class Page:
     control: Control
     source: str
     state: str
-    good: bool
-    met: bool | None
     headline: tuple[str, str]
-    verdict: str
-    margins: tuple[RequirementBar, ...]
-    facts: FactList | None
-    warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    motion: tuple[Block, ...]
     contenders: tuple[Contender, ...]
-    sections: tuple[PageSection, ...]
     made_by: str
-
-    def with_sections(self, sections: Iterable[PageSection]) -> Page:
-        """Copy with these sections."""
-        return replace(self, sections=tuple(sections))
+    good: bool = False
+    met: bool | None = None
+    verdict: str = ""
+    margins: tuple[RequirementRow, ...] = ()
+    facts: FactList | None = None
+    warnings: tuple[str, ...] = ()
+    motion: tuple[Block, ...] = ()
+    sections: tuple[PageSection, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -297,9 +285,9 @@ class Page:
         )
 
 
-def sheet(title: str, table: DataTable, *, place: str = "page", dots: tuple[str, ...] = ()) -> Sheet:
-    """A declared table as a `Sheet`."""
-    return Sheet(title, table.headings(place), table.cells(place), table.mark, dots)
+def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
+    """A declared table as a `Sheet` with further fields of its ``look``."""
+    return Sheet(table.title, table.headings(place), table.cells(place), table.mark, **look)
 
 
 SHARES = (Shared.LINEAR, Shared.CASES)
@@ -364,8 +352,6 @@ def plain(cell: object) -> str:
 
 def number_in(text: str) -> float | None:
     """The number in a cell, 0 for "< 1e-9"; None where it is not known or a word."""
-    if text == MISSING:
-        return None
     try:
         value = 0.0 if text.startswith("<") else float(text)
     except ValueError:

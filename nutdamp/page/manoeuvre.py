@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from nutdamp.common.results import note
 from nutdamp.flight.end_state import spin_phases
-from nutdamp.flight.propagation import Flight
-from nutdamp.page.document import Block, FactList, Prose, Sheet
+from nutdamp.page import document
+from nutdamp.page.document import FactList, Prose, Sheet, sheet
 from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import ideal_code
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
+from nutdamp.spacecraft.equipment import Block
+from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import decisions
 from nutdamp.views.notes import text
 from nutdamp.views.pulses import MILLISECONDS, channel_text
 from nutdamp.views.schemes import limits
-from nutdamp.views.tables import Heading, Shared
+from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
 from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ ON_HOLD = (
 
 def manoeuvre_blocks(
     decision: Decision, dispersed: Results | None, identity: Sequence[tuple[str, str]], summary: str
-) -> Iterator[Block]:
+) -> Iterator[document.Block]:
     """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the decision."""
     plan, body = decision.plan, decision.plan.spacecraft
     obstacles = [*_uncommandable(plan)]
@@ -122,34 +123,81 @@ def _inwards(value: float, digits: int) -> str:
     return f"{math.trunc(value * scale) / scale:+.{digits}f}"
 
 
+class SheetRow(NamedTuple):
+    """A pulse or block, from 0: its first pulse, Sun or spin phase at its start and nutation after it, rad.
+
+    ``hold``: range of the nutation outside of which nothing more is fired.
+    """
+
+    at: int
+    pulse: Pulse
+    block: Block | None
+    phase: float
+    nutation: float
+    hold: str
+
+
 def _fired(plan: Plan, points: Checkpoints | None) -> Sheet:
     """One row a pulse or block, as it is commanded, with the nutation after it."""
-    flown, body, pulses = plan.flight, plan.spacecraft, plan.pulses.pulses
-    counts = [*accumulate(block.count for block in plan.pulses.blocks)] or [*range(1, len(pulses) + 1)]
-    firsts = [0, *counts[:-1]]
-    starts = np.array([pulses[first].loaded[0] for first in firsts])
-    digits = _decimals(body)
-    columns: list[tuple[Heading, list[str]]] = [
-        (Heading("block" if plan.pulses.blocks else "pulse"), [str(number) for number in range(1, len(counts) + 1)]),
-        _when(body, starts, digits),
-        _phases(flown, starts),
-    ]
-    columns += _block_columns(plan) if plan.pulses.blocks else _pulse_columns(plan, digits)
-    _, after = flown.around_pulses()
+    flown, pulses = plan.flight, plan.pulses.pulses
+    blocks: Sequence[Block | None] = plan.pulses.blocks or [None] * len(pulses)
+    counts = [*accumulate(1 if block is None else block.count for block in blocks)]
+    firsts = [pulses[count] for count in (0, *counts[:-1])]
+    starts = np.array([pulse.loaded[0] for pulse in firsts])
+    phases = -to_sun_pulse(flown, starts) if _senses(plan.spacecraft) else spin_phases(flown, starts)
+    angles = flown.around_pulses()[1].nutation[np.array(counts) - 1].tolist()
+    holds = [MISSING] * len(counts) if points is None else _ranges(points, counts, angles)
+    rows = [*map(SheetRow, range(len(counts)), firsts, blocks, phases.tolist(), angles, holds)]
+    return sheet(DataTable("Fire", [*_columns(plan, rows)], rows, points), "sheet", folds=True)
+
+
+def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
+    """Columns of pulses or of blocks; starts in UTC where there is an epoch, else from t = 0."""
+    body, digits, blocks = plan.spacecraft, _decimals(plan.spacecraft), plan.pulses.blocks
+
+    def column(name: str, unit: str, value: Callable[[Any], Any], shown: Callable[[Any], str] = str) -> Column:
+        return Column("", name, unit, value, shown, "sheet")
+
+    def seconds(time: float) -> str:
+        return f"{time:.{digits}f}"
+
+    def date(row: SheetRow) -> str | None:
+        return body.utc(row.pulse.loaded[0], min(digits, MILLISECONDS))
+
+    yield column("block" if blocks else "pulse", "", lambda row: row.at + 1)
+    if all(map(date, rows)):
+        yield column(Shared.START, "UTC", date)._replace(kind=TEXT)
+    else:
+        yield column(Shared.START, "s", lambda row: row.pulse.loaded[0], seconds)
+    phase = "Sun phase" if _senses(body) else "spin phase"
+    yield column(phase, "deg", lambda row: math.degrees(row.phase) % 360.0, lambda angle: fixed(angle, 1, 360.0))
+    yield column(Shared.THRUSTERS, "", lambda row: _thrusters(row.pulse, body))._replace(kind=TEXT)
+    if blocks:
+        counts = " (counts)" * (body.commands is not None)
+        yield column(Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first)
+        yield column(Shared.DELAY, f"s{counts}", lambda row: _counted(body, "delay", row.block.delay))
+        yield column(Shared.ON_TIME, f"s{counts}", lambda row: _counted(body, "width", row.block.width))
+        yield column(Shared.PULSES, "", lambda row: row.block.count)
+        yield column(Shared.EVERY, "spin", lambda row: row.block.every)
+    else:
+        yield column(Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], seconds)
     least, _ = limits(body)
-    angles = after.nutation[np.array(counts) - 1].tolist()
-    columns.append((Heading(Shared.NUTATION_AFTER, "deg"), [short_angle(angle, least) for angle in angles]))
-    if points is not None:
-        columns.append((Heading("hold if outside", "deg"), _ranges(points, counts, angles, least)))
-    columns.append((Heading("done", number=False), ["☐"] * len(counts)))
-    rows = tuple(zip(*(cells for _, cells in columns), strict=True))
-    return Sheet("Fire", tuple(column for column, _ in columns), rows, folds=True)
+    yield column(Shared.NUTATION_AFTER, "deg", lambda row: row.nutation, lambda angle: short_angle(angle, least))
+    yield column("hold if outside", "deg", lambda row: row.hold)._replace(when=lambda points: points is not None)
+    yield column("done", "", lambda _: "☐")._replace(kind=TEXT)
 
 
-def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float], limit: float) -> list[str]:
+def _counted(body: Spacecraft, which: str, value: float) -> str:
+    """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has them."""
+    counts = f" ({getattr(body.commands, f'{which}_counts')(value)})" if body.commands is not None else ""
+    return f"{value:.6g}{counts}"
+
+
+def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float]) -> list[str]:
     """Range of the nutation in flown cases after each row that has one, with that ``expected`` (rad) in it."""
     from nutdamp.montecarlo.checkpoints import even
 
+    limit = limits(points.study.model.spacecraft)[0]
     rows = [number - 1 for number in even(len(counts), CHECKED)]
     texts = [MISSING] * len(counts)
     for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
@@ -157,38 +205,6 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
             f"{short_angle(min(least, expected[row]), limit)} to {short_angle(max(most, expected[row]), limit)}"
         )
     return texts
-
-
-def _pulse_columns(plan: Plan, digits: int) -> list[tuple[Heading, list[str]]]:
-    body, pulses = plan.spacecraft, plan.pulses.pulses
-    return [
-        (Heading(Shared.THRUSTERS, number=False), [_thrusters(pulse, body) for pulse in pulses]),
-        (Heading(Shared.ON_TIME, "s"), [f"{pulse.loaded[1]:.{digits}f}" for pulse in pulses]),
-    ]
-
-
-def _block_columns(plan: Plan) -> list[tuple[Heading, list[str]]]:
-    blocks, commands = plan.pulses.blocks, plan.spacecraft.commands
-    names = {pulse.channel: _thrusters(pulse, plan.spacecraft) for pulse in plan.pulses.pulses}
-
-    def counted(value: float, count: int | None) -> str:
-        return f"{value:.6g}" if count is None else f"{value:.6g} ({count})"
-
-    delays = [
-        counted(block.delay, None if commands is None else commands.delay_counts(block.delay)) for block in blocks
-    ]
-    widths = [
-        counted(block.width, None if commands is None else commands.width_counts(block.width)) for block in blocks
-    ]
-    counts = "" if commands is None else " (counts)"
-    return [
-        (Heading(Shared.THRUSTERS, number=False), [names.get(block.channel, block.channel) for block in blocks]),
-        (Heading(Shared.FIRST_SUN_PULSE), [str(block.first) for block in blocks]),
-        (Heading(Shared.DELAY, f"s{counts}"), delays),
-        (Heading(Shared.ON_TIME, f"s{counts}"), widths),
-        (Heading(Shared.PULSES), [str(block.count) for block in blocks]),
-        (Heading(Shared.EVERY, "spin"), [str(block.every) for block in blocks]),
-    ]
 
 
 def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
@@ -199,25 +215,6 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
         thruster.name for channel in body.channels if channel.name == pulse.channel for thruster in channel.thrusters
     ]
     return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
-
-
-def _when(body: Spacecraft, starts: Vector, digits: int) -> tuple[Heading, list[str]]:
-    """Column of the commanded starts: UTC where there is an epoch, else from t = 0."""
-    dates = [body.utc(start, min(digits, MILLISECONDS)) for start in starts.tolist()]
-    known = [date for date in dates if date is not None]
-    if len(known) == len(dates):
-        return Heading(Shared.START, "UTC", number=False), known
-    return Heading(Shared.START, "s"), [f"{start:.{digits}f}" for start in starts.tolist()]
-
-
-def _phases(flown: Flight, starts: Vector) -> tuple[Heading, list[str]]:
-    """Column of the Sun phase at the starts, or of the spin phase without a Sun sensor, to 0.1 deg."""
-    name, phases = (
-        ("Sun phase", -to_sun_pulse(flown, starts))
-        if _senses(flown.spacecraft)
-        else ("spin phase", spin_phases(flown, starts))
-    )
-    return Heading(name, "deg"), [fixed(math.degrees(phase) % 360.0, 1, 360.0) for phase in phases.tolist()]
 
 
 def _senses(body: Spacecraft) -> bool:

@@ -144,11 +144,9 @@ def _panels(
     pole = geometry.pole_path(track)
     pole_room = geometry.room(pole, 0.1, centre=True)
     sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
-    body, names = flown.spacecraft, geometry.sky_names(flown)
-    sense = ", spin about −3" if body.spin < 0.0 else ""
-    axes = "" if body.inertia.aligned else ", principal axes"
+    names = geometry.sky_names(flown)
     panels = (
-        panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{axes}{sense}", "ω2, deg/s")),
+        panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s")),
         panel("sky", "Axis track, H towards you", sky_room, (names.x, names.y)),
     )
     columns = {

@@ -12,13 +12,12 @@ from nutdamp.common import results
 from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.files.tabular import track_array, write_track, write_whole
 from nutdamp.flight.propagation import Flight
-from nutdamp.planning.decision import Comparison, Decision, Simulation, decide
+from nutdamp.planning.decision import Comparison, Simulation
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views import decisions
 from nutdamp.views.notes import joined, sentences
-from nutdamp.views.plan_json import comparison_json, decision_json
+from nutdamp.views.plan_json import decided_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.schemes import scheme_table
 from nutdamp.views.text import degrees
@@ -44,13 +43,14 @@ VIEWS = {
     "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
     **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
-    "Comparison.data": "page.results:comparison_data",
+    "Comparison.data": "views.plan_json:comparison_json",
     "Comparison.sentences": "page.results:comparison_sentences",
     "Comparison.reason": "page.results:comparison_reason",
-    **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in ("csv", "table", "figure", "line", "html")},
+    **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in _TABLED},
     "RobustComparison.data": "page.results:robust_data",
     **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
-    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("data", "csv", "table", "figure")},
+    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("csv", "table", "figure")},
+    "Simulation.data": "views.simulation:simulation_json",
     **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
     "Trade.csv": "views.trade:trade_csv fronts",
@@ -82,16 +82,6 @@ VIEWS = {
 """Functions of results, see `nutdamp.common.results.view`."""
 
 
-def comparison_data(compared: Comparison) -> dict[str, Any]:
-    """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
-    return _decided(compared, decide(compared))
-
-
-def _decided(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    data = comparison_json(compared, decided)
-    return {**data, "decision": None if decided is None else decision_json(decided, decisions.verdict(decided))}
-
-
 def plan_sentences(plan: Plan) -> tuple[str, ...]:
     """Notes on a plan."""
     return sentences(plan_notes(plan) if plan.feasible else ())
@@ -111,15 +101,7 @@ def robust_data(robust: RobustComparison) -> dict[str, Any]:
     """The object of ``plan --robust --json``."""
     from nutdamp.views.robust import robust_json
 
-    data = _decided(robust.comparison, robust.decision)
-    return {**data, "robust": robust_json(robust)}
-
-
-def simulation_data(simulation: Simulation) -> dict[str, Any]:
-    """The object of ``simulate --json``."""
-    from nutdamp.views.simulation import simulation_json
-
-    return simulation_json(simulation, decisions.verdict(simulation.decision))
+    return {**decided_json(robust.comparison, robust.decision), "robust": robust_json(robust)}
 
 
 def plan_table(plan: Plan) -> results.Table:
@@ -260,7 +242,7 @@ def plan_html(plan: Plan) -> str | None:
 
     if not plan.feasible:
         return _block(Prose(repr(plan)[1:-1]))
-    return _beside(_block(sheet(f"Pulses of {plan.scheme}", pulse_table(plan.flight, phased=True))), plan)
+    return _beside(_block(sheet(pulse_table(plan.flight, scheme=plan.scheme))), plan)
 
 
 def flight_html(flight: Flight) -> str | None:
@@ -277,7 +259,7 @@ def comparison_html(compared: Comparison) -> str | None:
     from nutdamp.page.document import sheet
 
     table = scheme_table(compared, compared.recommended)
-    return _beside(_block(sheet(table.title, table)), compared.recommended)
+    return _beside(_block(sheet(table)), compared.recommended)
 
 
 def _beside(table: str | None, result: Plan | Flight | None) -> str | None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.figures import geometry
-from nutdamp.figures.braille import ticks
+from nutdamp.figures.geometry import ticks
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.spacecraft.model import Vector
@@ -52,18 +52,11 @@ class Panel(NamedTuple):
     frame: tuple[int, int, int, int] = EDGES
 
 
-class Bar(NamedTuple):
-    """A firing in the row of its channel, in units of the SVG."""
-
-    row: int
-    start: float
-    width: float
-
-
 class Strip(NamedTuple):
     """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
 
-    ``outside``: a required nutation that lies beyond the scale. ``closed``: left and width of times without firing.
+    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left and width of each
+    firing; ``closed``: left and width of times without firing.
     """
 
     times: Scale
@@ -72,7 +65,7 @@ class Strip(NamedTuple):
     required: float | None
     outside: str
     channels: tuple[str, ...]
-    bars: tuple[Bar, ...]
+    bars: tuple[tuple[int, float, float], ...]
     closed: tuple[tuple[float, float], ...]
 
 
@@ -131,10 +124,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
 
     required = None if body.requirement is None else body.requirement.nutation
     channels = tuple(geometry.channels_fired(flown))
-    bars = [
-        Bar(channels.index(pulse.channel), *spread(*span))
-        for pulse, span in zip(flown.schedule, flown.spans, strict=True)
-    ]
+    fired = zip(flown.schedule, flown.spans, strict=True)
     prefix, factor = _prefix(high - low)
     level = None if required is None else math.degrees(required)
     edge = EDGE * (high - low)
@@ -148,7 +138,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
         required=rise(level) if level is not None and low < level < high else None,
         outside=most(math.radians(level)) if level is not None and not low < level < high else "",
         channels=channels,
-        bars=tuple(bars),
+        bars=tuple((channels.index(pulse.channel), *spread(*span)) for pulse, span in fired),
         closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
     )
     return strip, [low, high]

@@ -7,8 +7,7 @@ has more in it, `absence` gives the reason, and the page has no workbench.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,20 +30,13 @@ Room = tuple[Vector, float]
 """Middle (2,) and half the side of a square panel."""
 
 
-@dataclass(frozen=True, slots=True)
-class EndRow:
-    """A quantity at the end of the flight: ``key`` names it for the script, ``limit`` is its bound in words."""
+class Workbench(NamedTuple):
+    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
 
-    key: str
-    name: str
-    limit: str = ""
+    ``rows``: name of each quantity for the script and for people, and its bound in words.
+    """
 
-
-@dataclass(frozen=True, slots=True)
-class Workbench:
-    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel."""
-
-    rows: tuple[EndRow, ...]
+    rows: tuple[tuple[str, str, str], ...]
     pulses: tuple[str, ...]
     ratio: float = RATIO
     thrust: float = THRUST
@@ -70,9 +62,9 @@ def workbench_of(flown: Flight) -> Workbench:
     names = [(Part.NUTATION, "nutation"), (Part.SHIFT, "momentum shift")]
     if body.goal.axis is not None:
         names.append((Part.DISTANCE, "axis error"))
-    rows = [EndRow(part.value, name, _bound(limits[part].most) if part in limits else "") for part, name in names]
+    rows = [(part.value, name, _bound(limits[part].most) if part in limits else "") for part, name in names]
     if Part.SPIN in limits:
-        rows.append(EndRow("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
+        rows.append(("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
     pulses = (f"{number}: {channel_text(pulse, body)}" for number, pulse in enumerate(flown.schedule, start=1))
     return Workbench(tuple(rows), tuple(pulses))
 

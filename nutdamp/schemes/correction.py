@@ -101,11 +101,10 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
     """`misses` of a flight; ``spin`` adds a fifth, the relative error of the final spin."""
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
-    moments = np.asarray(flight_.last_moments)
-    body = flight_.settled.rates * moments
-    after = attitude.rotate(flight_.settled.quaternion, body)
+    inertia = replace(spacecraft.inertia, moments=flight_.last_moments)
+    body, after = inertia.momentum(flight_.settled.rates), flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
-    body[:2] -= moments[:2] * (steady.real, steady.imag)
+    body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
     left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin
     return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)

@@ -128,8 +128,8 @@ def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> floa
     if on_time is None:
         needed = 0.5 * abs(spacecraft.nutation_rate) * impulse
         raise Infeasible(
-            f"half the nutation needs a torque above {needed:.4g} N m to be taken out within half a body nutation "
-            f"period; the torquer has {torquer.torque:.4g} N m"
+            f"half the nutation needs more than {needed / torquer.torque:.4g} times the torque of the torquer to be "
+            "taken out within half a body nutation period"
         )
     return Windows(spacecraft).on_time(on_time, 0.0, math.inf)
 

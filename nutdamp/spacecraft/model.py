@@ -192,16 +192,12 @@ class Inertia:
     def _swings(self, spin: float) -> bool:
         """True if I1 ≠ I2 and a small nutation turns on an ellipse."""
         (first, second, third), wheel = self.moments, self.wheel
-        if wheel == 0.0:
-            return not self.symmetric and (first - third) * (second - third) > 0.0
-        return not self.symmetric and ((first - third) * spin - wheel) * ((second - third) * spin - wheel) > 0.0
+        rate = spin if wheel else 1.0  # without a wheel the sign is that of any spin
+        return first != second and ((first - third) * rate - wheel) * ((second - third) * rate - wheel) > 0.0
 
     def nutating(self, spin: float) -> float:
         """Transverse moment of the symmetric body whose small nutation turns as fast, kg m²: A where I1 = I2."""
-        if self.symmetric:
-            return self.A
-        axial, rate = self.axial(spin), spin - self.nutation_rate(spin)
-        return self.C / (1.0 - self.nutation_slope(spin)) if self.wheel == 0.0 else axial / rate
+        return self.A if self.symmetric else float(self.axial(spin)) / (spin - self.nutation_rate(spin))
 
     @property
     def shape(self) -> str:

@@ -17,7 +17,7 @@ from nutdamp.views.decisions import VERDICT
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, lasting, most, quantity
 
 SLOW = 0.1
@@ -34,31 +34,14 @@ def _of_cycle(get: Callable[[Cycle], float | None], scale: float = 1.0) -> Calla
     return value
 
 
-def _of_band(name: str) -> Callable[[HeldNutation], float | None]:
-    return lambda held: None if held.band is None else math.degrees(getattr(held.band, name))
-
-
 def _digits(count: int) -> Callable[[float], str]:
     return lambda value: f"{value:.{count}g}"
 
 
-def _tank(budget: Budget) -> bool:
-    return budget.spacecraft.tank is not None
-
-
-def _required(budget: Budget) -> bool:
-    return budget.meets_requirement is not None
-
-
-def _spin_share(held: HeldNutation) -> float | None:
-    return None if held.slows is None else 100.0 * held.slows * DAY / YEAR
-
-
-DEGREE = math.degrees(1.0)
 FILES, EVERYWHERE = "csv json", "screen csv json"
 HELD = (
-    Column("start_deg", Shared.START, "deg", lambda held: math.degrees(held.thresholds.start), _digits(4), EVERYWHERE),
-    Column("stop_deg", "stop", "deg", lambda held: math.degrees(held.thresholds.stop), _digits(4), EVERYWHERE),
+    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), _digits(4), EVERYWHERE),
+    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), _digits(4), EVERYWHERE),
     Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
     Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle(lambda cycle: cycle.pulses, DAY), _digits(4),
            f"{EVERYWHERE} other"),
@@ -70,20 +53,18 @@ HELD = (
     Column("", "cycle", "", _of_cycle(lambda cycle: cycle.cycles),
            lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause", "screen"),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle(lambda cycle: cycle.spin_rate, DAY), where=FILES),
-    Column("nutation_low_deg", "after firing", "deg", _of_cycle(lambda cycle: cycle.low, DEGREE), _digits(3),
-           EVERYWHERE),
-    Column("nutation_high_deg", "before firing", "deg", _of_cycle(lambda cycle: cycle.high, DEGREE), _digits(3),
-           EVERYWHERE),
-    Column("nutation_largest_deg", Shared.MOST, "deg", _of_cycle(lambda cycle: cycle.largest, DEGREE), _digits(3),
-           EVERYWHERE),
-    Column("", Shared.SPIN, "%/day", _spin_share, _digits(2), "screen"),
-    Column("noise_deg", "", "", _of_band("noise"), where=FILES),
-    Column("smallest_pulse_deg", "", "", _of_band("step"), where=FILES),
+    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), _digits(3), EVERYWHERE),
+    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), _digits(3), EVERYWHERE),
+    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), _digits(3), EVERYWHERE),
+    Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
+           _digits(2), "screen"),
+    Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
+    Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
-           _digits(4), "screen", _tank),
+           _digits(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
-    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", when=_required,
-           kind=TEXT, met=lambda held: held.meets_requirement),
+    Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", kind=TEXT,
+           when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),
     Column("meets_requirement", "", "", lambda held: held.meets_requirement, where=FILES, kind=YES_NO),
     Column("why", "", "", lambda held: held.why or None, where=FILES, kind=TEXT),
 )  # fmt: skip

@@ -24,13 +24,12 @@ from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, Consequence
 from nutdamp.spacecraft.equipment import SunSensor
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.units import bar
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.plan_json import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import in_words, size_text
 
@@ -45,10 +44,9 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
                "screen"),
         Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
         Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
-        Column("smallest_step_deg", "smallest step", "deg", lambda row: math.degrees(row.smallest),
+        Column("smallest_step_deg", "smallest step", "deg", angle_of("smallest"),
                lambda step: small_angle(step) if step else "any", "screen json"),
-        Column("largest_step_deg", "largest step", "deg", lambda row: math.degrees(row.largest), small_angle,
-               "screen json"),
+        Column("largest_step_deg", "largest step", "deg", angle_of("largest"), small_angle, "screen json"),
         Column("damps", "", "", lambda row: row.channel.damps, where="json", kind=YES_NO),
     )  # fmt: skip
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
@@ -88,11 +86,9 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
 
 TURNS = (
     Column("name", "command blocks", "", lambda row: row.channel.name, where="screen json", kind=TEXT),
-    Column("smallest_turn_deg", "least turn of H", "deg", lambda row: math.degrees(row.smallest), small_angle,
-           "screen json"),
+    Column("smallest_turn_deg", "least turn of H", "deg", angle_of("smallest"), small_angle, "screen json"),
     Column("smallest_turn_width_s", "by a pulse of", "", lambda row: row.smallest_width, duration, "screen json"),
-    Column("largest_turn_deg", "largest turn", "deg", lambda row: math.degrees(row.largest), small_angle,
-           "screen json"),
+    Column("largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"),
     Column("largest_turn_width_s", "by a pulse of", "", lambda row: row.largest_width, duration, "screen json"),
 )  # fmt: skip
 
@@ -104,7 +100,8 @@ def turn_table(spacecraft: Spacecraft) -> DataTable:
 
 TANK = (
     Column("used_kg", "used", "kg", lambda row: row[1], lambda used: f"{used:.4g}", "screen json"),
-    Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]), bar, "screen json"),
+    Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]),
+           lambda pressure: quantity(1e-5 * pressure, "bar"), "screen json"),
     Column("thrust_factor", "", "", lambda row: row[0].thrust_factor(row[1]), where="json"),
     Column("", "thrust", "%", lambda row: 100.0 * row[0].thrust_factor(row[1]), lambda share: f"{share:.4g}",
            "screen"),
@@ -137,10 +134,6 @@ class DisturbanceRow(NamedTuple):
         return self.result.disturbance.name or f"number {self.number}"
 
 
-def _degree(angle: float | None) -> float | None:
-    return None if angle is None else math.degrees(angle)
-
-
 def _reached(row: DisturbanceRow) -> list[dict[str, float]]:
     return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.result.resonant]
 
@@ -150,8 +143,8 @@ DISTURBANCES = (
     Column("name", "", "", lambda row: row.result.disturbance.name or None, where="json", kind=TEXT),
     Column("", "effect", "", lambda row: "; ".join(_effects(row.result)), where="screen", kind=TEXT),
     Column("precession_rad_s", "", "", lambda row: row.result.precession, where="json"),
-    Column("forced_tilt_deg", "", "", lambda row: _degree(row.result.tilt), where="json"),
-    Column("beat_deg", "", "", lambda row: _degree(row.result.beat), where="json"),
+    Column("forced_tilt_deg", "", "", angle_of("result.tilt"), where="json"),
+    Column("beat_deg", "", "", angle_of("result.beat"), where="json"),
     Column("beat_period_s", "", "", lambda row: row.result.beat_period, where="json"),
     Column("reaches", "", "", _reached, where="json"),
     Column("spin_rate_rad_s2", "", "", lambda row: row.result.spin_rate, where="json"),

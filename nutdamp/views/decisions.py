@@ -238,10 +238,10 @@ def decision_screen(compared: Comparison, decision: Decision) -> list[Renderable
     ]
 
 
-def requirement(decision: Decision, *, looped: bool = False) -> Iterator[Text]:
-    """The verdict as a line of a screen, and its notes; ``looped``: it is the flight of a closed loop."""
+def requirement(decision: Decision) -> Iterator[Text]:
+    """The verdict as a line of a screen, and its notes."""
     yield statement(decision)
-    yield from map(screen_line, ordered(decision_notes(decision, looped=looped)))
+    yield from map(screen_line, ordered(decision_notes(decision)))
 
 
 def figures(decision: Decision) -> list[RenderableType]:

@@ -22,6 +22,7 @@ from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to
 from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views.decisions import end_rows
 from nutdamp.views.plan_json import final_json, heading, target_json
@@ -173,11 +174,16 @@ def percentiles_json(
     return {name: None if value is None else shown(column, value) for name, value in values}
 
 
+def _names() -> Iterator[tuple[str, str, float]]:
+    """`NAMES` in the units of screens."""
+    return ((name, *screen_unit(unit, scale)) for name, unit, scale in NAMES)
+
+
 def _percentiles(results: Results) -> DataTable:
     """One row an output: values by shares of the cases; where any are negative, lower ones in a row of their own."""
     rows = []
     nominal = results.study.outputs_of({}).tolist()
-    for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, NAMES, nominal, strict=True):
+    for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, _names(), nominal, strict=True):
         distribution, signs = results.distribution(output), [""]
         if distribution is not None and distribution.minimum < 0.0:
             signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
@@ -336,7 +342,7 @@ def _cases(study: Study, rows: Sequence[Mapping[str, Any]]) -> DataTable:
 def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[Column]:
     yield Column("", Shared.CASE, "", itemgetter("case"), where="full", kind=WHOLE)
     yield Column("", "", "", lambda row: Shared.THIS_CASE if row["case"] else Shared.NOMINAL, where="case", kind=TEXT)
-    for key, (name, unit, scale) in zip(OUTPUT_COLUMNS, NAMES, strict=True):
+    for key, (name, unit, scale) in zip(OUTPUT_COLUMNS, _names(), strict=True):
         largest = max((scale * abs(row[key]) for row in rows), default=0.0)
         yield Column("", name, unit, _known(key, scale), partial(beside, largest=largest), "case")
         if unit == "deg":

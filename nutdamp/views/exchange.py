@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
+    from nutdamp.common.results import Note
     from nutdamp.common.time import Epoch
     from nutdamp.files.ccsds.message import Message
     from nutdamp.flight.propagation import Flight
@@ -37,7 +39,7 @@ class Format(NamedTuple):
     """A format: its ``name``, a ``summary`` for help pages, the function that gives the text.
 
     ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
-    frame of the attitude. ``needs_orbit``: incomplete without one.
+    frame of the attitude. ``needs_orbit``: incomplete without one. ``nutates``: as symmetric bodies do.
     """
 
     name: str
@@ -47,18 +49,15 @@ class Format(NamedTuple):
     track: bool = False
     dated: bool = False
     needs_orbit: bool = False
+    nutates: bool = False
 
 
 def _json(request: Request) -> str:
     from nutdamp.files.tabular import json_text
-    from nutdamp.planning.decision import compare_plans, decide
-    from nutdamp.views.decisions import verdict
-    from nutdamp.views.plan_json import comparison_json, decision_json
+    from nutdamp.planning.decision import compare_plans
+    from nutdamp.views.plan_json import comparison_json
 
-    compared = compare_plans((request.plan,))
-    decided = decide(compared)
-    data = comparison_json(compared, decided)
-    return json_text({**data, "decision": None if decided is None else decision_json(decided, verdict(decided))})
+    return json_text(comparison_json(compare_plans((request.plan,))))
 
 
 def _basilisk(request: Request) -> str:
@@ -94,23 +93,12 @@ def _opm(request: Request) -> str:
     return _notation(request, opm(request.plan, reference(request.plan.spacecraft), _now()))
 
 
-def _aem(request: Request) -> str:
-    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL
-
-    return _history(request, QUATERNION_ANGVEL)
-
-
-def _aem_spin(request: Request) -> str:
-    from nutdamp.files.ccsds.message import SPIN_NUTATION_MOM
-
-    return _history(request, SPIN_NUTATION_MOM)
-
-
-def _history(request: Request, kind: str) -> str:
+def _aem(request: Request, *, spin: bool = False) -> str:
+    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, SPIN_NUTATION_MOM
     from nutdamp.files.ccsds.write import aem
     from nutdamp.files.export import reference
 
-    place = reference(request.plan.spacecraft)
+    place, kind = reference(request.plan.spacecraft), SPIN_NUTATION_MOM if spin else QUATERNION_ANGVEL
     return _notation(request, aem(request.plan, request.flight(), request.end(), place, _now(), kind))
 
 
@@ -132,7 +120,15 @@ FORMATS = {
     for row in (
         Format("apm", "state and pulses (CCSDS)", _apm, message=True, dated=True),
         Format("aem", "attitude history (CCSDS) as quaternions", _aem, message=True, track=True, dated=True),
-        Format("aem-spin", "as spin, nutation and momentum", _aem_spin, message=True, track=True, dated=True),
+        Format(
+            "aem-spin",
+            "as spin, nutation and momentum",
+            partial(_aem, spin=True),
+            message=True,
+            track=True,
+            dated=True,
+            nutates=True,
+        ),
         Format("opm", "velocity change of each pulse (CCSDS)", _opm, message=True, dated=True, needs_orbit=True),
         Format("stk", "attitude history as .a", _stk, track=True, dated=True),
         Format("spin-table", "CSV, one row a spin", _spin_table, track=True),
@@ -172,6 +168,14 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
             cure = "an earlier --until" if row.track else "a shorter horizon"
             raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
     return row.text(request)
+
+
+def export_notes(plan: Plan, form: str) -> list[Note]:
+    """Notes on the motion that the format ``form`` does not hold."""
+    from nutdamp.common.results import note
+    from nutdamp.files.ccsds.write import spinning
+
+    return [note("spin-alone")] * (FORMATS[form].nutates and not spinning(plan.spacecraft.inertia))
 
 
 def lacking(plan: Plan, form: str) -> str | None:

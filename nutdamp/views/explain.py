@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from typing import Any, Literal, NamedTuple, get_args, get_origin
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -13,7 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from nutdamp.errors import BadRequest, nearest
+from nutdamp.errors import BadRequest, listed, nearest
 from nutdamp.files import fields
 from nutdamp.files.fields import Quantity, Section, section_of
 from nutdamp.files.keys import SpacecraftFile
@@ -45,10 +44,10 @@ def _notes() -> Iterator[tuple[str, str]]:
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
-    ("glossary", partial(guide.rows, "glossary")),
-    ("column of CSV", partial(guide.rows, "csv")),
-    ("name in JSON", partial(guide.rows, "json")),
-    ("symbol", partial(guide.rows, "symbols")),
+    ("glossary", lambda: page("glossary").rows),
+    ("column of CSV", lambda: page("csv").rows),
+    ("name in JSON", lambda: page("json").rows),
+    ("symbol", lambda: page("symbols").rows),
     ("note", _notes),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
@@ -93,8 +92,8 @@ def names() -> Iterator[str]:
     """Every name that `explained` finds, but for sections of pages."""
     yield from guide.NAMES
     for _, source in WORDS:
-        for listed, _ in source():
-            yield from listed.split(", ")
+        for entry, _ in source():
+            yield from entry.split(", ")
     yield from (key.path for key in _plain_keys())
 
 
@@ -118,18 +117,18 @@ def _texts(requested: str) -> Iterator[tuple[str, str]]:
     """
     seen: set[str] = set()
     for kind, source in WORDS:
-        words = [(_spelt(listed), listed, text) for listed, text in source()]
+        words = [(_spelt(entry), entry, text) for entry, text in source()]
         forms = (str,) if seen else (str, _folded, _bare)
         tiers = ([word for word in words if form(requested) in map(form, word[0])] for form in forms)
-        for _, listed, text in next(filter(None, tiers), []):
+        for _, entry, text in next(filter(None, tiers), []):
             if text not in seen:
                 seen.add(text)
-                yield kind, text if kind in ALIKE or ", " not in listed else f"{listed}: {text}"
+                yield kind, text if kind in ALIKE or ", " not in entry else f"{entry}: {text}"
 
 
-def _spelt(listed: str) -> list[str]:
+def _spelt(entry: str) -> list[str]:
     """The names of a list; some have a comma of their own."""
-    names = listed.split(", ")
+    names = entry.split(", ")
     spans = ((first, last) for first in range(len(names)) for last in range(first + 1, len(names) + 1))
     return [", ".join(names[first:last]) for first, last in spans]
 
@@ -202,7 +201,7 @@ class KeyGuide(NamedTuple):
     def _unit(self) -> str:
         if self.section is ToleranceSection:
             names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
-            return f"unit {_either(dict.fromkeys(names))}"
+            return f"unit {listed([*dict.fromkeys(names)], 'or')}"
         return "" if self.section is not None else _what(self.field)
 
     def _default(self) -> str:
@@ -237,7 +236,7 @@ def file_topic(below: str = "") -> Topic:
         return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
     requested = next((key for key in every if key.path == below), None)
     if requested is None:
-        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below, every)}")
+        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below)}")
     return Topic(
         f"{FILE}.{below}",
         "a key of the spacecraft file",
@@ -271,46 +270,29 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
         yield from _key_sections(child, every)
 
 
-def _near(below: str, every: list[KeyGuide]) -> str:
+def _near(below: str) -> str:
     """A key of the same name elsewhere, or one that is spelt alike."""
-    paths = tuple(
-        key.path for key in every if key.parent.partition(".")[0] != "dispersions" or not key.parent.count(".")
-    )
-    last = below.rpartition(".")[2]
-    same = next((path for path in paths if path.rpartition(".")[2] == last), None)
-    return (
-        f"did you mean '{FILE}.{same}'?"
-        if same
-        else meant(f"{FILE}.{below}", tuple(f"{FILE}.{path}" for path in paths), "nutdamp explain file")
-    )
+    paths = tuple(f"{FILE}.{key.path}" for key in _plain_keys())
+    same = (path for path in paths if path.rpartition(".")[2] == below.rpartition(".")[2])
+    return meant(next(same, f"{FILE}.{below}"), paths, "nutdamp explain file")
 
 
 def _what(field: fields.Key) -> str:
     """The units of a quantity, the words of a choice, or the form of another value."""
-    quantity = _first(Quantity, (field.type,))
+    parts = list(_within(field.type))
+    quantity = next((part for part in parts if isinstance(part, Quantity)), None)
     if quantity is not None:
         factors = KINDS[quantity.kind].factors
-        return f"unit {_either(factors)}" if factors else "plain numbers, without unit"
-    choices = _choices(field.type)
-    if choices:
-        return _either(choices)
-    plain = _plain(field.type)
-    return {int: "a whole number", str: "a text"}.get(plain, "")
+        return f"unit {listed([*factors], 'or')}" if factors else "plain numbers, without unit"
+    choices = next((get_args(part) for part in parts if get_origin(part) is Literal), ())
+    return listed(choices, "or") if choices else {int: "a whole number", str: "a text"}.get(_plain(field.type), "")
 
 
-def _first(kind: type[Quantity], parts: tuple[Any, ...]) -> Quantity | None:
-    """The first ``kind`` within types and their annotations."""
-    for part in parts:
-        match = part if isinstance(part, kind) else _first(kind, get_args(part))
-        if match is not None:
-            return match
-    return None
-
-
-def _choices(annotation: Any) -> tuple[str, ...]:
-    if get_origin(annotation) is Literal:
-        return tuple(str(choice) for choice in get_args(annotation))
-    return next(filter(None, map(_choices, get_args(annotation))), ())
+def _within(annotation: Any) -> Iterator[Any]:
+    """A type, the types within it, and their annotations."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _within(part)
 
 
 def _plain(annotation: Any) -> Any:
@@ -318,11 +300,6 @@ def _plain(annotation: Any) -> Any:
     if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
         return annotation
     return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
-
-
-def _either(names: Any) -> str:
-    *others, last = names
-    return f"{', '.join(others)} or {last}" if others else str(last)
 
 
 def flow(value: object) -> str:
@@ -352,7 +329,7 @@ def topics_screen() -> RenderableType:
         ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
         ("Motion", ", ".join(topic.name for topic in MOTION)),
         ("Equations", "17, K7, 24.4"),
-        ("Words", "any heading of a table, column, name in JSON, symbol, or key of the file, as in: explain tilt"),
+        ("Words", "any heading, column, name in JSON, symbol or key: explain tilt"),
     )
     return Constrain(Group(*parts, _Pairs(others)), WIDEST)
 

@@ -13,11 +13,13 @@ from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
+from nutdamp.estimation.signals import KIND
 from nutdamp.files.fitted import notes
+from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, percent
 from nutdamp.views.plan_json import heading
 from nutdamp.views.summary import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0
@@ -32,25 +34,31 @@ MOST_PAIRS = 6
 
 def in_shown(signal: str) -> tuple[str, float]:
     """Unit in which a signal is shown, and its factor from SI."""
-    if signal == "acceleration":
-        return "m/s²", 1.0
-    return ("ms", 1e3) if signal == "sun_pulse" else ("deg" if signal == "axis" else "deg/s", 180.0 / math.pi)
+    unit = KIND[signal].unit
+    if unit == "s":
+        return "ms", 1e3
+    return (unit.replace("rad", "deg"), 180.0 / math.pi) if unit.startswith("rad") else screen_unit(unit)
+
+
+def _unit(row: Estimate) -> tuple[str, float]:
+    """Unit of an estimate on screens, and its factor from SI."""
+    return screen_unit(row.unit, row.factor)
 
 
 def _scaled(name: str, row: Estimate) -> float | None:
     """A field of an estimate in its unit; None where it is not known, or infinite."""
     value = getattr(row, name)
-    return None if value is None or math.isinf(value) else value * row.factor
+    return None if value is None or math.isinf(value) else value * _unit(row)[1]
 
 
 def _value(row: Estimate) -> str:
     """The value to the digits that its sigma leaves, 0 where it is within rounding of it."""
     shown = row.value if math.isinf(row.sigma) or abs(row.value) > NOTHING * row.sigma else 0.0
-    return f"{shown * row.factor:.{_digits(row)}g}"
+    return f"{shown * _unit(row)[1]:.{_digits(row)}g}"
 
 
 def _file(row: Estimate) -> str | None:
-    return None if row.file is None else f"{row.file * row.factor:.{max(_digits(row) - 2, 4)}g}"
+    return None if row.file is None else f"{row.file * _unit(row)[1]:.{max(_digits(row) - 2, 4)}g}"
 
 
 def _changed(change: float) -> str:
@@ -72,7 +80,7 @@ ESTIMATES = (
     Column("", "value", "", _value, where="screen"),
     Column("", "sigma", "", lambda row: _scaled("sigma", row), lambda sigma: f"{sigma:.2g}", "screen"),
     Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
-    Column("unit", "unit", "", lambda row: row.unit, where="screen json", kind=TEXT),
+    Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
     Column("file", "", "", lambda row: _scaled("file", row), where="json"),
     Column("", "file", "", _file, where="screen"),
     Column("file_sigma", "", "", lambda row: _scaled("prior", row), where="json"),
@@ -132,6 +140,11 @@ def _probe(row: Prospect) -> str | None:
 def prospect_table(ahead: Outlook) -> DataTable:
     """A row for each coast and probe pulse of the forecast."""
     level = exact_percent(ahead.probability)
+
+    def gain(row: Prospect) -> float | None:
+        rate = ahead.gain(row)
+        return None if rate is None else math.degrees(rate)
+
     columns = (
         Column("coast_s", "", "", lambda row: row.length, where="json"),
         Column("", "coast", "s", lambda row: f"{row.length:.4g}" + " (now)" * (row is ahead.now), where="screen",
@@ -150,6 +163,11 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("", "comply", "%", lambda row: None if row.met is None else 100.0 * row.met,
                lambda share: f"{share:.4g}", "screen"),
         Column("propellant_kg", "", "", lambda row: row.propellant, where="json"),
+        Column("", Shared.PROPELLANT, "g", lambda row: row.propellant and 1e3 * row.propellant, lambda kg: f"{kg:.3g}",
+               "screen"),
+        Column("gain_deg_kg", "", "", gain, where="json"),
+        Column("", "gain", "deg/g", lambda row: (rate := gain(row)) and 1e-3 * rate, lambda rate: f"{rate:.2g}",
+               "screen"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
@@ -203,6 +221,10 @@ def advice(ahead: Outlook) -> Iterator[str]:
         if probe.propellant is not None and ahead.propellant is not None:
             spent = f"{mass(probe.propellant)} of propellant, besides the {mass(ahead.propellant)} of the plan"
             yield f"the probe pulse takes {spent}"
+        thrifty = ahead.thrifty
+        if thrifty is not None and thrifty is not probe:
+            takes = f"{mass(thrifty.propellant or 0.0)}, {degrees(thrifty.nutation)} left"
+            yield f"most is gained per propellant by the probe pulse of {thrifty.probe} ({takes})"
     elif ahead.probes:
         yield "no single probe pulse of a channel of the plan pays"
 
@@ -273,5 +295,6 @@ def _outlook(ahead: Outlook) -> dict[str, Any]:
         "probability": ahead.probability,
         "longer_coast_s": None if longer is None else longer.length,
         "probe": None if probe is None else probe.probe,
+        "probe_per_propellant": None if ahead.thrifty is None else ahead.thrifty.probe,
         "prospects": prospect_table(ahead).json(),
     }

@@ -3,7 +3,7 @@
 A page begins with ``# Title`` and a line of summary; its topic has the name of the file. On the pages of `ENTRIES` each
 ``## name`` begins a topic of its own, again with a line of summary, and ``### title`` a part of it; on the others
 ``## title`` begins a part. Blocks are what the web shows: paragraphs, tables, code, and lists, in which
-``- **name**: text`` is a row. The units of files and options come from the table that reads them.
+``- **name**: text`` is a row.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import NamedTuple, cast
 
 from nutdamp.errors import BadRequest, nearest
-from nutdamp.units import KINDS, Kind
 
 FOLDER = Path(__file__).parents[1] / "guide"
 """Folder of the pages."""
@@ -57,6 +56,16 @@ class Topic(NamedTuple):
     summary: str
     parts: tuple[TopicPart, ...]
 
+    @property
+    def blocks(self) -> Iterator[Block]:
+        """Blocks of all parts."""
+        return (block for part in self.parts for block in part.blocks)
+
+    @property
+    def rows(self) -> Iterator[tuple[str, str]]:
+        """Rows of all lists and tables."""
+        return (row for block in self.blocks if isinstance(block, TopicRows) for row in block.rows)
+
 
 ENTRIES = ("schemes", "motion", "equations")
 """Pages whose sections are topics of their own."""
@@ -78,14 +87,6 @@ def page(name: str) -> Topic:
 def entries(name: str) -> tuple[Topic, ...]:
     """The topics on a page of `ENTRIES`, in order."""
     return tuple(_topic(section, "### ") for section in _sections(_text(name), "## ")[1:])
-
-
-def rows(name: str) -> Iterator[tuple[str, str]]:
-    """The rows of all lists and tables of a page."""
-    for part in page(name).parts:
-        for block in part.blocks:
-            if isinstance(block, TopicRows):
-                yield from block.rows
 
 
 def _text(name: str) -> str:
@@ -169,45 +170,8 @@ def _plain(text: str) -> str:
     return _LINK.sub(shown, " ".join(text.split()))
 
 
-def _line(kind: Kind) -> str:
-    """The SI unit first, then the others and their values in it."""
-    if not kind.factors:
-        return "no unit"
-    named = ((unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}") for unit, factor in kind.factors.items())
-    others = [f"{unit}{worth}".rstrip() for unit, worth in named if unit != kind.si]
-    return "; ".join([kind.si, *others] if kind.si else others)
-
-
-def units_topic() -> Topic:
-    """Every unit that is accepted."""
-    rows = tuple((kind.noun.partition(" ")[2], _line(kind)) for kind in KINDS.values())
-    return Topic(
-        "units",
-        "units of the spacecraft file and of options",
-        (
-            TopicPart(
-                "",
-                (
-                    "A value is a number in SI (the first unit of a line) or a text with a unit, such as 60 rpm, 20 ms "
-                    "or 5 deg. On the command line the blank may be left out: --until 90s, --set state.spin=60rpm.",
-                    TopicRows(rows),
-                    "Blanks within a unit may be left out or written as *, · or -, and ^2 as ²: kgm², N*m, slug-ft². "
-                    "degrees, degree and ° are read as deg, sec as s, hour as hours, rpm in any case. A unit of "
-                    "another kind, or one that is not listed, is an error that names those allowed; Hz is for "
-                    "sampling rates alone, and revolutions are no unit here, since nobody can tell whether they count "
-                    "turns or radians.",
-                    "A share is a plain number or has %. Screens show degrees, s, N m s, g or kg of propellant, "
-                    "the spin in rpm and rad/s; CSV and JSON name the unit in the column or key, such as t_s, "
-                    "nutation_deg.",
-                ),
-            ),
-            TopicPart("See also", ("explain file",)),
-        ),
-    )
-
-
 PAGES = (
-    ("To begin", ("tutorial", "reading", "glossary")),
+    ("To begin", ("tutorial", "reading", "cases", "glossary")),
     (
         "How to",
         ("pointing", "trade", "robust", "blocks", "valves", "loop", "budget", "campaign", "fit", "report", "library"),
@@ -245,12 +209,10 @@ def found(requested: str) -> Topic:
     Raises BadRequest, which names a near one, where there is none.
     """
     name = re.sub(r"[\s_]+", "-", requested.strip().casefold())
-    if name == "units":
-        return units_topic()
     if name in NAMES:
         return page_or_topic(name)
-    if name == "energy-sink":
-        return page_or_topic("dissipation")
+    if name in (other := {"energy-sink": "dissipation", "gyrostat": "wheel"}):
+        return page_or_topic(other[name])
     if _FIGURE.fullmatch(name):
         return page_or_topic("figures")
     if match := _NUMBER.fullmatch(requested.strip().casefold()):
@@ -282,7 +244,7 @@ def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") ->
 
 def limits() -> tuple[str, ...]:
     """Assumptions and limits, a paragraph each."""
-    return tuple(text for _, text in rows("limits"))
+    return tuple(text for _, text in page("limits").rows)
 
 
 class Equation(NamedTuple):
@@ -324,7 +286,7 @@ class Equation(NamedTuple):
         return Topic(self.number, self.subject, parts)
 
 
-SYMBOLS = dict(rows("symbols"))
+SYMBOLS = dict(page("symbols").rows)
 """Symbols of the sources with their units."""
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))

@@ -23,7 +23,7 @@ from nutdamp.views.decisions import cost, end_rows, margin_lines, statement
 from nutdamp.views.plan_json import final_json, heading, requirement_json, residual_json, target_json
 from nutdamp.views.pulses import pulse_table, seconds
 from nutdamp.views.summary import Remark, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, facts
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
 SHOWN = 40
@@ -62,10 +62,10 @@ FIRINGS = (
     Column("on_time_difference_s", "differs by", "s", lambda row: row.apart[1], _apart, "verified verified_json"),
     Column("", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="screen", kind=TEXT),
     Column("decided_s", "", "", lambda row: row.firing.decided, where="json"),
-    Column("seen_deg", "nutation seen", "deg", lambda row: math.degrees(row.firing.seen), small_angle, "screen json"),
-    Column("", "before", "deg", lambda row: math.degrees(row.before), small_angle, "screen"),
-    Column("", "after", "deg", lambda row: math.degrees(row.after), small_angle, "screen"),
-    Column("", "nutation", "deg", lambda row: math.degrees(row.firing.true_nutation), small_angle, "verified"),
+    Column("seen_deg", "nutation seen", "deg", angle_of("firing.seen"), small_angle, "screen json"),
+    Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
+    Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
+    Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
     Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
            "verified verified_json"),
 )  # fmt: skip
@@ -84,7 +84,7 @@ def _finite(value: float) -> float | None:
 
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
-    Column("late_deg", "late", "deg", lambda row: math.degrees(row.late), lambda late: f"{late:.4g}", "screen json"),
+    Column("late_deg", "late", "deg", angle_of("late"), lambda late: f"{late:.4g}", "screen json"),
     Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
     Column("gain", "", "", lambda row: row.gain, where="json"),
     Column("", "remaining", "%", lambda row: 0.0 if row.gain < ROUNDING else 100.0 * row.gain,

@@ -21,6 +21,7 @@ from nutdamp.files.samples import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
+from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views.dispersion import (
     PERCENTILES,
@@ -56,7 +57,12 @@ class LoopOutput(NamedTuple):
     @property
     def label(self) -> str:
         """Heading and unit."""
-        return f"{self.heading}, {self.unit}" if self.unit else self.heading
+        return f"{self.heading}, {screen_unit(self.unit)[0]}" if self.unit else self.heading
+
+    @property
+    def factor(self) -> float:
+        """Factor to the unit of screens."""
+        return screen_unit(self.unit, self.scale)[1]
 
 
 SHOWN_OUTPUTS = (
@@ -179,7 +185,7 @@ def _percentiles(results: LoopResults) -> DataTable:
         if distribution is not None and output.name == "spin_change":  # up or down, the largest change is the worst
             distribution, plan = Exact(np.abs(results.of(output.name))), abs(plan)
         given = percentiles_json(output.key, None if distribution is None else plan, distribution)
-        rows.append(percentile_row(output.label, output.scale, given, whole=output.name == "firings"))
+        rows.append(percentile_row(output.label, output.factor, given, whole=output.name == "firings"))
     return DataTable("Percentiles", PERCENTILES, rows)
 
 
@@ -193,9 +199,9 @@ ENDS = (
 
 def _numbers(output: LoopOutput, values: Iterable[float], largest: float) -> list[str]:
     """Values beside the ``largest`` of them."""
-    scaled = [output.scale * shown(output.key, value) for value in values]
+    scaled = [output.factor * shown(output.key, value) for value in values]
     whole = output.name == "firings"
-    texts = (f"{value:.0f}" if whole else beside(value, output.scale * shown(output.key, largest)) for value in scaled)
+    texts = (f"{value:.0f}" if whole else beside(value, output.factor * shown(output.key, largest)) for value in scaled)
     return [MISSING if math.isnan(value) else text for value, text in zip(scaled, texts, strict=True)]
 
 

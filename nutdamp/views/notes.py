@@ -1,6 +1,7 @@
 """Notes in words: the catalogue of their sentences, ``guide/notes.md``, and notes for screens and JSON files.
 
-A value is shown by the unit in which its name ends, so that the sentences hold no formats.
+A value is shown by the unit in which its name ends, so that the sentences hold no formats; one without, in the unit
+that the note names, if any.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from rich.text import Text
 
 from nutdamp.common.results import Note, Value
+from nutdamp.units import screen_unit
 from nutdamp.views.guide import note_entries
 from nutdamp.views.text import degrees, duration, lasting, quantity, sentence
 
@@ -25,10 +27,10 @@ INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
 
 UNITS: dict[str, Callable[[float], str]] = {
     "_deg": lambda value: degrees(math.radians(value)),
+    "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,
     "_s": duration,
     "_Nms": lambda value: quantity(value, "N m s"),
-    "_rad_s": lambda value: quantity(value, "rad/s"),
     "_rpm": lambda value: quantity(value, "rpm", 5),
     "_percent": lambda value: f"{value:.3g} %",
     "_share": lambda value: f"{value:.10g} %",
@@ -45,7 +47,8 @@ def severity(note: Note) -> str:
 def text(note: Note) -> str:
     """The sentence of a note with its values, without a full stop."""
     entry, values = note_entries()[note.code], note.values
-    shown = {name: _shown(name, value) for name, value in values.items()}
+    unit, factor = screen_unit(str(values.get("unit", "")))
+    shown = {name: _shown(name, value, factor) for name, value in values.items()} | {"unit": unit}
     first, *clauses = entry.sentence.removesuffix(".").split("; ")
     differing = [clause for clause in clauses if _compared(clause, shown) == clause]
     return NAME.sub(lambda name: shown[name[1]], "; ".join([_compared(first, shown), *differing]))
@@ -56,11 +59,11 @@ def _compared(clause: str, shown: Mapping[str, str]) -> str:
     return INSTEAD.sub(lambda pair: pair[0] if shown[pair[1]] != shown[pair[2]] else f"{{{pair[1]}}}", clause)
 
 
-def _shown(name: str, value: Value) -> str:
+def _shown(name: str, value: Value, factor: float) -> str:
     if not isinstance(value, float):
         return str(value)
     unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
-    return f"{value:.4g}" if unit is None else unit(value)
+    return f"{factor * value:.4g}" if unit is None else unit(value)
 
 
 def note_json(note: Note) -> dict[str, Any]:

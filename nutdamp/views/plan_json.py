@@ -11,11 +11,12 @@ from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.planning.decision import Comparison, Decision, Line, infeasibility
+from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.requirements import Bound, Part
+from nutdamp.views.decisions import verdict
 from nutdamp.views.notes import joined, note_json
 from nutdamp.views.pulses import commanded
 
@@ -37,8 +38,13 @@ def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
     return {**heading(spacecraft), "feasible": False, "why": why}
 
 
-def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
-    """The object of ``plan --json``, without the decision itself."""
+def comparison_json(compared: Comparison) -> dict[str, Any]:
+    """The object of ``plan --json``: the plans, the decision on one of them, and the words of both."""
+    return decided_json(compared, decide(compared))
+
+
+def decided_json(compared: Comparison, decided: Decision | None) -> dict[str, Any]:
+    """`comparison_json` with a decision that is known already."""
     beside = () if decided is None else decision_notes(decided)
     return {
         **heading(compared.spacecraft),
@@ -47,6 +53,7 @@ def comparison_json(compared: Comparison, decided: Decision | None) -> dict[str,
         "no_pulse_needed": compared.needless,
         "reason": joined(reasons(compared)),
         "notes": [note_json(note) for note in (*comparison_warnings(compared), *beside, *alternatives(compared))],
+        "decision": None if decided is None else decision_json(decided),
     }
 
 
@@ -125,10 +132,15 @@ def requirement_json(plan: Plan) -> list[dict[str, Any]] | None:
     parts = []
     for part in plan.held:
         if part.bound.required:
-            unit, scale = ("rad_s", 1.0) if part.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+            unit, scale = _unit(part.bound)
             left, most = scale * part.left, scale * part.bound.most
             parts.append({"part": part.bound.part.value, f"left_{unit}": left, f"most_{unit}": most, "met": part.met})
     return parts or None
+
+
+def _unit(bound: Bound) -> tuple[str, float]:
+    """Unit of a part in files, and its factor from SI."""
+    return ("rad_s", 1.0) if bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
 
 
 def final_json(flown: Flight) -> dict[str, Any]:
@@ -184,8 +196,8 @@ def residual_json(residual: Residual | None) -> dict[str, float | None]:
     return {f"{name}_deg": None if residual is None else math.degrees(getattr(residual, name)) for name in RESIDUAL}
 
 
-def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
-    """The plan, whether it ``met`` the requirement and the ``verdict`` in words, part by part with margins, its end.
+def decision_json(decision: Decision) -> dict[str, Any]:
+    """The plan, whether it ``met`` the requirement and the verdict in words, part by part with margins, its end.
 
     ``cases`` is null where none were flown.
     """
@@ -193,7 +205,7 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
     return {
         "scheme": plan.scheme,
         "met": decision.met,
-        "verdict": verdict,
+        "verdict": verdict(decision),
         "requirement": [_line_json(line) for line in decision.lines],
         "cases": None
         if cases is None
@@ -214,7 +226,7 @@ def decision_json(decision: Decision, verdict: str) -> dict[str, Any]:
 
 def _line_json(line: Line) -> dict[str, Any]:
     """A part: its limit, its residual with nominal values and in the share of cases required, and the margin."""
-    unit, scale = ("rad_s", 1.0) if line.bound.part is Part.SPIN else ("deg", 180.0 / math.pi)
+    unit, scale = _unit(line.bound)
     return {
         "part": line.bound.part.value,
         "required": line.bound.required,

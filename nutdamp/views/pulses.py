@@ -16,7 +16,7 @@ from nutdamp.flight.track import Track
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
 
 MILLISECONDS = 3
@@ -127,21 +127,22 @@ def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
     return DataTable("Pulses", _dated(body), rows, schedule)
 
 
-def pulse_table(flown: Flight, *, phased: bool = False, least: float = math.inf) -> DataTable:
+def pulse_table(flown: Flight, *, scheme: str = "", least: float = math.inf) -> DataTable:
     """The pulses of a flight with the cone angles before and after each.
 
-    ``phased``: with spin phases, for pages; ``least``: limit of the nutation, rad, for the default screen.
+    ``scheme``: its name, for pages, which have spin phases too; ``least``: limit of the nutation, rad, of the default
+    screen.
     """
     before, after = flown.around_pulses()
     pulses, body = flown.schedule.pulses, flown.spacecraft
-    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if phased else np.zeros(len(pulses))
+    phases = spin_phases(flown, np.array([pulse.loaded[0] for pulse in pulses])) if scheme else np.zeros(len(pulses))
     rows = [
         PulseRow(index, pulse, body, before, after, phase)
         for index, (pulse, phase) in enumerate(zip(pulses, phases.tolist(), strict=True))
     ]
     left = Column("", Shared.NUTATION_AFTER, "deg", lambda row: float(row.after.nutation[row.at]),
                   lambda angle: short_angle(angle, least), "screen")  # fmt: skip
-    return DataTable("Pulses", (*_dated(body), left), rows, flown.schedule)
+    return DataTable(f"Pulses of {scheme}", (*_dated(body), left), rows, flown.schedule)
 
 
 def _dated(body: Spacecraft) -> tuple[Column, ...]:
@@ -170,10 +171,6 @@ def _counts(name: str) -> Callable[[BlockRow], int | None]:
     return counted
 
 
-def _delay_angle(row: BlockRow) -> float:
-    return _nine(math.degrees(row.block.delay * abs(row.body.spin)))
-
-
 def _nine(value: float) -> float:
     """A number to nine figures, without the noise of its last digits."""
     return float(f"{value:.9g}")
@@ -192,15 +189,15 @@ BLOCKS = (
            kind=TEXT),
     Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, _six, EVERYWHERE),
     Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
-    Column("delay_deg", Shared.DELAY, "deg", _delay_angle, lambda angle: f"{angle:.2f}", EVERYWHERE),
+    Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
+           lambda angle: f"{angle:.2f}", EVERYWHERE),
     Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
     Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",
            lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
-    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", lambda row: math.degrees(row.nutation), small_angle,
-           "csv page"),
+    Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle, "csv page"),
 )  # fmt: skip
 
 

@@ -18,14 +18,13 @@ from nutdamp.planning.notes import robust_cost, robust_reasons
 from nutdamp.planning.robust import RobustComparison
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, requirement
 from nutdamp.views.notes import joined, note_json, screen_line
 from nutdamp.views.plan_json import final_json, plan_json, target_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import in_degrees
 from nutdamp.views.tolerances import in_words, stated_text
 
@@ -88,11 +87,6 @@ def _needed(robust: RobustComparison) -> Iterator[Note]:
         least=f"{math.floor(1e4 * needed.least) / 100.0:.4g} %",
         confidence_share=100.0 * CONFIDENCE,
     )
-
-
-def left_name(spacecraft: Spacecraft) -> str:
-    """Name of the residual that a plan is to minimise."""
-    return "nutation" if spacecraft.goal.axis is None else "nutation or axis error"
 
 
 def robust_json(robust: RobustComparison) -> dict[str, Any]:
@@ -171,9 +165,9 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
                  "json" if fuelled else "full json")  # fmt: skip
     yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
     yield Column("", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
-    yield Column("nominal_nutation_deg", "", "", _nominal, where="json")
-    yield Column("nutation_deg", "", "", lambda row: math.degrees(row.nutation), where="json")
-    yield Column(f"{requirements.aim(body).value}_deg", "", "", lambda row: math.degrees(row.off), where="json")
+    yield Column("nominal_nutation_deg", "", "", angle_of("plan.flown.nutation"), where="json")
+    yield Column("nutation_deg", "", "", angle_of("nutation"), where="json")
+    yield Column(f"{requirements.aim(body).value}_deg", "", "", angle_of("off"), where="json")
     yield Column("", Shared.NOMINAL, "deg", attrgetter("nominal"), in_degrees, "full")
     yield Column("", level, "deg", attrgetter("left"), in_degrees, "full")
     yield Column("", "nominal cones", "", lambda row: KEPT[row.plan.kept is not False], where="full" * bool(body.keep))
@@ -182,10 +176,6 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
                  "full" * requirements.judged(body))  # fmt: skip
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
-
-
-def _nominal(row: PlanCandidate) -> float | None:
-    return None if row.plan.flown is None else math.degrees(row.plan.flown.nutation)
 
 
 def _four(value: float) -> str:
@@ -197,7 +187,8 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
-    level, left = decisions.exact_percent(robust.probability), left_name(robust.comparison.spacecraft)
+    level, pointed = decisions.exact_percent(robust.probability), robust.comparison.spacecraft.goal.axis is not None
+    left = "nutation" + " or axis error" * pointed
     notes = [
         *[f"Plans that rank below these: {rest}."] * bool(rest),
         *[f"Losing plans stopped early, after {listed(fewer, 'or')} cases."] * bool(fewer),

@@ -17,7 +17,7 @@ from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
 from nutdamp.views.decisions import COUNT, limit, size
 from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, turn_floor, turning
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, digits, short_angle, small_angle
 
 NOT = "✗"
@@ -68,14 +68,6 @@ def _feasible(get: Getter) -> Callable[[SchemeRow], Any]:
     return lambda row: get(row.plan) if row.plan.feasible else None
 
 
-def _residual(name: str, model: str = "flown") -> Callable[[SchemeRow], float | None]:
-    def angle(row: SchemeRow) -> float | None:
-        left = getattr(row.plan, model)
-        return None if left is None else math.degrees(getattr(left, name))
-
-    return angle
-
-
 def _met(row: SchemeRow) -> bool | None:
     return row.compared.meets(row.plan) if row.plan.feasible else None
 
@@ -100,10 +92,6 @@ def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
 
-def _milli(value: float) -> str:
-    return f"{value:.3f}"
-
-
 def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     body, least = compared.spacecraft, limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
@@ -116,7 +104,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where="screen full page csv", kind=TEXT)
     yield Column("feasible", "", "", lambda row: row.plan.feasible, where="csv", kind=YES_NO)
     yield Column("recommended", "", "", lambda row: row.plan is chosen, where="csv", kind=YES_NO)
-    yield Column("meets_requirement", "", "", lambda row: _csv_met(row), where="csv", kind=YES_NO)
+    yield Column("meets_requirement", "", "", lambda row: row.compared.meets(row.plan), where="csv", kind=YES_NO)
     yield Column("met_fraction", "", "", _exact_share, where="csv")
     yield Column(
         "pulses",
@@ -129,7 +117,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
     end, impulse = _feasible(lambda plan: plan.pulses.end), _feasible(lambda plan: plan.pulses.total_impulse)
     yield Column("", "end", "s", end, lambda value: f"{value:.4g}", "screen")
-    yield Column("end_s", "end", "s", end, _milli, "full page csv")
+    yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
     yield Column(
         "total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, "full page csv" + " screen" * (not fuelled)
     )
@@ -143,12 +131,14 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
         yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
         yield Column("", Shared.PROPELLANT, "g", spent, lambda value: f"{value:.4g}", "screen")
     for name in ("nutation", "momentum_shift"):
-        yield Column("", f"{_words(name)}, impulses (17)", "deg", _residual(name, "residual"), small_angle, "full")
+        yield Column(
+            "", f"{_words(name)}, impulses (17)", "deg", angle_of(f"plan.residual.{name}"), small_angle, "full"
+        )
     names = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
     shown = {"nutation": "screen full page", "axis_error": "screen full page" if aimed else "",
              "momentum_shift": "full page" if aimed else "screen full page"}  # fmt: skip
     for name in names:
-        where, angle = shown.get(name, "full"), _residual(name)
+        where, angle = shown.get(name, "full"), angle_of(f"plan.flown.{name}")
         largest = least[0] if name == "nutation" else least[1]
         if "screen" in where:
             yield Column("", _words(name), "", angle, shortly(largest), "screen")
@@ -180,10 +170,6 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield from _bounds(compared)
     yield Column("", Shared.VERDICT, "", verdict, where="screen full page", kind=TEXT, met=_met)
     yield Column("why", "", "", lambda row: infeasibility(row.plan), where="csv", kind=TEXT)
-
-
-def _csv_met(row: SchemeRow) -> bool | None:
-    return row.compared.meets(row.plan)
 
 
 def _words(name: str) -> str:

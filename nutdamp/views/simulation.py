@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from rich.console import RenderableType
@@ -35,21 +36,16 @@ class ModelEnd(NamedTuple):
     flight: Flight
 
 
-def _residual(name: str) -> Callable[[ModelEnd], str]:
-    return lambda row: degrees(getattr(row.flight.residual, name))
-
-
 def _direction(name: str, at: int) -> Callable[[ModelEnd], str]:
     return lambda row: angle_texts(row.flight.spacecraft, getattr(row.flight.final, name))[at]
 
 
 def _columns(body: Spacecraft) -> Iterator[Column]:
     yield Column("", "model", "", lambda row: row.model, where="screen", kind=TEXT)
-    names = ["nutation", "body_cone", "space_cone", "momentum_shift"]
-    for name in names:
-        yield Column("", name.replace("_", " "), "", _residual(name), where="screen")
+    for name in ("nutation", "body_cone", "space_cone", "momentum_shift"):
+        yield Column("", name.replace("_", " "), "", attrgetter(f"flight.residual.{name}"), degrees, "screen")
     if body.goal.axis is not None:
-        yield Column("", "axis error", "", _residual("axis_error"), where="screen")
+        yield Column("", "axis error", "", attrgetter("flight.residual.axis_error"), degrees, "screen")
     for heading_, name in (("spin axis", "axis"), ("H", "momentum")):
         for at, angle in enumerate(angle_names(body)):
             yield Column("", f"{heading_}: {angle}", "", _direction(name, at), where="screen")
@@ -120,7 +116,7 @@ def _range(values: tuple[float, float]) -> str:
     return f"{low.removesuffix(' deg')} to {high}"
 
 
-def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
+def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
     flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
@@ -136,7 +132,7 @@ def simulation_json(simulation: Simulation, verdict: str) -> dict[str, Any]:
         "differ": [bound.part.value for bound in end_state.deviations(impulses, flown)],
         "target": target_json(flight.spacecraft),
         **aspects_json(aspects(flight, extremes.until)),
-        "decision": decision_json(simulation.decision, verdict),
+        "decision": decision_json(simulation.decision),
         "until_s": extremes.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,

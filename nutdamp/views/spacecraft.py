@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -15,6 +16,7 @@ from nutdamp.planning.plan import NO_NUTATION
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.units import screen_unit
 from nutdamp.views.tables import WIDTH, facts
 from nutdamp.views.text import (
     RPM,
@@ -147,8 +149,9 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     moments = f"A = {quantity(inertia.A, 'kg m²', 6)}, C = {quantity(inertia.C, 'kg m²', 6)}"
     yield "inertia", f"{moments}: {inertia.shape}, a = {inertia.a:.4g}"
     if not inertia.symmetric:
-        first, second, _ = inertia.moments
-        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} kg m²; planned on the equivalent symmetric body"
+        unit, factor = screen_unit("kg m²")
+        first, second, _ = factor * np.asarray(inertia.moments)
+        yield "", f"I1 = {first:.6g}, I2 = {second:.6g} {unit}; planned on the equivalent symmetric body"
     if inertia.wheel:
         whole = f"H3 = C ω3 + h = {quantity(spacecraft.axial, 'N m s')}"
         yield "wheel", f"h = {quantity(inertia.wheel, 'N m s')} along axis 3: {whole}"

@@ -105,6 +105,8 @@ def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vec
     """Number of the first spin, and begins of it and those after it, s: to after ``last``, and three at least."""
     from nutdamp.schemes.block_model import spin_turn, sun_pulses
 
+    if body.spin == 0.0:
+        raise BadRequest("a table of spins needs a body that spins")
     turn = spin_turn(body)
     until = last + 3.0 * turn
     for _ in range(2):  # where the spin falls, turns get longer

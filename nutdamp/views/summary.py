@@ -107,7 +107,11 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
     used = schedule.propellant
     tank = body.tank
     left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
-    weighs = "" if used is None or body.mass is None else f"; mass {body.mass:.6g} kg to {body.mass - used:.6g} kg"
+    weighs = (
+        ""
+        if used is None or body.mass is None
+        else "; mass " + " to ".join(quantity(size, "kg", 6) for size in (body.mass, body.mass - used))
+    )
     yield "propellant", f"{mass(used)}{left}{weighs}"
     if velocity is not None:
         yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")

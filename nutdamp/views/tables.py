@@ -23,6 +23,7 @@ from rich.text import Text
 
 from nutdamp.common.numerics import MISSING
 from nutdamp.files.tabular import csv_text, number, truth
+from nutdamp.units import screen_unit
 
 NARROW = 60
 """Characters below which a table becomes one block a row."""
@@ -147,6 +148,17 @@ TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
 """Kinds of values: text, number, whole number, and yes or no."""
 
 
+def angle_of(path: str) -> Callable[[Any], float | None]:
+    """Value of a column: the angle of a row at a dotted ``path`` of attributes, in degrees; None where one is None."""
+
+    def value(row: Any) -> float | None:
+        for name in path.split("."):
+            row = None if row is None else getattr(row, name)
+        return None if row is None else math.degrees(row)
+
+    return value
+
+
 def always(_: Any) -> bool:
     """True: the column belongs to every table of its kind."""
     return True
@@ -157,8 +169,9 @@ class Column(NamedTuple):
 
     ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV has in columns of
     their own. ``value`` of a row in the unit of the key, or of the heading without a key; None where it is not known.
-    ``text``: the value as people read it. ``where``: the places that have the column, separated by blanks. ``when``:
-    tables that have it, by their source. ``met``: whether a requirement is met, where a verdict is coloured.
+    ``text``: the value as people read it, in the unit of screens. ``where``: the places that have the column, separated
+    by blanks. ``when``: tables that have it, by their source. ``met``: whether a requirement is met, where a verdict is
+    coloured.
     """
 
     key: str
@@ -170,6 +183,10 @@ class Column(NamedTuple):
     when: Callable[[Any], bool] = always
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
+
+    def headed(self, between: str) -> str:
+        """Heading and unit of screens."""
+        return f"{self.heading}{between}{screen_unit(self.unit)[0]}" if self.unit else self.heading
 
 
 class Heading(NamedTuple):
@@ -199,7 +216,9 @@ class DataTable:
 
     def headings(self, place: str) -> tuple[Heading, ...]:
         """Headings for people."""
-        return tuple(Heading(column.heading, column.unit, column.kind != TEXT) for column in self.at(place))
+        return tuple(
+            Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT) for column in self.at(place)
+        )
 
     def cells(self, place: str) -> tuple[tuple[str, ...], ...]:
         """Texts for people, row by row."""
@@ -209,7 +228,7 @@ class DataTable:
     def screen(self, place: str, *, between: str = "\n", first: int | None = None) -> FittedColumns:
         """A table of a screen; ``between`` heading and unit, and of many rows the ``first`` ones and the last."""
         shown = self.at(place)
-        names = [f"{column.heading}{between}{column.unit}" if column.unit else column.heading for column in shown]
+        names = [column.headed(between) for column in shown]
         text = [name for name, column in zip(names, shown, strict=True) if column.kind == TEXT]
         table = columns(*names, text=tuple(text))
         table.whole = tuple(name for name, column in zip(names, shown, strict=True) if column.met)
@@ -233,9 +252,8 @@ class DataTable:
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
-            heading = f"{column.heading}, {column.unit}" if column.unit else column.heading
             cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))
-            table.add_row(Text(heading, style="dim"), *cells)
+            table.add_row(Text(column.headed(", "), style="dim"), *cells)
         return table
 
     def array(self, place: str = "csv") -> NDArray[np.void]:
@@ -266,8 +284,8 @@ class DataTable:
 
 
 def _text(column: Column, row: Any) -> str:
-    value = column.value(row)
-    return MISSING if value is None else column.text(value)
+    value, (_, factor) = column.value(row), screen_unit(column.unit)
+    return MISSING if value is None else column.text(value if factor == 1.0 else np.multiply(factor, value))
 
 
 def _names(column: Column) -> list[str]:

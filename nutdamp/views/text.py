@@ -9,6 +9,7 @@ from nutdamp.common.numerics import MISSING as MISSING
 from nutdamp.common.numerics import RPM as RPM
 from nutdamp.common.numerics import cleaned
 from nutdamp.schemes.catalogue import NAMES
+from nutdamp.units import screen_unit
 
 LONG = (
     ("s", 1.0, 3600.0),
@@ -20,12 +21,13 @@ LONG = (
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
-    """A number with its unit, or the word for an unknown or infinite one."""
+    """A number with its unit, that of the screen for it, or the word for an unknown or infinite one."""
     if value is None or math.isnan(value):
         return MISSING
     if math.isinf(value):
         return "infinite" if value > 0 else "-infinite"
-    return f"{value:.{digits}g} {unit}"
+    unit, factor = screen_unit(unit)
+    return f"{factor * value:.{digits}g} {unit}"
 
 
 def digits(value: float, count: int) -> str:
@@ -96,8 +98,9 @@ def cost(value: float | None, unit: str) -> str:
     """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
     if value is None or value == 0.0 or not math.isfinite(value):
         return mass(value) if unit == "kg" else quantity(value, unit)
-    size, name = _in_grams(value) if unit == "kg" else (value, unit)
-    return f"{digits(size, 4)} {name}"
+    size, unit = _in_grams(value) if unit == "kg" else (value, unit)
+    unit, factor = screen_unit(unit)
+    return f"{digits(factor * size, 4)} {unit}"
 
 
 def duration(value: float | None) -> str:

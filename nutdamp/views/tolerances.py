@@ -17,6 +17,7 @@ from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
+from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
 from nutdamp.views.text import quantity
 
@@ -192,7 +193,7 @@ def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) ->
 
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
     """The unit of an input for people, and the factor to it."""
-    return SHOWN.get(entry.unit, (entry.unit, 1.0))
+    return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
 
 
 def unused_table(unused: Iterable[Unused]) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ from nutdamp.views.plan_json import heading, plan_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
 ROWS = 18
@@ -99,7 +99,7 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     bounded = any(row.least is not None for row in rows)
     yield Column("point", "point", "", attrgetter("number"), where="csv full brief", kind=WHOLE)
     yield Column("", "H within", "deg", lambda row: _allowed(row.front), where="brief")
-    yield Column("shift_allowed_deg", "", "", lambda row: math.degrees(row.front.shift), where="csv")
+    yield Column("shift_allowed_deg", "", "", angle_of("front.shift"), where="csv")
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "csv full brief")
     yield Column("", "cost", "", lambda row: row.spent(row.point.cost), where="full brief")
     yield Column("", "small-angle bound", "", lambda row: row.spent(row.least), where="full" * bounded)
@@ -108,10 +108,10 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
     yield Column("total_impulse_Nms", "", "", attrgetter("plan.pulses.total_impulse"), where="csv")
     yield Column("first_order_least", "", "", attrgetter("least"), where="csv")
     yield Column("least_unit", "", "", attrgetter("point.unit"), where="csv", kind=TEXT)
-    yield Column("nutation_deg", "", "", _residual("nutation"), where="csv")
-    shift = _residual("momentum_shift")
+    yield Column("nutation_deg", "", "", angle_of("plan.flight.residual.nutation"), where="csv")
+    shift = angle_of("plan.flight.residual.momentum_shift")
     yield Column("momentum_shift_deg", Part.SHIFT.label, "deg", shift, small_angle, "csv full brief")
-    yield Column("axis_error_deg", "", "", _residual("axis_error"), where="csv")
+    yield Column("axis_error_deg", "", "", angle_of("plan.flight.residual.axis_error"), where="csv")
     yield Column("", f"vs point {first}", "%", _saved, where="full")
     yield Column("", "vs first", "%", _saved, where="" if others else "brief")
     scheme = "csv full brief" if others else "csv"
@@ -123,10 +123,6 @@ def _columns(rows: Sequence[TradeRow]) -> Iterator[Column]:
 
 def _allowed(front: Front) -> str:
     return "any" if math.isinf(front.shift) else degrees(front.shift).removesuffix(" deg")
-
-
-def _residual(name: str) -> Callable[[TradeRow], float]:
-    return lambda row: math.degrees(getattr(row.point.plan.flight.residual, name))
 
 
 def _saved(row: TradeRow) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from operator import attrgetter
 from typing import Any
 
@@ -20,7 +20,7 @@ from nutdamp.views.decisions import coloured, size
 from nutdamp.views.plan_json import final_json, heading, target_json
 from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns
+from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, angle_of
 from nutdamp.views.text import MISSING, degrees, small_angle
 
 SHOWN = 1e-9 * math.pi / 180.0
@@ -81,14 +81,6 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
     }
 
 
-def _angle(name: str) -> Callable[[Any], float | None]:
-    def value(row: Any) -> float | None:
-        angle = getattr(row, name)
-        return None if angle is None else math.degrees(angle)
-
-    return value
-
-
 def _difference(value: float | None) -> str:
     if value is None:
         return MISSING
@@ -97,8 +89,8 @@ def _difference(value: float | None) -> str:
 
 METHODS = (
     Column("name", "method", "", attrgetter("name"), where="json screen", kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, "json screen"),
-    Column("momentum_shift_deg", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, "json screen"),
+    Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"),
+    Column("momentum_shift_deg", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "json screen"),
     Column("axis_difference_rad", "Δaxis", "rad", attrgetter("axis"), _difference, "json screen"),
     Column("momentum_difference_rad", "ΔH", "rad", attrgetter("momentum"), _difference, "json screen"),
     Column("rate_difference", "Δrates", "relative", attrgetter("rate"), _difference, "json screen"),
@@ -106,12 +98,12 @@ METHODS = (
 )
 IMPERFECTIONS = (
     Column("imperfection", "imperfection", "", attrgetter("name"), where="json screen", kind=TEXT),
-    Column("nutation_deg", Part.NUTATION.label, "deg", _angle("nutation"), small_angle, "json screen"),
-    Column("momentum_shift_deg", "", "", _angle("momentum_shift"), where="json"),
-    Column("", Part.SHIFT.label, "deg", _angle("momentum_shift"), small_angle, "screen",
+    Column("nutation_deg", Part.NUTATION.label, "deg", angle_of("nutation"), small_angle, "json screen"),
+    Column("momentum_shift_deg", "", "", angle_of("momentum_shift"), where="json"),
+    Column("", Part.SHIFT.label, "deg", angle_of("momentum_shift"), small_angle, "screen",
            lambda body: body.goal.axis is None),
-    Column("axis_error_deg", "", "", _angle("axis_error"), where="json"),
-    Column("", Part.DISTANCE.label, "deg", _angle("axis_error"), small_angle, "screen",
+    Column("axis_error_deg", "", "", angle_of("axis_error"), where="json"),
+    Column("", Part.DISTANCE.label, "deg", angle_of("axis_error"), small_angle, "screen",
            lambda body: body.goal.axis is not None),
 )  # fmt: skip
 
@@ -154,9 +146,9 @@ def _course(course: Conservation) -> str:
 
 
 def _largest(verification: Verification) -> list[str]:
-    """The imperfection that leaves the most nutation alone; empty where none leaves any."""
+    """The imperfection that leaves the most nutation alone; empty where none leaves more than ideal impulses."""
     single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
     most = max(single, key=lambda row: row.nutation, default=None)
-    if most is None or most.nutation <= SHOWN:
+    if most is None or most.nutation - verification.budget[0].nutation <= SHOWN:
         return []
     return [f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."]

@@ -89,6 +89,22 @@ def test_turns_to_a_target(scheme: str, motion: tuple[str, int]) -> None:
     assert reference.angle(momentum, plan.spacecraft.target_axis) < math.radians(0.05)
 
 
+@spread("horizon", ["60 s", "150 s", "300 s", "628 s"], quick=2)
+def test_thrusters_that_stand_still_in_space(horizon: str) -> None:
+    """Two pulses push H along one line alone: what they miss beside it must be small, not nothing."""
+    plan = planned(
+        "optimal",
+        dissipation={"time_constant": "2 hours", "nutation": "grows"},
+        thrusters=[{**thruster, "min_on_time": "20 ms"} for thruster in THRUSTERS],
+        requirement={"nutation": "0.05 deg", "momentum_shift": "0.1 deg"},
+        limits={"horizon": horizon},
+    )
+    nutation, momentum = end_of(plan)
+    assert nutation < math.radians(0.005)
+    assert reference.angle(momentum, plan.spacecraft.momentum) < math.radians(0.005)
+    assert plan.pulses.total_impulse < 1.02 * plan.spacecraft.least_impulse
+
+
 def test_a_train_needs_a_body_that_spins() -> None:
     plan = planned("rhumb-line", goal={"tilt": "4 deg", "azimuth": "50 deg"})
     assert not plan.feasible

@@ -102,6 +102,7 @@ def test_planes_have_equal_scales_and_all_axes_their_units(name: str, case: str)
             (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
             assert width / (right - left) == pytest.approx(height / (high - low), rel=1e-3)
         if axes.axison:
+            assert any(line.get_visible() for line in axes.get_xgridlines())
             shared = [one.get_xlabel() for one in axes.get_shared_x_axes().get_siblings(axes)]
             assert any(re.search(r", °|, °/s|time, s", label) for label in shared)
             rows = [text.get_text() for text in axes.get_yticklabels()]

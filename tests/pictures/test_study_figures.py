@@ -29,7 +29,7 @@ from nutdamp.figures.history import BAR
 from nutdamp.figures.loop import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
-from nutdamp.page.pictures import dispersion_pictures
+from nutdamp.page.content import dispersion_pictures
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance

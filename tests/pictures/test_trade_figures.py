@@ -18,7 +18,6 @@ from support.layout import check_layout, texts
 from support.shown import WIDE, check_star, legend_words
 
 from nutdamp.common.numerics import down
-from nutdamp.figures import certificate as primer
 from nutdamp.figures import trade
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
@@ -140,14 +139,14 @@ def test_the_envelope_of_the_primer_is_nowhere_below_zero_but_where_a_channel_is
 ) -> None:
     """It reaches as far as the plan fires, and the firings stand on it."""
     made = planning.plan(spinner(channels=cross(torque), limits=Limits(horizon=horizon)), "optimal")
-    figure = primer.certificate_figure(certificate(made))
+    figure = trade.certificate_figure(certificate(made))
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
     envelope, fired = line(axes, "least 1 − q of all channels"), line(axes, "firings of the plan")
     assert made.pulses.end < envelope[-1, 0] <= 2.0 * max(made.pulses.end, made.spacecraft.body_period)
     assert sorted(fired[:, 0]) == pytest.approx([pulse.t for pulse in made.pulses])
-    assert bool(envelope[:, 1].min() < -primer.ROUNDING) is long
+    assert bool(envelope[:, 1].min() < -trade.SHALLOW) is long
     assert ("is taken off the bound" in axes.get_title("left")) is long
     assert np.interp(fired[:, 0], *envelope.T) == pytest.approx(fired[:, 1], abs=1e-2)
 

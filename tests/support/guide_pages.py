@@ -1,11 +1,13 @@
-"""Pages of the guide that are made from the code: ``python tests/support/guide_pages.py`` writes them anew."""
+"""Pages and lists of the guide that are made from the code: ``python tests/support/guide_pages.py`` writes them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
+from nutdamp.units import KINDS, Kind
 from nutdamp.views.explain import file_topic
-from nutdamp.views.guide import FOLDER, Topic, TopicRows, units_topic
+from nutdamp.views.guide import FOLDER, Topic, TopicRows
 
 
 def markdown(title: str, summary: str, topic: Topic) -> str:
@@ -47,16 +49,24 @@ thrusters:
 A number that is unlikely in SI, such as a position of 800, is accepted with a warning that names the likely unit."""
 
 
+def _line(kind: Kind) -> str:
+    """The SI unit first, then the others and their values in it."""
+    if not kind.factors:
+        return "no unit"
+    named = ((unit, "" if factor == 1.0 else f" = {factor:.6g} {kind.si}") for unit, factor in kind.factors.items())
+    others = [f"{unit}{worth}".rstrip() for unit, worth in named if unit != kind.si]
+    return "; ".join([kind.si, *others] if kind.si else others)
+
+
 def pages() -> dict[str, str]:
     """The text of each such page."""
     file = markdown(
         "The spacecraft file", "every key of the spacecraft file; file.thrusters, file.limits.tick", file_topic()
     )
     title, summary, rest = file.split("\n\n", 2)
-    return {
-        "file": "\n\n".join([title, summary, BEGIN, rest]),
-        "units": markdown("Units", "units of the spacecraft file and of options", units_topic()),
-    }
+    rows = "".join(f"- **{kind.noun.partition(' ')[2]}**: {_line(kind)}\n" for kind in KINDS.values())
+    units = re.sub(r"(- \*\*.*\n)+", lambda _: rows, (FOLDER / "units.md").read_text(encoding="utf-8"))
+    return {"file": "\n\n".join([title, summary, BEGIN, rest]), "units": units}
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import Record
+from nutdamp.estimation.signals import Record
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 

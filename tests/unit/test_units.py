@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.golden import check_text
 
-from nutdamp.units import KINDS, LARGEST, parse, pattern, shown
+from nutdamp.units import KINDS, LARGEST, SI, US, parse, pattern, screen_unit, screen_units, shown
 
 UNITS = {
     "mass": {"250 kg": 250.0, "250 g": 0.25, "10 lbm": 4.5359237, "1 slug": 14.593902937206},
@@ -120,3 +120,32 @@ def test_what_parses_fits_the_pattern(number: float, kind_and_unit: tuple[str, s
     text = f"{number!r}{space}{unit}"
     assert parse(text, kind) == number * KINDS[kind].factors[unit]
     assert re.search(pattern(kind), text)
+
+
+SCREENS = [
+    ("kg", "lbm", 1 / 0.45359237), ("g", "lbm", 1e-3 / 0.45359237), ("kg/year", "lbm/year", 1 / 0.45359237),
+    ("N", "lbf", 1 / 4.4482216152605), ("N s", "lbf s", 1 / 4.4482216152605),
+    ("N m", "ft lbf", 1 / 1.3558179483314004), ("N m s", "ft lbf s", 1 / 1.3558179483314004),
+    ("kg m²", "slug ft²", 1 / 1.3558179483314004), ("m", "ft", 1 / 0.3048), ("mm", "in", 1 / 25.4),
+    ("m/s", "ft/s", 1 / 0.3048), ("m/s²", "ft/s²", 1 / 0.3048), ("bar", "psi", 14.503773773020923),
+]  # fmt: skip
+"""Units of SI and of US screens, and factors by NIST SP 811."""
+
+
+@pytest.mark.parametrize(("si", "us", "factor"), SCREENS)
+def test_screens_have_us_units_where_requested(si: str, us: str, factor: float) -> None:
+    assert screen_unit(si, 3.0) == (si, 3.0)
+    with screen_units(US):
+        assert screen_unit(si)[0] == us
+        assert screen_unit(si)[1] == pytest.approx(factor, rel=1e-14)
+        assert screen_unit(si, 3.0)[1] == pytest.approx(3.0 * factor, rel=1e-14)
+        assert screen_unit(us, 2.0) == (us, 2.0)
+        with screen_units(SI):
+            assert screen_unit(si) == (si, 1.0)
+    assert screen_unit(si) == (si, 1.0)
+
+
+@pytest.mark.parametrize("unit", ["", "s", "ms", "min", "rad/s", "mrad/s", "deg", "rpm", "%", "%/day", "1/day", "Hz"])
+def test_angles_rates_times_and_shares_are_the_same_in_both_systems(unit: str) -> None:
+    with screen_units(US):
+        assert screen_unit(unit, 2.0) == (unit, 2.0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile
-from nutdamp.estimation.parameters import AXIS, GYROS, Record
+from nutdamp.estimation.signals import GYROS, Record, of_quaternions
 from nutdamp.files.ccsds.checked import (
     BEFORE,
     BODY,
@@ -178,7 +178,7 @@ class _HistoryReader(Frames):
 
 
 def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> Record:
-    """Telemetry of a history for the fit of a spacecraft: the direction of its spin axis, and the rates if given.
+    """Telemetry of a history for the fit of a spacecraft: the attitude, and the rates if given.
 
     Times count from attitude.epoch of the file; raises BadRequest where it has none.
     """
@@ -187,8 +187,7 @@ def record_of(history: History, spacecraft: Spacecraft, schedule: Schedule) -> R
         raise BadRequest("the spacecraft file has no attitude.epoch to count the times of a history from")
     if history.frame is not None and given.frame not in (None, history.frame):
         raise BadRequest(f"the history is in {history.frame}, the spacecraft file in {given.frame}: expected one frame")
-    axis = spacecraft.sense * spacecraft.inertia.axes[:, 2]
-    signals = dict(zip(AXIS, attitude.rotate(history.quaternions, axis).T, strict=True))
+    signals = of_quaternions(history.quaternions, spacecraft)
     if history.rates is not None:
         signals |= dict(zip(GYROS, history.rates.T, strict=True))
     times = history.times + history.epoch.since(Epoch.parse(given.epoch))

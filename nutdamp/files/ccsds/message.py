@@ -155,13 +155,14 @@ AEM_METADATA = _text(
 )
 """Keywords of table 4-3 that are written."""
 
-QUATERNION_ANGVEL, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN/NUTATION_MOM"
+QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/NUTATION_MOM"
 """Values of ATTITUDE_TYPE."""
 
 AEM_RECORDS = {
     QUATERNION_ANGVEL: Layout(
         "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*_ANGVEL, unit="deg/s", tag="angVel"))
     ),
+    SPIN: Layout("spin", (*_text("EPOCH"), *_SPIN)),
     SPIN_NUTATION_MOM: Layout(
         "spinNutationMom",
         (*_text("EPOCH"), *_SPIN, *_numbers(*MOMENTUM[:2], unit="deg"), *_numbers(MOMENTUM[2], unit="deg/s")),

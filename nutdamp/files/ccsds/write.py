@@ -6,8 +6,8 @@ which the message calls `message.BODY_FRAME`.
 OPM (CCSDS 502.0-B-3): the velocity change of each pulse as a manoeuvre. Its state vector is the orbit of the spacecraft
 file. Without one the message is only the part with the manoeuvres, which says so: the standard demands a state.
 
-AEM: the flown motion, a new segment at each edge of a pulse; as quaternions and rates, which fit every body, or as
-spin, nutation and momentum, for those symmetric about axis 3.
+AEM: the flown motion, a new segment at each edge of a pulse; as quaternions and rates, or as spin, nutation and
+momentum. Nutation by annex F5 is the steady motion of bodies symmetric about axis 3: others have the spin alone.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from nutdamp.files.ccsds.message import (
     OPM_BLOCKS,
     OPM_METADATA,
     QUATERNION_ANGVEL,
+    SPIN,
     SPIN_NUTATION_MOM,
     Keyword,
     Message,
@@ -232,16 +233,17 @@ def aem(
     """The message for the flight of a plan from 0 to ``until`` s; ``created`` is the moment at which it is made.
 
     Nobody interpolates across the edges of pulses, where the torque jumps, because segments end there. ``kind`` is the
-    ATTITUDE_TYPE. Raises BadRequest for one that is not for this body.
+    ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
     """
     body = plan.spacecraft
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
-        raise BadRequest(
-            f"{SPIN_NUTATION_MOM} is for a body symmetric about the third axis of its file, which this one is not; "
-            "take --format aem, which has quaternions"
-        )
+        kind = SPIN
     segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
     return Message("AEM", header(plan, created), segments)
+
+
+ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no nutation."
+"""Comment on records of the spin alone."""
 
 
 def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, kind: str) -> Segment:
@@ -258,12 +260,13 @@ def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, k
             "STOP_TIME": times[-1],
             "ATTITUDE_TYPE": kind,
             **({"ANGVEL_FRAME": BODY_FRAME} if kind == QUATERNION_ANGVEL else {}),
-            "INTERPOLATION_METHOD": "HERMITE",
+            "INTERPOLATION_METHOD": "LAGRANGE" if kind == SPIN else "HERMITE",
             "INTERPOLATION_DEGREE": "3",
         },
         f"pulses completed: {stretch.completed}",
+        *[ALONE] * (kind == SPIN),
     )
-    rows = _turns(stretch) if kind == QUATERNION_ANGVEL else _spins(body, stretch)
+    rows = _turns(stretch) if kind == QUATERNION_ANGVEL else _spins(body, stretch, kind)
     records = tuple((time, *map(number, row)) for time, row in zip(times, rows, strict=True))
     return Segment(metadata, records=records, record=AEM_RECORDS[kind])
 
@@ -274,10 +277,12 @@ def _turns(stretch: AttitudeSegment) -> Iterable[tuple[float, ...]]:
         yield (*vector, scalar, *angular_velocity(rates).values())
 
 
-def _spins(body: Spacecraft, stretch: AttitudeSegment) -> Iterable[list[float]]:
-    """Spin axis, angle and its rate, momentum, and the rate about that."""
+def _spins(body: Spacecraft, stretch: AttitudeSegment, kind: str) -> Iterable[list[float]]:
+    """Spin axis, angle and rate; with nutation momentum, and the rate about that."""
     spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
-    names = [keyword.name for keyword in AEM_RECORDS[SPIN_NUTATION_MOM].keywords[1:]]
+    if kind == SPIN:
+        spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
+    names = [keyword.name for keyword in AEM_RECORDS[kind].keywords[1:]]
     rows: list[list[float]] = np.column_stack([spin[name] for name in names]).tolist()
     return rows
 

@@ -341,9 +341,9 @@ class Problem:
         if most * largest >= body.least_impulse:
             return ""
         return (
-            f"limits.max_pulses = {most} is too few: so many pulses give at most {most * largest:.4g} N m s, and "
-            f"taking out the nutation takes {body.least_impulse:.4g} N m s, "
-            f"{math.ceil(body.least_impulse / largest)} pulses or more"
+            f"limits.max_pulses = {most} is too few: so many pulses give at most "
+            f"{100.0 * most * largest / body.least_impulse:.4g} % of the impulse that takes out the nutation, "
+            f"{math.ceil(body.least_impulse / largest)} pulses or more all of it"
         )
 
     def cure(self, long_enough: Callable[[float], float | None]) -> str:

@@ -27,9 +27,10 @@ from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, Unrepairable, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal.refinement import refine
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
+from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
 CHOICES = 3
@@ -73,6 +74,9 @@ HASTE = 0.0008
 
 NEAR = 0.05
 """End error, rad, below which a flight is refined."""
+
+NEARLY = 0.05
+"""Share of the tightest bound that a schedule may leave where none leaves nothing."""
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
@@ -462,8 +466,13 @@ class _LeastCostSearch(Problem):
     def best(self, candidates: list[_FlownSchedule]) -> Schedule | None:
         """The cheapest that leaves nothing; on ticks the one that leaves least, where that is rounding.
 
-        All that leave up to `DAMPED_ANGLE` leave as little.
+        All that leave up to `DAMPED_ANGLE` leave as little. Where none leaves nothing, as channels that stand still
+        in space may not, those that leave a share `NEARLY` of the tightest bound will do.
         """
         there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
+        if not there:
+            bounds = (bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
+            nearly = NEARLY * min(bounds)
+            there = [candidate for candidate in candidates if candidate.left <= nearly]
         best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
         return None if best is None else best.schedule

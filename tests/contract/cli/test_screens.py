@@ -119,7 +119,7 @@ def test_a_row_becomes_a_block_on_a_narrow_screen_or_where_it_does_not_fit() -> 
 
 def comparison(shown: str) -> list[str]:
     """The lines of the comparison of schemes, of the paragraphs of the screen of ``plan``."""
-    return next(part.splitlines() for part in shown.split("\n\n") if "\nends at, s" in part)
+    return next(part.splitlines() for part in shown.split("\n\n") if "\nend, s" in part)
 
 
 @pytest.mark.weekly

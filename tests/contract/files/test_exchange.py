@@ -188,15 +188,10 @@ ORBITAL = {
 
 
 def test_what_cannot_be_exported_is_refused() -> None:
-    plan, tilted = messages.planned("prolate"), messages.planned("tilted tensor, backwards")
+    plan = messages.planned("prolate")
     ideal = planning.plan(replace(messages.spacecraft("prolate"), steerable=None), "two-pulse")
     assert "2026-03-01T12" in export_text(ideal, "aem")
     attitude = known(plan.spacecraft.attitude)
-    lean = math.radians(1.0)
-    turn = np.array([[1, 0, 0], [0, math.cos(lean), -math.sin(lean)], [0, math.sin(lean), math.cos(lean)]])
-    tensor = (turn @ np.diag([120.0, 120.0, 80.0]) @ turn.T).tolist()
-    leaning = read_spacecraft(messages.BODIES["prolate"].replace("{A: 120, C: 80}", f"{{tensor: {tensor}}}"), "leaning")
-    assert leaning.inertia.symmetric
     brake = channel("brake", 0.0, 0.0, -400.0)
     halted = Schedule((channel_pulse(brake, 0.4, 0.6),))  # 80 kg m² × 3 rad/s = 400 N m × 0.6 s
     orbital = {
@@ -213,8 +208,6 @@ def test_what_cannot_be_exported_is_refused() -> None:
         "an end of an APM": (plan, "apm", {"until": 3.0}),
         "a late end": (plan, "aem", {"until": 1e7}),
         "after the year 9999": (plan, "aem", {"until": 1e12}),
-        "three moments in spin and nutation": (tilted, "aem-spin", {}),
-        "an axis that leans": (replace(tilted, spacecraft=leaning, schedule=Schedule()), "aem-spin", {}),
         **{name: (other, "opm", {}) for name, other in orbital.items()},
         "very many spins": (Plan(spinner(), "none", Schedule()), "spin-table", {"until": 1e6}),
         "no spin": (Plan(spinner(degrees=0.0, channels=(brake,)), "by hand", halted), "spin-table", {"until": 1.0}),

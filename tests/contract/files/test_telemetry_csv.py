@@ -14,7 +14,7 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import CannotRead
-from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record
+from nutdamp.estimation.signals import ACCELERATION, AXIS, DIRECTION, GYROS, QUATERNION, SEEN, SUN_ASPECT, Record
 from nutdamp.files import tabular
 from nutdamp.files.telemetry import read_telemetry
 
@@ -55,6 +55,38 @@ def test_sun_pulses_by_samples_and_by_a_file_of_their_own(read: Read) -> None:
     assert_array_equal(record.signals[ACCELERATION], [0.1, 0.2])
 
 
+def test_a_crossing_is_of_the_direction_in_its_row_or_of_the_sun(read: Read) -> None:
+    sunny = DATED.with_(sun="epoch")
+    assert sunny.sun is not None
+    crossed = "crossing_azimuth_deg,crossing_elevation_deg"
+    record, _ = read(f"t_s,{crossed},crossing_ra_deg,crossing_dec_deg\n0,90,0,0,-90\n1,0,30,,\n2,,,,\n", sunny)
+    times, rows = record.samples((*SEEN, *DIRECTION))
+    assert_array_equal(times, [0.0, 1.0])
+    assert_allclose(rows[:, :3], [[0.0, 1.0, 0.0], [math.cos(math.pi / 6), 0.0, 0.5]], atol=1e-15)
+    assert_allclose(rows[:, 3:], np.array([[0.0, 0.0, -1.0], sunny.sun.tolist()]), atol=1e-15)
+    record, _ = read(f"t_s,{crossed}\n0,90,0\n", sunny)
+    assert_allclose(record.samples(DIRECTION)[1], [sunny.sun])
+
+
+def test_quaternions_give_the_axis_and_the_turn_in_place_of_an_axis(read: Read) -> None:
+    half = math.sqrt(0.5)
+    record, _ = read(f"t_s,q_w,q_x,q_y,q_z,axis_x,axis_y,axis_z\n0,{half},{half},0,0,1,0,0\n1,,,,,1,0,0\n")
+    times, turned = record.samples(QUATERNION)
+    assert_array_equal(times, [0.0])
+    assert_allclose(turned, [[half, half, 0.0, 0.0]])
+    assert_allclose(record.samples(AXIS)[1], [[0.0, -1.0, 0.0]], atol=1e-15)
+
+
+def test_sun_aspect_angles_are_those_of_their_rows_or_of_the_pulses_in_a_file(read: Read) -> None:
+    record, _ = read("t_s,sun_aspect_deg\n0,60\n2,\n")
+    assert_allclose(record.signals[SUN_ASPECT], [math.pi / 3, math.nan])
+    record, _ = read("t_s,omega_1_rad_s\n0,0.1\n1,0.2\n2,0.3\n", sun="t_s,sun_aspect_deg\n0.5,90\n1,60\n")
+    assert_array_equal(record.times, [0.0, 0.5, 1.0, 2.0])
+    assert_array_equal(record.sun_pulses, [0.5, 1.0])
+    assert_allclose(record.signals[SUN_ASPECT], [math.nan, math.pi / 2, math.pi / 3, math.nan])
+    assert_array_equal(record.signals[GYROS[0]], [0.1, math.nan, 0.2, 0.3])
+
+
 FAULTY = (
     "omega_1_rad_s\n1\n",
     "t_s\n1\n",
@@ -69,6 +101,16 @@ FAULTY = (
     "t_s,omega_1_rad_s\n0,fast\n",
     "t_s,omega_1_rad_s\n0,1,2\n",
     "t_s,sun_pulse\n0,0\n1,2\n",
+    "t_s,q_w,q_x,q_y\n0,1,0,0\n",
+    "t_s,q_w,q_x,q_y,q_z\n0,1,0,0,\n1,2,0,0,0\n",
+    "t_s,q_w,q_x,q_y,q_z\n0,2,0,0,0\n",
+    "t_s,crossing_azimuth_deg\n0,1\n",
+    "t_s,crossing_ra_deg,crossing_dec_deg\n0,1,2\n",
+    "t_s,crossing_azimuth_deg,crossing_elevation_deg\n0,400,0\n1,5,-91\n",
+    "t_s,crossing_azimuth_deg,crossing_elevation_deg\n0,5,\n1,5,1\n",
+    "t_s,crossing_azimuth_deg,crossing_elevation_deg,crossing_ra_deg,crossing_dec_deg\n0,5,1,,4\n",
+    "t_s,crossing_az_deg,sun_aspect,q_1\n0,5,1,1\n",
+    "t_s,sun_aspect_deg\n0,181\n",
     "t_s;omega_1_rad_s\n0;1\n",
     "t_s,omega_1_rad_s\n",
     "utc,omega_1_rad_s\n2026-03-01T12:00:00Z,1\n",

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
-from nutdamp.views.exchange import export_text
+from nutdamp.views.exchange import export_notes, export_text
 from nutdamp.views.spin_table import SPINS, spin_table
 
 HEADER = [column.key for column in SPINS]
@@ -144,6 +145,48 @@ def test_spin_nutation_and_momentum_are_those_of_the_motion(case: str) -> None:
         assert unit(momentum_alpha, momentum_delta) == pytest.approx(momentum / np.linalg.norm(momentum), abs=1e-10)
         turned = math.radians(about) * unit(momentum_alpha, momentum_delta) + math.radians(own) * unit(alpha, delta)
         assert turned == pytest.approx(motion.rotation @ motion.rates, abs=2e-8)
+
+
+def leaning() -> Spacecraft:
+    """A symmetric body whose axis leans by 1 deg from the third axis of its file."""
+    lean = math.radians(1.0)
+    turn = np.array([[1, 0, 0], [0, math.cos(lean), -math.sin(lean)], [0, math.sin(lean), math.cos(lean)]])
+    tensor = (turn @ np.diag([120.0, 120.0, 80.0]) @ turn.T).tolist()
+    return read_spacecraft(messages.BODIES["prolate"].replace("{A: 120, C: 80}", f"{{tensor: {tensor}}}"), "leaning")
+
+
+@spread("case", ["leaning", *(name for name in messages.BODIES if "tensor" in name)], quick=2)
+@pytest.mark.parametrize("xml", [False, True])
+def test_bodies_without_steady_nutation_have_the_spin_of_each_moment(case: str, xml: bool) -> None:
+    """The attitude by annex F5, and the rate about the third axis of the file; as keywords and values, and as XML."""
+    plan = Plan(leaning(), "none", Schedule()) if case == "leaning" else messages.planned(case)
+    body = plan.spacecraft
+    assert (case == "leaning") == body.inertia.symmetric
+    text = export_text(plan, "aem-spin", xml=xml)
+    if xml:
+        root = ElementTree.fromstring(text.split("\n", 1)[1])
+        leaves = [[leaf.text or "" for leaf in state.find("spin") or ()] for state in root.iter("attitudeState")]
+        kinds = {entry.text for entry in root.iter("ATTITUDE_TYPE")}
+    else:
+        leaves = [line.split() for line in re.findall(r"^[0-9]{4}-\S+ .*$", text, re.MULTILINE)]
+        kinds = set(re.findall(r"^ATTITUDE_TYPE += (\S+)$", text, re.MULTILINE))
+    assert kinds == {"SPIN"}
+    start, rows = Epoch.parse(known(body.attitude).epoch or ""), leaves[::6]
+    assert len(rows) > 10
+    times = [Epoch.parse(moment).since(start) for moment, *_ in rows]
+    moved = motions(body, plan.pulses, times, messages.columns(body, body.initial.quaternion) @ body.inertia.axes)
+    for (_, *numbers), motion in zip(rows, moved, strict=True):
+        alpha, delta, angle, rate = map(float, numbers)
+        columns = motion.rotation @ body.inertia.axes.T
+        assert unit(alpha, delta) == pytest.approx(columns[:, 2], abs=1e-8)
+        assert first_axis(alpha, delta, angle) == pytest.approx(columns[:, 0], abs=1e-8)
+        assert math.radians(rate) == pytest.approx(messages.in_file_axes(body, motion.rates)[2], abs=2e-8)
+
+
+def test_only_a_message_without_nutation_is_remarked_upon() -> None:
+    plans = [messages.planned("prolate"), messages.planned("tilted tensor, backwards")]
+    assert [[note.code for note in export_notes(plan, "aem-spin")] for plan in plans] == [[], ["spin-alone"]]
+    assert export_notes(plans[1], "aem") == []
 
 
 # --- a schedule spin by spin -----------------------------------------------------------------------------------------

@@ -26,6 +26,9 @@ pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
 NOTATIONS = pytest.mark.parametrize("xml", [False, True], ids=["kvn", "xml"])
 CASES = pytest.mark.parametrize("case", messages.CASES)
 
+WITHOUT_RATES = 2e-3
+"""deg; the same where a reader has directions alone to go by."""
+
 MID_ARC = 1e-5
 """deg; how far an interpolated attitude may be off: 0.01 is promised, some 1e-7 is found."""
 
@@ -144,9 +147,11 @@ def motion(flown: Flight, t: float) -> tuple[np.ndarray, np.ndarray]:
 @NOTATIONS
 @pytest.mark.parametrize("form", ["aem", "aem-spin"])
 def test_attitude_history(case: str, xml: bool, form: str) -> None:
-    """Attitude and rates that come back are those flown, whether as quaternions or as spin, nutation and momentum."""
-    if form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric:
-        return  # refused: see test_exchange
+    """Attitude and rates that come back are those flown, whether as quaternions or as spin, nutation and momentum.
+
+    The spin alone, of bodies that are not symmetric, has no transverse rates.
+    """
+    alone = form == "aem-spin" and not messages.spacecraft(case).inertia.symmetric
     flown, epoch, segments = ephemeris(case, xml, form)
     frames = orekit.java("org.orekit.frames.FramesFactory")
     frame = frames.getGCRF() if known(flown.spacecraft.attitude).frame == "GCRF" else frames.getEME2000()
@@ -164,9 +169,9 @@ def test_attitude_history(case: str, xml: bool, form: str) -> None:
         for t, step, rotation, spin in seen:
             rates, axes = motion(flown, min(max(t, 0.0), flown.legs[-1].end))
             worst_turn = max(worst_turn, messages.turned(orekit.body_axes(rotation), axes))
-            off = float(np.linalg.norm(orekit.components(spin) - rates)) - ROUNDED / step
+            off = 0.0 if alone else float(np.linalg.norm(orekit.components(spin) - rates)) - ROUNDED / step
             worst_rate = max(worst_rate, off / float(np.linalg.norm(rates)))
-    assert worst_turn <= MID_ARC
+    assert worst_turn <= (WITHOUT_RATES if alone else MID_ARC)
     assert worst_rate <= 1e-6
 
 
@@ -254,7 +259,7 @@ def test_the_second_reader(reader: Any, case: str, notation: str) -> None:
     assert [block.ixy, block.ixz, block.iyz] == pytest.approx([-tensor[0, 1], -tensor[0, 2], -tensor[1, 2]], rel=1e-15)
     durations = [manoeuvre.man_duration for manoeuvre in data.maneuver_parameters]
     assert durations == pytest.approx([pulse.on_time for pulse in plan.pulses], rel=1e-15)
-    for form in ("aem", "aem-spin") if plan.spacecraft.inertia.symmetric else ("aem",):
+    for form in ("aem", "aem-spin"):
         text, segments = export_text(plan, form), parsed("Aem", form).segments
         assert len(segments) == text.count("META_START")
         rows = len(re.findall(r"^[0-9]{4}-\S+ ", text, re.MULTILINE))

@@ -17,9 +17,10 @@ from support.synthetic import gyro_case
 from support.telemetry_kinds import KINDS, telemetry
 
 from nutdamp.estimation.fit import Fit, chi_square_tail, fit
-from nutdamp.estimation.model import Model, Vector
-from nutdamp.estimation.parameters import GYROS, moments, prior, quantisation
+from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import moments, prior
 from nutdamp.estimation.search import residuals, search, units_of
+from nutdamp.estimation.signals import GYROS, Vector, quantisation
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 

@@ -22,7 +22,7 @@ from nutdamp.estimation import forecast
 from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.planning import decision
-from nutdamp.views.fit import advice, estimate_table, fit_screen
+from nutdamp.views.fit import advice, estimate_table, fit_screen, prospect_table
 
 SPIN, LENGTH = math.pi, 30.0
 
@@ -138,3 +138,19 @@ def test_what_pays_is_said_once_it_does() -> None:
         probes = () if probe is None else (Prospect(30.0, 1e-4, math.radians(probe), met, "T1", 0.5, 0.01, 0.004),)
         clauses += [*advice(Outlook("optimal", tuple(coasts), probes, 0.997, 0.1)), "-"]
     check_text("estimation.advice", "\n".join(clauses))
+
+
+def test_a_probe_pulse_that_gains_more_per_propellant_is_named_beside_the_one_that_leaves_least() -> None:
+    """Of 0.4 deg 4 g leave 0.1 deg, 75 deg/kg, and 1 g 0.3 deg, 100 deg/kg; 0.1 g, 0.39 deg, too much to pay."""
+    left = {"T1": (0.1, 0.004), "T2": (0.3, 0.001), "T3": (0.39, 0.0001), "T4": (0.2, None)}
+    probes = [Prospect(30.0, 1e-4, math.radians(one), 0.5, name, 0.5, 0.01, kg) for name, (one, kg) in left.items()]
+    coasts = [Prospect(length, 1e-4, math.radians(0.4), 0.5) for length in (7.5, 15.0, 30.0, 60.0, 120.0)]
+    ahead = Outlook("optimal", tuple(coasts), tuple(probes), 0.997, 0.1)
+    assert ahead.probe is probes[0]
+    assert ahead.thrifty is probes[1]
+    gains = [ahead.gain(probe) for probe in probes]
+    assert [gain and math.degrees(gain) for gain in gains] == [*map(pytest.approx, (75.0, 100.0, 100.0)), None]
+    check_text("estimation.advice-propellant", "\n".join(advice(ahead)))
+    table = shown(prospect_table(ahead).screen("screen"))
+    assert "0.075" in table
+    assert "gain" in table

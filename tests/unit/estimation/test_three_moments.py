@@ -19,8 +19,8 @@ import nutdamp
 from nutdamp.common import work
 from nutdamp.estimation.fit import Fit, fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.estimation.results import doubts
+from nutdamp.estimation.signals import GYROS, Record
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -141,6 +141,21 @@ def test_thrust_of_random_bodies_of_three_moments(seed: int) -> None:
         thrust, delay, of_thrust, of_delay = calibrated(fitted, channel)
         assert abs(thrust - factor) < 4.0 * of_thrust
         assert abs(delay - late) < 4.0 * of_delay
+
+
+@pytest.mark.deep
+def test_dissipation_that_does_not_show_is_not_taken_as_known() -> None:
+    """Four sigma of growth would put the rates at the start off by as much, if they were estimated without it."""
+    body, times, growth = nutdamp.load(FILE | {"omega0": [0.1, 0.05, 0.9]}), np.linspace(0.0, 80.0, 200), -1e-4
+    truth = {"omega_1": 0.1, "omega_2": 0.05, "unequal_1": 3.0 / 118.0, "unequal_2": 0.0, "growth": growth}
+    clean, squares = motion((121.0, 115.0, 170.0), body.omega0, times, growth), dict.fromkeys(truth, 0.0)
+    for seed in range(6):
+        shown = clean + math.radians(0.05) * np.random.default_rng([7, seed]).normal(size=clean.shape)
+        fitted = fit(body, Record(times, {name: shown[:, at] for at, name in enumerate(GYROS)}))
+        for name, value in truth.items():
+            squares[name] += ((fitted.named[name] - value) / fitted.sigmas[fitted.index(name) or 0]) ** 2
+    # Of six, each sum of squares is below 22.5 in 999 of 1000 cases.
+    assert not {name: total for name, total in squares.items() if total > 22.5}
 
 
 @pytest.mark.weekly

@@ -13,8 +13,8 @@ from support.builders import cross, spinner
 from support.cases import deep
 
 import nutdamp
-from nutdamp.figures.braille import FAINT, BraillePanel, framed, ticks
-from nutdamp.figures.terminal import motion_drawing
+from nutdamp.figures.geometry import ticks
+from nutdamp.figures.terminal import FAINT, BraillePanel, framed, motion_drawing
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track

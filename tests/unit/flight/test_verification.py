@@ -246,6 +246,28 @@ def test_the_command_takes_a_schedule_file(run: Run) -> None:
     assert run("verify", "--schedule", "missing.csv").returncode == 1
 
 
+PAIR = """
+name: Pair
+mass: 142 kg
+inertia: {A: 142 kg m^2, C: 252 kg m^2}
+state: {spin: 12 rpm, nutation: 1 deg}
+thrusters:
+  - {name: A1, position: [ 0.27, 0, -0.64], direction: [0, 0, 1], force: 11.18 N, isp: 180.3 s}
+  - {name: A2, position: [-0.27, 0, -0.64], direction: [0, 0, 1], force: 11.18 N, isp: 180.3 s}
+channels: {DV: [A1, A2]}
+tank: {propellant: 2 kg, pressure: 20 bar, final_pressure: 10 bar, inertia_per_kg: {A: 2 m^2, C: 4 m^2}}
+"""
+
+
+def test_thrusters_whose_torques_cancel_use_propellant_and_leave_no_imperfection(run: Run, tmp_path: Path) -> None:
+    """Moments fall with it; what remains is the nutation at t = 0, which is no fault of the pulse."""
+    (tmp_path / "pair.yaml").write_text(PAIR, encoding="utf-8")
+    (tmp_path / "burn.csv").write_text("start_s,on_time_s,channel\n0,43.5,DV\n", encoding="utf-8")
+    assert json.loads(run("verify", "pair.yaml", "--schedule", "burn.csv", "--json", "-").stdout)["agree"] is True
+    rigid = ("verify", "pair.yaml", "--schedule", "burn.csv", "--set", "tank.inertia_per_kg={A: 0, C: 0}")
+    assert "imperfection" not in run(*rigid).stdout
+
+
 @pytest.mark.deep
 def test_with_a_target_the_budget_is_of_the_distance_from_it(run: Run) -> None:
     screen = run("verify", "--scheme", "half-cone", "--target", "10deg,45deg", "--quiet", "-v").stdout

@@ -30,6 +30,7 @@ from nutdamp.page.document import Circle, Moving, NamedDirection, PageSection
 from nutdamp.page.html import page_html
 from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, moving_of
 from nutdamp.page.scales import EDGES, LEAD, strip_of
+from nutdamp.page.workbench import absence
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Requirement
@@ -274,3 +275,59 @@ def test_playing_takes_seconds_to_minutes(until: float) -> None:
 @pytest.mark.parametrize("name", ["view.js", "bench.js", "motion.js"])
 def test_the_scripts_are_small(name: str) -> None:
     assert (Path(moving.__file__).parent / name).stat().st_size <= 25_000
+
+
+# --- workbench: what its script computes is tested in a browser -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        ("dissipation: {time_constant: 600 s}", "energy dissipation"),
+        ("disturbances: [{torque: [20 mN m, 0, 0]}]", "disturbance torques"),
+        deep("tank: {propellant: 30 kg, pressure: 22 bar, final_pressure: 8 bar}", "blowdown"),
+        deep("cold: {first: 90 %, pulses: 4}", "cold pulses"),
+        deep("valve: {open_delay: 8 ms, close_delay: 12 ms, rise_time: 5 ms, fall_time: 10 ms}", "valves"),
+    ],
+)
+def test_other_bodies_have_none_and_the_view_has_the_reason(more: str, reason: str) -> None:
+    made, data, _ = view(f"{TEXTS['example']}\n{more}\n")
+    assert (made.workbench, made.absent) == (None, reason)
+    assert data["bench"] is None
+
+
+def test_three_moments_and_schedules_without_pulses_have_none() -> None:
+    plan = chosen(TEXTS["example"])
+    assert absence(plan.spacecraft, plan.pulses) == ""
+    assert absence(plan.spacecraft, Schedule()) == "no pulses"
+    inertia = replace(plan.spacecraft.inertia, moments=(120.0, 100.0, 60.0))
+    assert absence(replace(plan.spacecraft, inertia=inertia), plan.pulses) == "I1 ≠ I2"
+
+
+def test_its_data_are_the_plan_and_the_limits_of_the_file() -> None:
+    text = (
+        TEXTS["example"] + "limits: {horizon: 60 s, earliest: 1 s, gap: 0.2 s, tick: 1 ms, blackout: [[30 s, 31 s]]}\n"
+    )
+    made, data, _ = view(text)
+    bench, pulses = data["bench"], chosen(text).pulses.pulses
+    assert [(entry["t"], entry["on"], entry["channel"]) for entry in bench["pulses"]] == [
+        (pulse.t, pulse.on_time, pulse.channel) for pulse in pulses
+    ]
+    assert [entry["impulse"] for entry in bench["pulses"]] == [pulse.impulse.tolist() for pulse in pulses]
+    assert {(entry["least"], entry["most"]) for entry in bench["pulses"]} == {(0.02, 2.0)}
+    limits = {"earliest": 1.0, "horizon": 60.0, "gap": 0.2, "tick": 1e-3, "blackout": [[30.0, 31.0]], "most": None}
+    assert bench["limits"] == limits
+    assert made.workbench is not None
+    assert [(key, limit) for key, _, limit in made.workbench.rows] == [
+        ("nutation", "≤ 0.5°"),
+        ("momentum_shift", "≤ 0.2°"),
+    ]
+
+
+def test_with_a_target_the_axis_error_is_bounded_and_ideal_impulses_have_no_on_time() -> None:
+    made, data, _ = view(TEXTS["target"])
+    assert made.workbench is not None
+    rows = [(key, limit) for key, _, limit in made.workbench.rows]
+    assert rows == [("nutation", ""), ("momentum_shift", ""), ("axis_error", "≤ 4°")]
+    pulses = data["bench"]["pulses"]
+    assert {(entry["on"], entry["torque"], entry["most"]) for entry in pulses} == {(0.0, None, None)}

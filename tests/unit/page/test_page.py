@@ -25,8 +25,7 @@ from nutdamp.api import trade
 from nutdamp.figures import style
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.montecarlo.study import Results, run, study_of
-from nutdamp.page.background import CONDITIONS, assumptions
-from nutdamp.page.content import Repeat, report_page
+from nutdamp.page.content import CONDITIONS, Repeat, assumptions, report_page
 from nutdamp.page.document import Prose, Sheet, blocks_of, number_in
 from nutdamp.page.html import block_html, page_html
 from nutdamp.planning.decision import Comparison, compare
@@ -179,7 +178,7 @@ def test_cells_are_numbers_and_options_and_relations_stay_in_one_line() -> None:
 @pytest.mark.parametrize(("samples", "recommended"), [(0, "four-pulse"), (None, "two-pulse")])
 def test_comparison_and_schedule_say_what_the_json_says(samples: int | None, recommended: str) -> None:
     both = compared_text(example_text(), CLASSIC, samples)
-    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both, None)
+    shown, data = tree(page(example_text(), samples=samples)), comparison_json(both)
     (heads, *rows), *_ = (cells(table) for table in section(shown, "schemes").all("table"))
     names = [head.text for head in heads]
     assert [row[0].text for row in rows] == [plan["scheme"] for plan in data["plans"]]
@@ -283,7 +282,7 @@ def test_dispersions_enter_the_verdict(sigma: str, good: bool) -> None:
     assert (made.verdict, made.state) == (said, "met" if good else "missed")
     assert made.headline[0] == ("FLY " if good else "NOT ENOUGH: ")
     (margin,) = made.margins
-    assert (margin.met, margin.texts[-1], margin.bar[1] <= 100.0) == (good, "met" if good else "NOT met", good)
+    assert (margin.met, margin.verdict.plain, margin.used[1] <= 1.0) == (good, "met" if good else "NOT met", good)
     part = section(tree(made), "dispersion")
     heads, values, *_ = ([cell.text for cell in row] for row in cells(part.all("table")[0]))
     first = dict(zip(heads, values, strict=True))

@@ -66,6 +66,7 @@ def test_values_are_shown_by_the_unit_in_their_names(name: str, value: float, sh
         name: value,
     }
     assert shown in text(Note("cone-broken", tuple(values.items())))
+    assert "0.0598 rad/s" in text(note("spin-change", scheme="x", spin_change_rad_s=0.0598))
 
 
 def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from types import SimpleNamespace as Row
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from support.places import CONFIGS
 
 import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
+from nutdamp.units import US, screen_units
 from nutdamp.views.pulses import block_table, pulse_table
-from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable
+from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable, angle_of
+from nutdamp.views.text import vector
 
 TABLE = DataTable(
     "Things",
@@ -93,3 +96,26 @@ def test_files_of_pulses_and_blocks_have_the_names_that_are_read_again(name: str
     dated, valves = plan.spacecraft.utc(0.0) is not None, plan.pulses.through_valves
     assert names == (*PULSES_HEADER, *(EFFECTIVE * valves), *(("utc",) * dated))
     assert tuple(next(csv.reader(io.StringIO(block_table(plan.flight).csv())))) == BLOCKS_HEADER
+
+
+def test_an_angle_of_a_row_is_in_degrees_and_unknown_where_a_step_to_it_is() -> None:
+    end = angle_of("flight.end")
+    assert end(Row(flight=Row(end=math.pi))) == 180.0
+    assert (end(Row(flight=None)), end(Row(flight=Row(end=None)))) == (None, None)
+
+
+def test_a_screen_has_the_units_requested_and_files_are_si() -> None:
+    """One pound of mass, foot pounds of a vector; a value that is not known stays so."""
+    columns = (
+        Column("mass_kg", "mass", "kg", lambda row: row[0], lambda size: f"{size:.4f}", "screen csv json"),
+        Column("torque#_Nm", "torque", "N m", lambda row: row[1], vector, "screen csv json", kind=TEXT),
+    )
+    table = DataTable(
+        "Units", columns, [(0.45359237, np.array([1.3558179483314004, 0.0, -2.7116358966628])), (None, None)]
+    )
+    files = table.csv(), table.json()
+    assert screen(table) == [["mass", "torque"], ["kg", "N", "m"], ["0.4536", "(1.356,", "0,", "-2.712)"], ["–", "–"]]
+    with screen_units(US):
+        assert screen(table)[1:3] == [["lbm", "ft", "lbf"], ["1.0000", "(1,", "0,", "-2)"]]
+        assert [heading.unit for heading in table.headings("screen")] == ["lbm", "ft lbf"]
+        assert (table.csv(), table.json()) == files
