@@ -20,7 +20,7 @@ from nutdamp.planning.recommendation import Gain, Ground, Obstacle, Standing
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
 if TYPE_CHECKING:
@@ -153,11 +153,41 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
     if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
-    change = decision.final.spin - body.spin
-    if body.goal.spin is None and abs(change) > requirements.SPIN_TOLERANCE * abs(body.spin):
-        yield note("spin-change", scheme=plan.scheme, spin_change_rad_s=change)
+    yield from _spin_change(decision)
     if body.loop is not None:
         yield note("loop-not-judged")
+
+
+SPIN_DIGITS = 5
+"""Digits of a spin rate in rpm, of which one has to change."""
+
+
+def _spin_change(decision: Decision) -> Iterator[Note]:
+    """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then what else acts."""
+    plan, body = decision.plan, decision.plan.spacecraft
+    before, after = RPM * body.spin, RPM * decision.final.spin
+    resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) + 1 - SPIN_DIGITS)
+    if body.goal.spin is not None or abs(after - before) <= resolution:
+        return
+    pulses, causes, explained = decision.flight.schedule, list[str](), 0.0
+    for name in dict.fromkeys(pulse.channel for pulse in pulses):
+        own = [pulse for pulse in pulses if pulse.channel == name]
+        impulse, spent = (
+            math.fsum(float(pulse.impulse[2]) for pulse in own),
+            math.fsum(pulse.propellant or 0.0 for pulse in own),
+        )
+        explained += RPM * impulse / body.inertia.C
+        if impulse:
+            causes.append(f"{name} {impulse:.3g} N m s" + f" with {1e3 * spent:.3g} g" * (spent > 0.0))
+    if abs(after - before - explained) > resolution:
+        others = {
+            "dissipation": body.growth != 0.0,
+            "disturbances": bool(body.disturbances),
+            LIGHTER: LIGHTER in body.thrust_laws,
+            "I1 ≠ I2": not body.inertia.symmetric,
+        }
+        causes += [cause for cause, acts in others.items() if acts]
+    yield note("spin-change", scheme=plan.scheme, before_rpm=before, after_rpm=after, cause=", ".join(causes))
 
 
 def ideal_code(plan: Plan) -> str:

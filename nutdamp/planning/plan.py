@@ -24,15 +24,12 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.flight.propellant import Supply
 from nutdamp.physics import attitude, precession
 from nutdamp.planning.recommendation import Hindrance, Standing
 from nutdamp.schemes import catalogue, planner, valve_commands
-from nutdamp.schemes.block_model import fired, sun_pulses
-from nutdamp.schemes.correction import FlownBuilder
+from nutdamp.schemes.block_legs import Legs
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, breaches
-from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
@@ -153,9 +150,9 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
 
     Each leg has the share of the horizon that it has of the way.
     """
-    builder, goal, blocks, supply = FlownBuilder(spacecraft), spacecraft.goal, list[Block](), Supply(spacecraft)
+    legs, goal = Legs(spacecraft), spacecraft.goal
     for number, point in enumerate(route, start=1):
-        here = builder.here
+        here = legs.here
         to_go = _length((here.momentum, point, *route[number:]))
         share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
         spin = goal.spin if number == len(route) else None
@@ -164,20 +161,9 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
             goal=replace(goal, axis=point, spin=spin),
             limits=replace(here.limits, horizon=share * here.horizon),
         )
-        schedule = planner.schedule(scheme, supply.behind(leg), options)
-        passed = _sun_pulses(spacecraft, builder) if schedule.blocks else 0
-        blocks += [replace(block, first=block.first + passed) for block in schedule.blocks]
-        builder.fire(schedule)
-        supply.count(schedule)
+        legs.fire(planner.schedule(scheme, leg, options))
     names = ", ".join(keep.name for keep in spacecraft.keep)
-    aside = note("goes-round", points=len(route) - 1, directions=names)
-    return replace(fired(spacecraft, blocks), notes=(aside,)) if blocks else builder.schedule(aside)
-
-
-def _sun_pulses(spacecraft: Spacecraft, builder: FlownBuilder) -> int:
-    """Number of Sun pulses before the end of the pulses of a ``builder``, from where its next leg counts."""
-    flown = propagation.flown(spacecraft, builder.schedule(), builder.now)
-    return len(sun_pulses(flown, builder.now)) if builder.now > 0.0 else 0
+    return legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
 
 
 NO_NUTATION = 1e-12
@@ -446,7 +432,7 @@ def _routed(astray: Plan, options: catalogue.SchemeOptions) -> Plan:
 def reaches_spin(spacecraft: Spacecraft) -> bool:
     """True if the spin is that of the goal from the beginning."""
     goal = spacecraft.goal.spin
-    return goal is None or abs(spacecraft.spin - goal) <= requirements.SPIN_TOLERANCE * abs(goal)
+    return goal is None or requirements.spins_at(spacecraft, goal)
 
 
 def spinning(spacecraft: Spacecraft) -> tuple[str, ...]:

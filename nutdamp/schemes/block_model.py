@@ -69,7 +69,7 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     Raises Infeasible where the sensor never sees the Sun.
     """
     body = flown.spacecraft
-    sensor, turn = body.sun_sensor, spin_turn(body)
+    sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
     assert body.sun is not None
     times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)

@@ -345,7 +345,7 @@ class BlockSearch:
         every = next(filter(self._spaced, self.commands.every), None)
         if self.body.goal.axis is None or every is None:
             return sequences
-        for channel in self.channels:
+        for channel in (channel for channel in self.channels if channel.transverse):
             for width in evenly(commandable_widths(self.commands, channel), 3).tolist():
                 step = float(self.model.turned_by(channel, width, start.spin))
                 delay = self.commanded(self.model.delay(channel, heading, width))

@@ -14,10 +14,12 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
 from nutdamp.schemes.block_flights import FLOWN, FlownSequence
+from nutdamp.schemes.block_legs import spin_and_turn
 from nutdamp.schemes.block_model import BlockModel, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions
-from nutdamp.schemes.sequential import at_hand
+from nutdamp.schemes.sequential import NO_AXIAL, at_hand
+from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
@@ -111,24 +113,56 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     if commands is None or spacecraft.sun_sensor is None or spacecraft.sun is None:
         raise Infeasible("the file describes no commands: command blocks need the keys sun, sun_sensor and commands")
     tick, spacecraft = spacecraft.limits.tick, replace(spacecraft, limits=replace(spacecraft.limits, tick=None))
-    spun = spacecraft.goal.spin is not None
-    if spun and spacecraft.goal.axis is not None:
-        raise Infeasible("sets the spin or turns H, not both; optimal does")
-    able = at_hand(spacecraft, usable(spacecraft, axial=spun))
+    goal, most = spacecraft.goal.spin, options.max_blocks
+    most_of = {bound.part: bound.most for bound in requirements.bounds(spacecraft)}
+    alone = goal is None or (spacecraft.goal.axis is None and spacecraft.nutation <= most_of[Part.NUTATION])
+    if goal is not None:
+        expect_spin(spacecraft, goal, alone=alone)
+    if alone:
+        chosen = _searched(spacecraft, most)
+    else:
+        chosen = spin_and_turn(spacecraft, lambda leg, few: _searched(leg, few).schedule, most)
+        missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
+        notes = (note("blocks-in-legs"), *missed * (chosen.rank[1] > 1.0))
+        chosen = chosen._replace(schedule=replace(chosen.schedule, notes=notes))
+    return replace(chosen.schedule, notes=(*chosen.schedule.notes, *off_ticks(tick, commands)))
+
+
+def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
+    """Raise Infeasible where no blocks bring the spin to ``spin`` rad/s; ``alone``: they may turn H more than that."""
+    change = spin - spacecraft.spin
+    if spin * spacecraft.spin <= 0.0:
+        raise Infeasible("cannot reverse the spin: where the body does not turn there is no Sun pulse")
+    if requirements.spins_at(spacecraft, spin):
+        return
+    if not any(channel.axial for channel in spacecraft.channels):
+        raise Infeasible(NO_AXIAL)
+    able = [channel for channel in spacecraft.channels if channel.axial * change > 0.0]
+    if not any(alone or not channel.damps for channel in able):
+        across = "" if alone else ", and less across it"
+        raise Infeasible(f"no channel has a torque about axis 3 in the sense of the change of spin{across}")
+
+
+def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
+    """The best of the sequences of up to ``most`` blocks that were looked at together, with notes on its schedule."""
+    commands = spacecraft.commands
+    assert commands is not None
+    able = at_hand(spacecraft, usable(spacecraft, axial=spacecraft.goal.spin is not None))
     channels = [channel for channel in able if commandable_widths(commands, channel).size]
     if not channels:
         raise Infeasible("no width that can be commanded (commands.width) is one that a channel allows")
     search = BlockSearch(spacecraft, channels, commands)
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
-    best = search.best(options.max_blocks or BLOCKS)
+    best = search.best(most or BLOCKS)
     for round_ in range(ROUNDS + 1):
         if round_ > 0 and search.flights.complies:
             break
         for number, sequence in enumerate(search.flights.fired(best if round_ == 0 else search.nearer())):
             pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
             enough = search.flights.complies and number >= FLOWN * (round_ == 0)
-            if pulses > FLOWN_PULSES * (1 + round_) or work.exhausted() or enough:
+            spent = pulses > FLOWN_PULSES * (1 + round_) or (work.exhausted() and pulses > 0)
+            if spent or enough:
                 break
             try:
                 search.flights.flown(sequence)
@@ -139,10 +173,10 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
         raise Infeasible(why)
     chosen = _cheapest(search.flights.all)
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
-    notes = [scope_note(search, chosen, first=first), *off_ticks(tick, commands)]
+    notes = [scope_note(search, chosen, first=first)]
     if chosen.rank[1] > 1.0:
-        notes[1:1] = cures(search, chosen, options.max_blocks or BLOCKS)
-    return replace(chosen.schedule, notes=tuple(notes))
+        notes += cures(search, chosen, most or BLOCKS)
+    return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
 
 
 def _cheapest(flights: Sequence[FlownSequence]) -> FlownSequence:

@@ -286,6 +286,10 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     return listed(names)
 
 
+NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leave --spin out"
+"""Reason why a final spin cannot be had."""
+
+
 def at_hand(spacecraft: Spacecraft, channels: list[Channel]) -> list[Channel]:
     """Damping ``channels``; raises Infeasible where there are none."""
     if not channels:

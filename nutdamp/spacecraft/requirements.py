@@ -96,6 +96,11 @@ def required(spacecraft: Spacecraft) -> tuple[Bound, ...]:
     return tuple(bounds)
 
 
+def spins_at(spacecraft: Spacecraft, spin: float) -> bool:
+    """True where the body spins at ``spin`` rad/s, within the tolerance of a goal."""
+    return abs(spacecraft.spin - spin) <= SPIN_TOLERANCE * abs(spin)
+
+
 def judged(spacecraft: Spacecraft) -> bool:
     """True if cases comply or not: something is required at the end, or cones are to be kept."""
     return bool(spacecraft.keep or required(spacecraft))

@@ -22,7 +22,7 @@ from nutdamp.schemes.optimal import bounds, refinement
 from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.refinement import EndEquations
-from nutdamp.schemes.sequential import at_hand
+from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.spacecraft.constraints import Windows, rounded_off, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
@@ -192,7 +192,7 @@ class Problem:
         requested = spacecraft.goal.spin is not None
         self.channels = tuple(at_hand(spacecraft, usable(spacecraft, axial=requested)))
         if requested and not any(channel.axial for channel in self.channels):
-            raise Infeasible("no channel has a torque about axis 3, so none can set the spin; leave --spin out")
+            raise Infeasible(NO_AXIAL)
         self.equations = EndEquations(shift=not options.free_axis, spin=requested)
         flows = [channel.mass_flow for channel in self.channels]
         known = [flow for flow in flows if flow is not None]

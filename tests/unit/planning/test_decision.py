@@ -143,7 +143,7 @@ def test_the_recommended_plan_is_decided_by_its_own_cases_once_all_have_flown() 
 
 
 def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> None:
-    """Beyond 0.1° and 0.1 %; not where the momentum shift is limited, or a target or a spin is asked for."""
+    """Beyond 0.1° and a digit of the spin shown; not where the shift is limited, or target or spin are asked for."""
     free = nutdamp.example().replace(requirement=Requirement(nutation=math.radians(0.5)))
     turning, steady = (Decision(plan(free, scheme)) for scheme in ("one-pulse", "two-pulse"))
     assert turning.flight.residual.momentum_shift > math.radians(0.1) > steady.flight.residual.momentum_shift
@@ -154,7 +154,7 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
     shift = one_of(decision_notes(turning), "momentum-shift")["momentum_shift_deg"]
     assert shift == math.degrees(turning.flight.residual.momentum_shift)
     up = nutdamp.load(case("genesis-spinup.yaml"))
-    for share, change in ((0.9e-3, False), (1.1e-3, True), (-1.1e-3, True)):
+    for share, change in ((5e-5, False), (8e-5, True), (-8e-5, True)):
         fired = Pulse(1.0, 0.0, "T", np.array([0.0, 0.0, share * up.spin * up.inertia.C]))
         for asked in (False, True):
             aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
@@ -163,7 +163,9 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
             assert ("spin-change" in codes(decision_notes(made))) == (change and not asked)
             if change and not asked:
                 values = one_of(decision_notes(made), "spin-change")
-                assert values["spin_change_rad_s"] == pytest.approx(share * up.spin)
+                assert values["before_rpm"] == pytest.approx(1.6)
+                assert values["after_rpm"] == pytest.approx(1.6 * (1.0 + share))
+                assert values["cause"] == f"T {share * up.spin * up.inertia.C:.3g} N m s"
 
 
 STAGE = nutdamp.example("upper-stage")
