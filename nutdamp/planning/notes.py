@@ -171,14 +171,10 @@ def _spin_change(decision: Decision) -> Iterator[Note]:
         return
     pulses, causes, explained = decision.flight.schedule, list[str](), 0.0
     for name in dict.fromkeys(pulse.channel for pulse in pulses):
-        own = [pulse for pulse in pulses if pulse.channel == name]
-        impulse, spent = (
-            math.fsum(float(pulse.impulse[2]) for pulse in own),
-            math.fsum(pulse.propellant or 0.0 for pulse in own),
-        )
+        impulse = math.fsum(float(pulse.impulse[2]) for pulse in pulses if pulse.channel == name)
         explained += RPM * impulse / body.inertia.C
         if impulse:
-            causes.append(f"{name} {impulse:.3g} N m s" + f" with {1e3 * spent:.3g} g" * (spent > 0.0))
+            causes.append(f"{name} {RPM * impulse / body.inertia.C:+.3g} rpm")
     if abs(after - before - explained) > resolution:
         others = {
             "dissipation": body.growth != 0.0,

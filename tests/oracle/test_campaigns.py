@@ -148,7 +148,7 @@ def test_the_spin_of_ace_rises_as_reported(date: str) -> None:
     assert rise == pytest.approx(one.after - one.before, rel=0.2, abs=1e-4)
     given = math.fsum(pulse.impulse[2] for pulse in schedule)
     assert given == pytest.approx(body.inertia.C * rise * math.pi / 30.0, rel=1e-3)
-    assert str(cause).startswith(f"P1 {given:.3g} N m s with")
+    assert str(cause).startswith(f"P1 {30.0 / math.pi * given / body.inertia.C:+.3g} rpm")
 
 
 @pytest.mark.weekly
