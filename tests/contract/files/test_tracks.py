@@ -165,7 +165,9 @@ def test_bodies_without_steady_nutation_have_the_spin_of_each_moment(case: str, 
     text = export_text(plan, "aem-spin", xml=xml)
     if xml:
         root = ElementTree.fromstring(text.split("\n", 1)[1])
-        leaves = [[leaf.text or "" for leaf in state.find("spin") or ()] for state in root.iter("attitudeState")]
+        leaves = [
+            [leaf.text or "" for leaf in spin] for state in root.iter("attitudeState") for spin in state.iter("spin")
+        ]
         kinds = {entry.text for entry in root.iter("ATTITUDE_TYPE")}
     else:
         leaves = [line.split() for line in re.findall(r"^[0-9]{4}-\S+ .*$", text, re.MULTILINE)]
