@@ -224,7 +224,8 @@ def _rate(fitted: Fit, signal: int) -> float:
     if KIND[fitted.model.signals[signal]].nutation != SPACE:
         return rate
     named = fitted.named
-    axial = named[RATIO] * named.get("omega_3", fitted.model.spacecraft.spin)
+    spin = named.get("omega_3", fitted.model.spacecraft.spin)
+    axial = initial_guess.axial_rate(fitted.model, named[RATIO], spin)
     return math.hypot(axial, named["omega_1"], named["omega_2"])
 
 

@@ -105,7 +105,7 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
             values = _linear(model, linear | turned | {RATIO: ratio})
             yield values
             if _seldom(model) and model.record.shows_spin:
-                axial = _axial_rate(model, ratio, spin)
+                axial = axial_rate(model, ratio, spin)
                 size = math.hypot(values["omega_1"], values["omega_2"])
                 less = math.copysign(math.hypot(axial, size), axial) - axial
                 yield _linear(model, values | {"omega_3": spin - less})
@@ -445,11 +445,11 @@ def too_slow(model: Model, values: Vector) -> bool:
 def nutation_rate(model: Model, values: Vector) -> float:
     """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
     spin = _spin_of(model, values)
-    axial = _axial_rate(model, float(values[_range(model)[0]]), spin)
+    axial = axial_rate(model, float(values[_range(model)[0]]), spin)
     return spin - axial if _transverse(model) else axial
 
 
-def _axial_rate(model: Model, ratio: float, spin: float) -> float:
+def axial_rate(model: Model, ratio: float, spin: float) -> float:
     """H3/A in rad/s at a ``ratio`` C/A and a ``spin``."""
     inertia = model.spacecraft.inertia
     return ratio * (spin + inertia.wheel / inertia.C)

@@ -380,7 +380,7 @@ def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
             growth = f" and grows e-fold in {rigid_body.growth(moments, spin).growth_time:.2g} s"
     else:
         return None
-    cure = "spin about the axis of the smallest or largest moment"
+    cure = "spin about the axis of the smallest or largest moment, or hold it by a wheel"
     problem = f"the spin axis has {problem}: free spin about it is unstable{growth}; {cure}"
     return Finding(("inertia", "tensor"), problem)
 

@@ -59,7 +59,7 @@ def spin_turn(spacecraft: Spacecraft) -> float:
     """
     inertia = spacecraft.inertia
     size = float(np.linalg.norm(spacecraft.momentum))
-    turning = inertia.a * spacecraft.spin - inertia.wheel / inertia.A
+    turning = spacecraft.spin - spacecraft.axial / inertia.A
     return 2.0 * math.pi / abs(math.copysign(size / inertia.A, spacecraft.axial) + turning)
 
 

@@ -81,10 +81,14 @@ class ImpulseBuilder:
         most = self.spacecraft.limits.max_pulses
         return MOST_PULSES if most is None else min(most, MOST_PULSES)
 
+    def rate(self, spin: float) -> float:
+        """Rate ν in rad/s at which ω turns in the body at a ``spin``."""
+        return self.a * spin - self.wheel / self.A
+
     @property
     def turning(self) -> float:
-        """Rate ν in rad/s at which ω turns in the body at the present spin."""
-        return self.a * self.spin - self.wheel / self.A
+        """`rate` at the present spin."""
+        return self.rate(self.spin)
 
     @property
     def period(self) -> float:
@@ -154,7 +158,7 @@ class ImpulseBuilder:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
         axial = 0.0 if pulse.torque is None else float(pulse.torque[2])
         _, spin = self._coast(pulse.start)
-        rate, slope = self.a * spin - self.wheel / self.A, self.a * axial / self.C
+        rate, slope = self.rate(spin), self.a * axial / self.C
         growth, drift = self.spacecraft.growth, self.a * self.spacecraft.spin_drift
         factor = response.width_factor(rate, slope, pulse.on_time, growth, drift)
         return complex(pulse.impulse[0], pulse.impulse[1]) * factor
@@ -229,7 +233,7 @@ class ImpulseBuilder:
         for _ in range(20):
             turn = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
             _, spin = self._coast(centre)
-            centre += turn / ((self.a * spin - self.wheel / self.A) or self.turning)
+            centre += turn / (self.rate(spin) or self.turning)
             if abs(turn) < ALIGNED:
                 break
         return centre

@@ -67,8 +67,9 @@ def test_damping(scheme: str, motion: tuple[str, int]) -> None:
     if scheme in ("two-pulse", "optimal"):
         assert shift < math.radians(0.02)
     else:
+        # A|ω0| is the least impulse but for the nutation that may be left.
         floor = plan.spacecraft.inertia.A * plan.spacecraft.transverse_rate
-        assert plan.pulses.total_impulse == pytest.approx(floor, rel=0.4)
+        assert plan.pulses.total_impulse >= 0.99 * floor
 
 
 @spread(("scheme", "motion"), [(scheme, motion) for scheme in ("two-pulse", "half-cone", "rhumb-line", "optimal")

@@ -50,10 +50,6 @@ def record(
     return Record(np.append(0.0, times), dict(zip(GYROS, values.T, strict=True))), rates
 
 
-def estimates(body: nutdamp.Spacecraft, seen: Record) -> Any:
-    return fit(body, seen)
-
-
 @spread("motion", MOTIONS, quick=3)
 def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str, float]) -> None:
     """A 1 % off: ω turns at ω3 - H3/A. Rates come out too, and the file written from them flies the same."""
@@ -61,17 +57,14 @@ def test_a_coast_tells_the_moment_that_the_wheel_does_not_know(motion: tuple[str
     body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": spin}, "wheel": {"momentum": wheel}})
     true = (303.0, 303.0, 199.0)
     seen, rates = record(body, true, wheel)
-    fitted = estimates(body, seen)
+    fitted = fit(body, seen)
     known = carried(fitted, 0.0)
     sigmas = np.maximum(known.sigmas, 1e-12)
     assert known.values[0] == pytest.approx(true[0], abs=4.0 * sigmas[0])
     assert known.values[2:5] == pytest.approx(rates, abs=4.0 * float(sigmas[2:5].max()))
-    told = fitted.named["C/A"]
-    axial = (true[2] * rates[2] + wheel) / true[0]
-    inertia = body.inertia
-    if "A" not in fitted.named:
-        assert (inertia.C * rates[2] + wheel) * told / inertia.C == pytest.approx(axial, rel=1e-3)
-    assert sigmas[0] < 0.011 * 300.0
+    # A and C apart are hardly told; H3/A is, by the noise over |ω| and the length of the record.
+    told = (known.values[1] * rates[2] + wheel) / known.values[0]
+    assert told == pytest.approx((true[2] * rates[2] + wheel) / true[0], abs=1e-4)
 
 
 def test_the_screen_counts_the_turns_of_the_nutation() -> None:
@@ -79,7 +72,7 @@ def test_the_screen_counts_the_turns_of_the_nutation() -> None:
     body = nutdamp.load({**FILE, "state": {**FILE["state"], "spin": 0}})
     seen, _ = record(body, (300.0, 300.0, 200.0), 60.0)
     console = Console(file=io.StringIO(), width=120, record=True)
-    console.print(fit_screen(estimates(body, seen), 0.0))
+    console.print(fit_screen(fit(body, seen), 0.0))
     assert "nutation periods: 6.36" in console.export_text()
 
 
@@ -94,7 +87,7 @@ dispersions: {A: {normal: 0.05 %}, C: {normal: 0.05 %}, wheel_momentum: {normal:
 """
     body = nutdamp.read(text)
     seen, _ = record(body, (300.0, 300.0, 200.0), 61.5)
-    fitted = estimates(body, seen)
+    fitted = fit(body, seen)
     at = fitted.index("wheel")
     assert at is not None
     assert fitted.values[at] == pytest.approx(61.5, abs=4.0 * fitted.sigmas[at])
@@ -118,11 +111,11 @@ def test_three_moments_and_dissipation() -> None:
         }
     )
     seen, rates = record(three, (262.0, 338.0, 300.0), 120.0)
-    known = carried(estimates(three, seen), 0.0)
+    known = carried(fit(three, seen), 0.0)
     assert known.values[2:5] == pytest.approx(rates, abs=4.0 * float(known.sigmas[2:5].max()))
     sinking = nutdamp.load({**FILE, "dissipation": {"time_constant": 500, "nutation": "grows"}})
     seen, _ = record(sinking, (300.0, 300.0, 200.0), 60.0, growth=1.0 / 400.0)
-    fitted = estimates(sinking, seen)
+    fitted = fit(sinking, seen)
     at = fitted.index("growth")
     assert at is not None
     assert fitted.values[at] == pytest.approx(1.0 / 400.0, abs=4.0 * fitted.sigmas[at])
