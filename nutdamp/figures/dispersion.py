@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.control_loop.dispersion import LoopResults
 from nutdamp.figures import geometry, style
 from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION
 from nutdamp.flight.propagation import model_name
@@ -22,6 +21,8 @@ from nutdamp.views.decisions import cases_verdict, exact_percent
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from nutdamp.control_loop.dispersion import LoopResults
 
 
 BINS = 60
@@ -90,7 +91,7 @@ def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft)
     """Share of the cases within each value of nutation and momentum shift, over a histogram."""
     for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
         distribution = results.distribution(part.value)
-        nutation = "largest nutation" if isinstance(results, LoopResults) else "nutation left"
+        nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
         name = nutation if part is Part.NUTATION else style.part_name(part)
         limit = style.limit_of(body, part)
         required = "" if limit is None else f", required {style.number(limit)}°"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -110,12 +111,22 @@ def settle(figure: Figure) -> None:
     """Lay labels where they cover neither each other nor a curve; take out those for which there is no room."""
     for axes in panels(figure):  # drawn later outside this style, as many ticks fit between labels of the same size
         axes.tick_params(labelsize=TICK_SIZE)
-    before = np.zeros(1)
-    for _ in range(PASSES):
+        # They lie within the panel and its ticks.
+        axes.spines[["left", "right", "top"]].set_in_layout(False)
+        for artist in (*axes.texts, *axes.child_axes):
+            artist.set_in_layout(False)
+    equal = any(axes.get_aspect() != "auto" for axes in figure.axes)
+    before, size = None, np.tile(figure.bbox.size, 2)
+    for _ in range(PASSES if equal else 1):
         _lay_out(figure)
-        now = np.array([axes.get_window_extent().extents for axes in figure.axes])
-        if now.shape == before.shape and np.abs(now - before).max(initial=0.0) < 1.0:
-            break
+        now = np.array([axes.get_position(original=True).bounds for axes in figure.axes])
+        if before is not None:
+            if np.abs((now - before) * size).max() < 1.0:
+                break
+            now += (now - before) / 3.0  # a pass leaves a quarter of the way to go
+            for axes, place in zip(figure.axes, now.tolist(), strict=True):
+                axes.set_position(place, "original")
+                axes.set_in_layout(True)
         before = now
     figure.set_layout_engine("none")  # labels are put where panels are now
     order = list(_OFFSETS)
@@ -175,31 +186,42 @@ def _settle(
     """
     role = str(note.get_label())
     here = note.get_window_extent().padded(1.5 * points)
-    best, least = None, np.inf
+    best, least = None, _COVERED[role]
     led = note in _MEANT
-    for x, y in [*_AROUND, *_FAR] if led else _OFFSETS[role]:
-        # Sideways offsets are counted from the edge of the text, so that long names are as near as short ones.
-        offset = (x + np.sign(x) * max(0.5 * here.width / points - 4.5, 0.0), y)
-        box = here.translated(offset[0] * points, offset[1] * points)
-        curves, leads = (box.count_contains(part) for part in inked)
-        covered = float(curves) + 30.0 * float(leads > 0) + 0.04 * float(np.hypot(x, y))
+    steps = np.array([*_AROUND, *_FAR] if led else _OFFSETS[role])
+    # Sideways offsets are counted from the edge of the text, so that long names are as near as short ones.
+    offsets = steps + np.sign(steps) * (max(0.5 * here.width / points - 4.5, 0.0), 0.0)
+    boxes = [here.translated(x * points, y * points) for x, y in offsets.tolist()]
+    curves, leads = (_contained(boxes, part) for part in inked)
+    away = np.hypot(*steps.T)
+    for number in np.argsort(covers := curves + 30.0 * (leads > 0) + 0.04 * away, kind="stable").tolist():
+        covered, box = float(covers[number]), boxes[number]
+        if covered >= least:
+            break
         out = max(window.x0 - box.x0, box.x1 - window.x1, window.y0 - box.y0, box.y1 - window.y1, 0.0)
-        if led and not _nearest(note, box, points):
-            way = _way(note, box, points)
-            covered += 3.0 if np.hypot(x, y) > FAR else 1e3
-            covered += 1e3 * any(other.count_contains(way) for other in taken)
         if out > 0.0 or any(box.overlaps(other) for other in taken):
             if role != "_vital":
                 continue
             covered += 1e4 * (1.0 + out)
-        if covered < min(least, _COVERED[role]):
-            best, least = (offset, box), covered
+        if led and not _nearest(note, box, points):
+            way = _way(note, box, points)
+            covered += 3.0 if away[number] > FAR else 1e3
+            covered += 1e3 * any(other.count_contains(way) for other in taken)
+        if covered < least:
+            best, least = number, covered
     if best is None:
         note.set_visible(False)
         return None
-    note.set_position(best[0])
-    taken.append(best[1])
-    return best[1]
+    note.set_position(offsets[best].tolist())
+    taken.append(boxes[best])
+    return boxes[best]
+
+
+def _contained(boxes: Sequence[Bbox], places: Vector) -> Vector:
+    """Number of ``places`` (n, 2) within each box."""
+    corners = np.array([box.get_points() for box in boxes])
+    x, y = ((corners[:, :1, axis] < places[:, axis]) & (places[:, axis] < corners[:, 1:, axis]) for axis in (0, 1))
+    return np.asarray(np.count_nonzero(x & y, axis=1), dtype=np.float64)
 
 
 NEARER, NEAR = 0.45, 8.0

@@ -72,6 +72,7 @@ _SETTINGS: dict[str, Any] = {
     "font.size": 8.5,
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
+    "axes.titley": 1.0,  # else matplotlib measures all tick labels of a panel once more for each title
     "axes.labelsize": 8.5,
     "axes.linewidth": 0.6,
     "axes.edgecolor": INK,
