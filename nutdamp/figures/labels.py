@@ -115,19 +115,21 @@ def settle(figure: Figure) -> None:
         axes.spines[["left", "right", "top"]].set_in_layout(False)
         for artist in (*axes.texts, *axes.child_axes):
             artist.set_in_layout(False)
-    equal = any(axes.get_aspect() != "auto" for axes in figure.axes)
-    before, size = None, np.tile(figure.bbox.size, 2)
-    for _ in range(PASSES if equal else 1):
+    size = np.tile(figure.bbox.size, 2)
+    begun: Vector | None = None
+    ended: Vector | None = None
+    for _ in range(PASSES if any(axes.get_aspect() != "auto" for axes in figure.axes) else 1):
         _lay_out(figure)
         now = np.array([axes.get_position(original=True).bounds for axes in figure.axes])
-        if before is not None:
-            if np.abs((now - before) * size).max() < 1.0:
-                break
-            now += (now - before) / 3.0  # a pass leaves a quarter of the way to go
+        if ended is not None and np.abs((now - ended) * size).max() < 1.0:
+            break
+        ended = now
+        if begun is not None:  # a pass leaves a quarter of the way to go
+            now = now + (now - begun) / 3.0
             for axes, place in zip(figure.axes, now.tolist(), strict=True):
                 axes.set_position(place, "original")
                 axes.set_in_layout(True)
-        before = now
+        begun = now
     figure.set_layout_engine("none")  # labels are put where panels are now
     order = list(_OFFSETS)
     for axes in panels(figure):
@@ -214,7 +216,7 @@ def _settle(
         return None
     note.set_position(offsets[best].tolist())
     taken.append(boxes[best])
-    return boxes[best]
+    return taken[-1]
 
 
 def _contained(boxes: Sequence[Bbox], places: Vector) -> Vector:
