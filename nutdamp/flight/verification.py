@@ -97,7 +97,10 @@ class EulerEquations:
         from scipy.integrate import solve_ivp
 
         derivative = self._derivative(start, tuple(pushes), burn)
-        return solve_ivp(derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense)
+        return solve_ivp(
+            derivative, (start, end), state, method="DOP853", rtol=1e-13, atol=1e-15, dense_output=dense,
+            first_step=end - start,  # often one step does: the guess would take two, and two evaluations more
+        )  # fmt: skip
 
     def _derivative(
         self, start: float, pushes: tuple[Push, ...], burn: tuple[float, float]
