@@ -21,8 +21,7 @@ from nutdamp.views.tables import DataTable, Heading, Shared
 from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
-    from nutdamp.page.scales import Panel, Strip
-    from nutdamp.page.workbench import Workbench
+    from nutdamp.page.moving import Panel, Strip, Workbench
     from nutdamp.spacecraft.model import Vector
     from nutdamp.views.glance import RequirementRow
 

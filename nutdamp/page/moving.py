@@ -1,7 +1,8 @@
-"""The view of the motion that the script of a page moves: its rows as whole numbers.
+"""The view of the motion that the script of a page moves: its rows as whole numbers, scales, workbench.
 
 The script reads rows and draws them: each number that it shows is one row of the track, rounded here. Only where the
-schedule is changed in the workbench it computes rows of its own.
+schedule is changed in the workbench it computes rows of its own: the motion of `propagation.by_impulses` for a
+symmetric body between ideal coasts; where the flight has more in it, `absence` gives the reason, and there is none.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,16 @@ from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.flight.track import Track
 from nutdamp.page.document import Circle, Moving, NamedDirection
-from nutdamp.page.scales import LEAD, Panel, panel, placed, strip_of
-from nutdamp.page.workbench import Room, absence, workbench_data, workbench_of
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.pulses import channel_text
 from nutdamp.views.spacecraft import angle_names, angle_texts
-from nutdamp.views.text import MISSING, most
+from nutdamp.views.text import MISSING, most, quantity
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 """Even rows in the quickest nutation turn; least and largest number of them altogether."""
@@ -259,3 +262,246 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     speeds = sorted({1.0, *(round(pace, 12) for pace in every if QUICK <= until / pace <= SLOW)})
     first = min(speeds, key=lambda pace: abs(math.log(until / pace / UNHURRIED)))
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
+
+
+EDGES = (350, 150, 1960, 1760)
+"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
+
+STRIP = (2000, 1000)
+"""Width and height of the angles over time in units of their SVG."""
+
+EDGE = 0.03
+"""Part of a scale at either end without a number: it would touch those of the other scale."""
+
+LEAD = 0.012
+"""Part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor."""
+
+PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
+"""Prefixes of units with their factors, and the largest number of a scale that needs another one."""
+
+Mark = tuple[float, str]
+"""A place on a scale, and the number there."""
+
+
+class Scale(NamedTuple):
+    """A scale with its name and marks."""
+
+    name: str
+    marks: tuple[Mark, ...]
+
+
+class Panel(NamedTuple):
+    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
+
+    part: str
+    title: str
+    described: str
+    x: Scale
+    y: Scale
+    zero: tuple[float, float]
+    frame: tuple[int, int, int, int] = EDGES
+
+
+class Strip(NamedTuple):
+    """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
+
+    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left and width of each
+    firing; ``closed``: left and width of times without firing.
+    """
+
+    times: Scale
+    angles: Scale
+    zero: float
+    required: float | None
+    outside: str
+    channels: tuple[str, ...]
+    bars: tuple[tuple[int, float, float], ...]
+    closed: tuple[tuple[float, float], ...]
+
+
+def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
+    """Two columns: the places of ``points`` (n, 2) in a panel."""
+    left, top, right, bottom = EDGES
+    part = (points - middle + half) / (2.0 * half)
+    across = left + part[:, 0] * (right - left), bottom - part[:, 1] * (bottom - top)
+    return [np.rint(column).astype(int).tolist() for column in across]
+
+
+def panel(part: str, title: str, room: tuple[Vector, float], names: tuple[str, str]) -> Panel:
+    """A panel with ``room``: its middle (2,) and half its side; the ``names`` of its axes have deg as their unit."""
+    middle, half = room
+    prefix, factor = _prefix(half)
+    names = names[0].replace(", deg", f", {prefix}deg"), names[1].replace(", deg", f", {prefix}deg")
+    marks = []
+    for which in (0, 1):
+        inner = (1.0 - 2.0 * EDGE) * half
+        values = np.array(geometry.ticks(float(middle[which]) - inner, float(middle[which]) + inner, 5))
+        both = np.column_stack([values, values])
+        places = placed(both, middle[[which, which]], half)[which]
+        marks.append(tuple(zip(map(float, places), map(_number, (factor * values).tolist()), strict=True)))
+    zero = placed(np.zeros((1, 2)), middle, half)
+    described = f"{title}; {names[0]} to the right, {names[1]} upwards"
+    x, y = (Scale(name, mark) for name, mark in zip(names, marks, strict=True))
+    return Panel(part, title, described, x, y, (zero[0][0], zero[1][0]))
+
+
+def _prefix(largest: float) -> tuple[str, float]:
+    """The prefix of a unit that keeps numbers up to ``largest`` short, and the factor by which they grow."""
+    return next(((name, factor) for name, factor in PREFIXES if factor * largest >= SHORT), PREFIXES[-1])
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")
+
+
+def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[float]]:
+    """Angles and firings over time, and the lowest and highest angle of the scale, deg."""
+    body = flown.spacecraft
+    angles = np.degrees(np.concatenate([track.nutation, track.body_cone, track.space_cone, [0.0]]))
+    low, high = float(angles.min()), float(angles.max())
+    margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
+    low, high = low - margin, high + margin
+    width, height = STRIP
+
+    def rise(angle: float) -> float:
+        return round(height * (high - angle) / (high - low), 1)
+
+    def across(time: float) -> float:
+        return LEAD + (1.0 - LEAD) * time / until
+
+    def spread(begins: float, ends: float) -> tuple[float, float]:
+        return round(width * across(begins), 1), round(width * (across(ends) - across(begins)), 1)
+
+    required = None if body.requirement is None else body.requirement.nutation
+    channels = tuple(geometry.channels_fired(flown))
+    fired = zip(flown.schedule, flown.spans, strict=True)
+    prefix, factor = _prefix(high - low)
+    level = None if required is None else math.degrees(required)
+    edge = EDGE * (high - low)
+    scale = tuple(
+        (rise(angle) * 100.0 / height, _number(factor * angle)) for angle in geometry.ticks(low + edge, high - edge, 5)
+    )
+    strip = Strip(
+        times=Scale("time, s", tuple((100.0 * across(time), _number(time)) for time in geometry.ticks(0.0, until, 6))),
+        angles=Scale(f"{prefix}deg", scale),
+        zero=rise(0.0),
+        required=rise(level) if level is not None and low < level < high else None,
+        outside=most(math.radians(level)) if level is not None and not low < level < high else "",
+        channels=channels,
+        bars=tuple((channels.index(pulse.channel), *spread(*span)) for pulse, span in fired),
+        closed=tuple(spread(begins, ends) for begins, ends in geometry.closed(body, until)),
+    )
+    return strip, [low, high]
+
+
+RATIO, THRUST = 1.0, 5.0
+"""Largest change of C/A and of the thrust by the sliders, per cent."""
+
+Room = tuple[Vector, float]
+"""Middle (2,) and half the side of a square panel."""
+
+
+class Workbench(NamedTuple):
+    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
+
+    ``rows``: name of each quantity for the script and for people, and its bound in words.
+    """
+
+    rows: tuple[tuple[str, str, str], ...]
+    pulses: tuple[str, ...]
+    ratio: float = RATIO
+    thrust: float = THRUST
+
+
+def absence(body: Spacecraft, schedule: Schedule) -> str:
+    """Reason for which there is no workbench, a few words; empty where there is one."""
+    kinds = (
+        (not len(schedule), "no pulses"),
+        (not body.inertia.symmetric, "I1 ≠ I2"),
+        (body.inertia.wheel != 0.0, "a wheel"),
+        (body.growth != 0.0, "energy dissipation"),
+        (bool(body.disturbances), "disturbance torques"),
+        (bool(body.thrust_laws) or schedule.shaped, ", ".join(body.thrust_laws) or "shaped pulses"),
+    )
+    return next((reason for holds, reason in kinds if holds), "")
+
+
+def workbench_of(flown: Flight) -> Workbench:
+    """The workbench of a flight; there must be one by `absence`."""
+    body = flown.spacecraft
+    limits = {bound.part: bound for bound in requirements.required(body)}
+    names = [(Part.NUTATION, "nutation"), (Part.SHIFT, "momentum shift")]
+    if body.goal.axis is not None:
+        names.append((Part.DISTANCE, "axis error"))
+    rows = [(part.value, name, _bound(limits[part].most) if part in limits else "") for part, name in names]
+    if Part.SPIN in limits:
+        rows.append(("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
+    pulses = (f"{number}: {channel_text(pulse, body)}" for number, pulse in enumerate(flown.schedule, start=1))
+    return Workbench(tuple(rows), tuple(pulses))
+
+
+def _bound(angle: float) -> str:
+    """An upper bound given in rad, with the sign of degrees."""
+    return f"≤ {most(angle).removesuffix(' deg')}°"
+
+
+def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:
+    """Data of the script, SI and rad in principal axes: body, pulses, limits, and the scales of the panels.
+
+    ``pole`` and ``sky`` are the rooms of the panels, deg/s and deg; ``track`` is shown to ``until`` s.
+    """
+    body, limits, start = flown.spacecraft, flown.spacecraft.limits, flown.spacecraft.initial
+    target, channels = body.goal.axis, geometry.channels_fired(flown)
+    return {
+        "body": {
+            "A": body.inertia.A,
+            "C": body.inertia.C,
+            "sense": math.copysign(1.0, body.spin),
+            "target": None if target is None else target.tolist(),
+        },
+        "start": {"omega": body.omega0[:2].tolist(), "spin": start.spin, "turn": start.quaternion.tolist()},
+        "framed": body.attitude is not None,
+        "axes": None if body.inertia.aligned else body.inertia.axes.tolist(),
+        "pulses": [_pulse(body, pulse, channels.index(pulse.channel)) for pulse in flown.schedule],
+        "limits": {
+            "earliest": limits.earliest,
+            "horizon": body.horizon,
+            "gap": limits.gap,
+            "tick": None if flown.schedule.blocks else limits.tick,
+            "blackout": limits.blackout,
+            "most": limits.max_pulses,
+        },
+        "required": {bound.part.value: bound.most for bound in requirements.required(body)},
+        "spin": body.goal.spin,
+        "frame": EDGES,
+        "plane": geometry.sky_plane(flown, track.momentum[0]).tolist(),
+        "pole": _room(pole),
+        "sky": _room(sky),
+        "step": _step(until),
+    }
+
+
+def _pulse(body: Spacecraft, pulse: Pulse, row: int) -> dict[str, Any]:
+    channel = channel_of(body, pulse)
+    longest = math.inf if channel is None else channel.max_on_time
+    return {
+        "t": pulse.t,
+        "on": pulse.on_time,
+        "channel": pulse.channel,
+        "row": row,
+        "text": channel_text(pulse, body),
+        "impulse": pulse.impulse.tolist(),
+        "torque": None if pulse.torque is None else pulse.torque.tolist(),
+        "least": 0.0 if channel is None else channel.min_on_time,
+        "most": None if math.isinf(longest) else longest,
+    }
+
+
+def _room(room: Room) -> list[float]:
+    middle, half = room
+    return [*np.asarray(middle, dtype=float).tolist(), half]
+
+
+def _step(until: float) -> float:
+    """Steps of times changed by hand, s: the decade of a two-thousandth of the time shown."""
+    return float(10.0 ** math.floor(math.log10(until / 2000.0)))

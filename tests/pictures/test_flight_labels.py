@@ -23,7 +23,7 @@ from support.layout import check_layout, texts
 from support.shown import BODY, CASES, NAMES, STEERED, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
 
 from nutdamp.figures import geometry, labels, overview, style
-from nutdamp.figures.motion import together
+from nutdamp.figures.overview import together
 from nutdamp.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.files.reader import load_spacecraft
 from nutdamp.flight import propagation

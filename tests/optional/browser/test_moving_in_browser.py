@@ -22,7 +22,7 @@ from support.process import Run
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.page.content import Repeat, report_page
 from nutdamp.page.html import page_html
-from nutdamp.page.scales import LEAD
+from nutdamp.page.moving import LEAD
 from nutdamp.planning.decision import compare
 from nutdamp.schemes.catalogue import CLASSIC
 

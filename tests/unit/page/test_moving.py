@@ -28,9 +28,7 @@ from nutdamp.flight import propagation
 from nutdamp.page import moving
 from nutdamp.page.document import Circle, Moving, NamedDirection, PageSection
 from nutdamp.page.html import page_html
-from nutdamp.page.moving import MOST_ROWS, NONE, SPHERE, moving_of
-from nutdamp.page.scales import EDGES, LEAD, strip_of
-from nutdamp.page.workbench import absence
+from nutdamp.page.moving import EDGES, LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Requirement
