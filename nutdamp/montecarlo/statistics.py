@@ -210,20 +210,13 @@ class Exact:
         return float(self.values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
-        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`.
-
-        Each divides what lies above the last one.
-        """
+        """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`."""
         places = np.asarray(probabilities) * (len(self.values) - 1)
-        quantiles = np.empty(len(places))
-        rest, first = self.values.copy(), 0  # what lies above the last quantile, and its rank
-        for index in np.argsort(places).tolist():
-            rank = int(places[index])
-            rest.partition(rank - first)
-            rest, first = rest[rank - first :], rank
-            share = places[index] - rank
-            low, high = rest[0], rest[1:].min() if share else rest[0]
-            quantiles[index] = low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)
+        ranks = places.astype(int)
+        share, above = places - ranks, np.ceil(places).astype(int)
+        ordered = np.partition(self.values, np.unique([ranks, above]))
+        low, high = ordered[ranks], ordered[above]
+        quantiles: Array = np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
         return quantiles
 
     def histogram(self, edges: Array) -> Array:
