@@ -13,6 +13,7 @@ from nutdamp.cli.job import (
     FIGURES,
     Files,
     Job,
+    SessionCommand,
     carry_options,
     plot_options,
     quiet_option,
@@ -20,7 +21,7 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import OUTPUT, SchemeName, SessionCommand, goal_options, scheme_options
+from nutdamp.cli.options import OUTPUT, SchemeName, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, listed, printable
 from nutdamp.schemes.catalogue import PLANNED
@@ -63,7 +64,7 @@ PRIMER = "primer"
 @plot_options((*FIGURES, PRIMER))
 @screen_options
 @quiet_option
-def command(
+def plan_command(
     job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
 ) -> None:
     """Plan pulse schedules that damp the nutation, and compare them.
@@ -81,7 +82,7 @@ def command(
     from nutdamp.planning.decision import decide
     from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.requirements import expect_dispersions
-    from nutdamp.views.schemes import scheme_table
+    from nutdamp.views.glance import scheme_table
 
     if robust:
         expect_dispersions(body)
@@ -181,7 +182,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     if proof is None:
         return {}
     from nutdamp.figures.trade import certificate_figure
-    from nutdamp.views.plan_json import certificate_json
+    from nutdamp.views.pulses import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}
     return {"certificate": partial(certificate_json, proof), **drawn}

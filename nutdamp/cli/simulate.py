@@ -12,6 +12,7 @@ from nutdamp.cli.flown import flown_options, plan_or_read
 from nutdamp.cli.job import (
     FIGURES,
     Job,
+    SessionCommand,
     carry_options,
     deliver,
     plot_options,
@@ -20,7 +21,7 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import leave
-from nutdamp.cli.options import END, OUTPUT, SessionCommand, goal_options
+from nutdamp.cli.options import END, OUTPUT, goal_options
 from nutdamp.errors import printable
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @screen_options
 @quiet_option
-def command(
+def simulate_command(
     job: Job, real: bool, until: float | None, samples: int, at: float | None, drawn: bool, verbose: bool
 ) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.control_loop.controller import SAMPLED, Watch
-from nutdamp.control_loop.first_passage import FARTHEST, Odds, transfer
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
+from nutdamp.control_loop.stability import FARTHEST, Odds, transfer
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propellant import Supply
 from nutdamp.physics.thruster import Ramp, shape_factor
