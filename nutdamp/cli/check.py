@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from nutdamp.errors import Fault
-    from nutdamp.files.overrides import Setting
+    from nutdamp.files.editing import Setting
 
 
 @click.command("check")

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
     from nutdamp.common.results import Note
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.overrides import Setting
+    from nutdamp.files.editing import Setting
     from nutdamp.files.reader import Source
     from nutdamp.planning.plan import Plan
     from nutdamp.spacecraft.model import Spacecraft
@@ -97,7 +97,7 @@ class FileInput(NamedTuple):
 def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
     if not texts:
         return ()
-    from nutdamp.files.overrides import parse_setting
+    from nutdamp.files.editing import parse_setting
 
     try:
         return tuple(parse_setting(text) for text in texts)

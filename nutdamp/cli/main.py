@@ -166,7 +166,7 @@ def _explain(wrong: Exception) -> int:
 
 COMMANDS = {
     "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
-    "simulate": ("simulate", "Propagate a scheme or a schedule; cone angles and axis track."),
+    "simulate": ("plan", "Propagate a scheme or a schedule; cone angles and axis track."),
     "trade": ("studies", "Trade finish time against propellant."),
     "loop": ("studies", "Fire from a gyro or an accelerometer, in a closed loop."),
     "budget": ("studies", "Hold the nutation: pulses a day, propellant a year."),
@@ -174,7 +174,7 @@ COMMANDS = {
     "disperse": ("studies", "Fly many dispersed cases; percentiles, tolerance budget."),
     "verify": ("check", "Fly a schedule by independent means; an error budget."),
     "report": ("export", "Write a report, one page of HTML."),
-    "animate": ("simulate", "Film the body cone rolling on the space cone."),
+    "animate": ("plan", "Film the body cone rolling on the space cone."),
     "check": ("check", "Check spacecraft files: all faults, derived quantities."),
     "export": ("export", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
     "import": ("export", "A spacecraft file from a CCSDS attitude parameter message."),

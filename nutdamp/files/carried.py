@@ -19,8 +19,17 @@ from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
 from nutdamp.estimation.signals import ACCELERATION
-from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits, number
-from nutdamp.files.overrides import Setting, overlay
+from nutdamp.files.editing import (
+    Edits,
+    Later,
+    Setting,
+    as_before,
+    carry_text,
+    epoch_after,
+    motion_edits,
+    number,
+    overlay,
+)
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight

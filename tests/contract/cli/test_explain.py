@@ -23,7 +23,7 @@ from nutdamp.cli.main import group
 from nutdamp.cli.options import SHARED
 from nutdamp.errors import BadRequest
 from nutdamp.files import samples, tabular, telemetry
-from nutdamp.files.overrides import parse_setting
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
