@@ -20,6 +20,7 @@ import numpy as np
 from nutdamp.control_loop.controller import GRID
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.sensor import HARMONIC, Estimator, lag
+from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -378,3 +379,13 @@ def exceeds(limit: float, shown: Vector) -> Vector:
             total += share * tail
         chances[near] = total
     return np.clip(chances, 0.0, 1.0)
+
+
+def expect_damping(body: Spacecraft, loop: Loop) -> None:
+    """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
+    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
+    if turned:
+        raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
+    late = feeding(body, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))

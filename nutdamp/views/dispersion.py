@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.files.samples import OUTPUT_COLUMNS
+from nutdamp.files.export import OUTPUT_COLUMNS
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show

@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
+from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, Cycle, HeldNutation
 from nutdamp.control_loop.controller import Fired
 from nutdamp.control_loop.evaluation import AGREE, LoopPlan, LoopVerification
 from nutdamp.control_loop.law import Ending
-from nutdamp.control_loop.limit_cycle import Cycle
 from nutdamp.control_loop.simulation import LoopRun
 from nutdamp.control_loop.stability import SURELY, Margin, dead_band, feeding, margins, too_late
 from nutdamp.planning.decision import Decision

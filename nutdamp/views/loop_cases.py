@@ -17,7 +17,7 @@ from nutdamp import __version__
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
-from nutdamp.files.samples import column, cone_columns
+from nutdamp.files.export import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE

@@ -22,7 +22,7 @@ from support.process import Run
 from nutdamp.cli.main import group
 from nutdamp.cli.options import SHARED
 from nutdamp.errors import BadRequest
-from nutdamp.files import samples, tabular, telemetry
+from nutdamp.files import export, tabular, telemetry
 from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE
@@ -267,7 +267,7 @@ def columns_written() -> Iterator[str]:
         *telemetry.MEASURED,
         *(column.key for column in simulation.SPINS),
     )
-    yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
+    yield from (*export.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
     for key in (key for key, where in keys_of_columns() if "csv" in where or "json" not in where):
         yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]
 

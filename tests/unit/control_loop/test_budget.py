@@ -16,9 +16,8 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation, Thresholds, budget
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.limit_cycle import Cycle, Map
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import Odds, Transfer, exceeds, transfer
