@@ -23,8 +23,7 @@ from nutdamp.control_loop.stability import dead_band
 from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state
 from nutdamp.flight.dynamics import Dynamics, Path, make_dynamics
-from nutdamp.flight.propagation import Flight, Leg
-from nutdamp.flight.track import widest
+from nutdamp.flight.propagation import Flight, Leg, widest
 from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, batch, energy_sink, taylor
 from nutdamp.physics.taylor import Forcing

@@ -23,7 +23,7 @@ from nutdamp.views.text import degrees, joined, sentences
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nutdamp.flight.track import Track
+    from nutdamp.flight.propagation import Track
     from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.document import Block
     from nutdamp.planning.robust import RobustComparison

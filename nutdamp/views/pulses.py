@@ -16,8 +16,7 @@ import numpy as np
 from nutdamp import __version__
 from nutdamp.common.numerics import cleaned
 from nutdamp.flight.end_state import Aspect, spin_phases
-from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Residual, Track
 from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
