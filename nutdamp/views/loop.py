@@ -374,7 +374,7 @@ def _outlook(budget: Budget) -> Iterator[str]:
     elif limit is None:
         yield "No largest nutation is named: give requirement.nutation or --largest, to see when damping must begin."
     elif budget.until_largest == 0.0:
-        yield f"Damping must begin now: the nutation of {now} is already above {most(limit)}."
+        yield f"Damping must begin now: the nutation of {now} is not below {most(limit)}."
     else:
         yield (
             f"Damping must begin within {lasting(budget.until_largest)}: "
