@@ -16,8 +16,7 @@ import numpy as np
 from nutdamp.figures import geometry, history, labels, sphere, style
 from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, model_name
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector

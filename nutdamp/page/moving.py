@@ -16,8 +16,7 @@ import numpy as np
 
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.document import Circle, Moving, NamedDirection
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
