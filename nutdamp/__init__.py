@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from nutdamp.estimation.forecast import Fitted
     from nutdamp.flight.propagation import Flight, Residual, Track
     from nutdamp.montecarlo.study import Dispersion
-    from nutdamp.page.html import Report
+    from nutdamp.page.report import Report
     from nutdamp.planning.decision import Comparison, Simulation
     from nutdamp.planning.plan import Plan, Verified
     from nutdamp.planning.robust import RobustComparison
@@ -112,7 +112,7 @@ _HOMES = {
     "nutdamp.estimation.forecast": ("Fitted",),
     "nutdamp.flight.propagation": ("Flight", "Residual", "Track"),
     "nutdamp.montecarlo.study": ("Dispersion",),
-    "nutdamp.page.html": ("Report",),
+    "nutdamp.page.report": ("Report",),
     "nutdamp.planning.decision": ("Comparison", "Simulation"),
     "nutdamp.planning.plan": ("Plan", "Verified"),
     "nutdamp.planning.robust": ("RobustComparison",),

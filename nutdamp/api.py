@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
     from nutdamp.estimation.forecast import Fitted
     from nutdamp.montecarlo.study import Dispersion
-    from nutdamp.page.html import Report
+    from nutdamp.page.report import Report
     from nutdamp.planning.decision import Comparison, Simulation
     from nutdamp.planning.plan import Plan, Verified
     from nutdamp.planning.robust import RobustComparison
@@ -579,9 +579,8 @@ def report(
     True
     """
     from nutdamp.files.tabular import write_whole
-    from nutdamp.page.content import called
     from nutdamp.page.document import controlled
-    from nutdamp.page.html import expect_html, made_of
+    from nutdamp.page.report import called, expect_html, made_of
     from nutdamp.spacecraft.model import Spacecraft
 
     name, kept = units.path("output", output), controlled(**control)

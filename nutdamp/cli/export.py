@@ -231,7 +231,7 @@ def report_command(
     standard output. Needs the extra plot.
     """
     from nutdamp.page.document import controlled
-    from nutdamp.page.html import expect_html, made_of
+    from nutdamp.page.report import expect_html, made_of
 
     output = job.written["output"] or ""
     expect_html(output)
@@ -241,7 +241,7 @@ def report_command(
         raise click.UsageError("a report is of the schemes compared, of --schedule, or of --blocks: name one of them")
     body = job.begin()
 
-    from nutdamp.page.content import repeated
+    from nutdamp.page.report import repeated
     from nutdamp.planning.decision import compare_plans
     from nutdamp.spacecraft.requirements import expect_dispersions
 

@@ -182,7 +182,7 @@ def _proof_files(proof: Certificate | None, figure: str) -> Files:
     """The files of a certificate, if there is one."""
     if proof is None:
         return {}
-    from nutdamp.figures.trade import certificate_figure
+    from nutdamp.figures.studies import certificate_figure
     from nutdamp.views.pulses import certificate_json
 
     drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}

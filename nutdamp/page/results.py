@@ -52,13 +52,13 @@ VIEWS = {
     **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
     "Trade.csv": "views.trade:trade_csv fronts",
-    "Trade.figure": "figures.trade:trade_figure spacecraft fronts",
+    "Trade.figure": "figures.studies:trade_figure spacecraft fronts",
     "Trade.screen": "views.trade:trade_screen spacecraft fronts",
     "Dispersion.data": "views.dispersion:dispersion_json core scheme=scheme",
     "Dispersion.figure": "page.results:dispersion_figure",
     "Dispersion.screen": "views.dispersion:dispersion_screen core scheme=scheme nominal=core.study.nominal",
     "LoopDispersion.data": "views.loop_cases:loop_cases_json core",
-    "LoopDispersion.figure": "figures.dispersion:loop_cases_figure core",
+    "LoopDispersion.figure": "figures.studies:loop_cases_figure core",
     "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
     "LoopPlan.data": "views.loop:loop_json",
     "LoopPlan.figure": "figures.loop:loop_figure",
@@ -66,7 +66,7 @@ VIEWS = {
     "LoopVerification.data": "views.loop:verified_json",
     "LoopVerification.screen": "views.loop:verification_screen",
     "Fitted.data": "views.fit:fit_json core",
-    "Fitted.figure": "figures.fit:fit_figure core",
+    "Fitted.figure": "figures.studies:fit_figure core",
     "Fitted.text": "files.carried:fitted_file core",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
@@ -135,7 +135,7 @@ def write(_: object, path: str | PathLike[str], text: str) -> None:
 
 def dispersion_figure(dispersion: Dispersion, name: str = "overview") -> Figure:
     """Figure of dispersed cases by its name."""
-    from nutdamp.figures import dispersion as figures
+    from nutdamp.figures import studies as figures
 
     return figures.dispersion_figure(name, dispersion.core, scheme=dispersion.scheme)
 
@@ -277,7 +277,7 @@ def _beside(table: str | None, result: Plan | Flight | None) -> str | None:
 
 
 def _block(content: Block) -> str | None:
-    from nutdamp.page.html import block_html
+    from nutdamp.page.report import block_html
 
     try:
         return block_html(content)

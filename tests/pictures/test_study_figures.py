@@ -24,12 +24,12 @@ from support.shown import heading, legend_words, studied
 from nutdamp.control_loop.dispersion import LoopResults, loop_study
 from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
-from nutdamp.figures import dispersion
+from nutdamp.figures import studies
 from nutdamp.figures.history import BAR
 from nutdamp.figures.loop import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
-from nutdamp.page.content import dispersion_pictures
+from nutdamp.page.report import dispersion_pictures
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
@@ -51,7 +51,7 @@ def study(which: str = "shift") -> Results:
 
 @cache
 def drawn(name: str, which: str = "shift") -> Figure:
-    return dispersion.dispersion_figure(name, study(which), scheme="two-pulse")
+    return studies.dispersion_figure(name, study(which), scheme="two-pulse")
 
 
 @pytest.mark.deep
@@ -76,7 +76,7 @@ def test_curves_and_histograms_hold_all_cases(which: str) -> None:
         (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
         heights, edges, _ = stairs.get_data()
         counts, _ = np.histogram(values, [min(values[0], edges[0]), *edges[1:-1], values[-1]])
-        assert heights == pytest.approx(dispersion.HIGHEST * counts / counts.max())
+        assert heights == pytest.approx(studies.HIGHEST * counts / counts.max())
         places, shares = line(axes, "cases within").T
         assert (places[-1], shares[-1]) == (pytest.approx(values[-1]), 100.0)
         for place, share in zip(places[::37], shares[::37], strict=True):
@@ -88,7 +88,7 @@ def test_curves_and_histograms_hold_all_cases(which: str) -> None:
 def test_a_histogram_with_a_long_tail_reaches_its_end_on_a_log_axis() -> None:
     values = np.append(np.random.default_rng(1).random(99_990), np.full(10, 50.0)) * math.radians(1.0)
     axes = Figure().subplots()
-    dispersion.draw_distribution(axes, Exact(values), "nutation left, °", None, 60)
+    studies.draw_distribution(axes, Exact(values), "nutation left, °", None, 60)
     assert axes.get_xscale() == "log"
     assert axes.get_xlabel() == "nutation left, ° (log)"
     (stairs,) = (patch for patch in axes.patches if isinstance(patch, StepPatch))
@@ -101,7 +101,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
     """A histogram of rounding is an empty panel with ticks of 1e-13 degrees."""
     still = Dispersions(timing=Tolerance("uniform", 1e-15), timing_offset=OFFSET if bias else None)
     results = studied(replace(BODY, dispersions=still), 50)
-    figure = dispersion.dispersion_figure("cases", results, scheme="two-pulse")
+    figure = studies.dispersion_figure("cases", results, scheme="two-pulse")
     check_layout(figure)
     for axes, output, required in zip(figure.axes, ("nutation", "momentum_shift"), (0.5, 0.2), strict=True):
         most = results.distribution(output)
@@ -119,7 +119,7 @@ def test_cases_that_are_all_alike_are_told_in_words(bias: float) -> None:
 def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
     thrust = dict.fromkeys(TOLERANCES.thrust, Tolerance("normal", size, relative=True))
     body = replace(BODY, dispersions=Dispersions(thrust=thrust, timing=Tolerance("uniform", 0.05 * size)))
-    figure = dispersion.dispersion_figure("momentum", studied(body, 500), scheme="two-pulse")
+    figure = studies.dispersion_figure("momentum", studied(body, 500), scheme="two-pulse")
     check_layout(figure)
     assert "the 500 cases" in legend_words(figure)
     ticks = figure.axes[0].get_xticklabels()
@@ -133,12 +133,12 @@ def test_the_ticks_of_small_shifts_keep_apart(size: float) -> None:
 def test_final_h_lies_as_far_out_as_the_table_says(which: str, output: str) -> None:
     results = study(which)
     assert results.values is not None
-    cases = dispersion.momentum_cases(results)
+    cases = studies.momentum_cases(results)
     away = np.degrees(results.values[OUTPUTS.index(output)])
     assert np.hypot(*cases.T) == pytest.approx(away, rel=1e-6, abs=1e-9)
     axes = drawn("momentum", which).axes[0]
     (dots,) = (patch for patch in axes.patches if isinstance(patch, PathPatch))
-    assert np.asarray(dots.get_path().vertices)[::2] == pytest.approx(cases[: dispersion.DOTS])
+    assert np.asarray(dots.get_path().vertices)[::2] == pytest.approx(cases[: studies.DOTS])
     required = line(axes, "required")
     assert np.hypot(*required.T) == pytest.approx(np.full(len(required), 0.2))
     assert axes.get_aspect() == 1.0
@@ -151,21 +151,21 @@ def test_the_ellipse_holds_its_share_and_is_that_of_the_covariance() -> None:
     points = np.random.default_rng(2).multivariate_normal([1.0, -2.0], [[4.0, 1.5], [1.5, 1.0]], 100_000)
     inverse = np.linalg.inv(np.cov(points.T))
     for share in (0.5, 0.9, 0.997):
-        rim, inside = (rows - points.mean(axis=0) for rows in (dispersion.ellipse(points, share), points))
+        rim, inside = (rows - points.mean(axis=0) for rows in (studies.ellipse(points, share), points))
         sizes = np.sqrt(np.einsum("ij,jk,ik->i", rim, inverse, rim))
         assert np.ptp(sizes) < 1e-6 * sizes[0]
         # Rayleigh: of normal cases this share lies within.
         assert sizes[0] == pytest.approx(math.sqrt(-2.0 * math.log(1.0 - share)), rel=0.02)
         within = np.einsum("ij,jk,ik->i", inside, inverse, inside) <= sizes[0] ** 2
         assert within.mean() == pytest.approx(share, abs=1e-4)
-    assert (dispersion.ellipse(np.zeros((5, 2)), 0.997) == 0.0).all()
+    assert (studies.ellipse(np.zeros((5, 2)), 0.997) == 0.0).all()
 
 
 @pytest.mark.deep
 @pytest.mark.parametrize("name", ["overview", *map(weekly, NAMES[1:])])
 def test_nothing_that_varies_is_drawn(name: str) -> None:
     results = studied(replace(BODY, dispersions=Dispersions(timing_offset=OFFSET)), 50)
-    check_layout(dispersion.dispersion_figure(name, results, scheme="two-pulse"))
+    check_layout(studies.dispersion_figure(name, results, scheme="two-pulse"))
 
 
 @pytest.mark.deep
@@ -211,7 +211,7 @@ def test_numbers_of_firings_do_not_touch_the_bars_of_the_row_above() -> None:
 def test_dispersed_loops_show_the_shift_that_is_required(most: float, beside: bool) -> None:
     body = looping(Requirement(momentum_shift=math.radians(most)))
     results = run_loops(LoopResults(loop_study(body, 60.0), 20))
-    figure = dispersion.loop_cases_figure(results)
+    figure = studies.loop_cases_figure(results)
     check_layout(figure)
     nutation, shift = figure.axes
     assert line(nutation, "cases within")[-1] == pytest.approx([np.degrees(results.of("nutation").max()), 100.0])

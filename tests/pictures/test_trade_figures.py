@@ -18,7 +18,7 @@ from support.layout import check_layout, texts
 from support.shown import WIDE, check_star, legend_words
 
 from nutdamp.common.numerics import down
-from nutdamp.figures import trade
+from nutdamp.figures import studies
 from nutdamp.planning import plan as planning
 from nutdamp.planning import tradeoff
 from nutdamp.planning.decision import compare
@@ -56,7 +56,7 @@ def traded_point(later: float, share: float) -> Point:
 @pytest.mark.deep
 def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
     chosen = planning.plan(BODY, "two-pulse")
-    figure = trade.trade_figure(BODY, traded(), chosen)
+    figure = studies.trade_figure(BODY, traded(), chosen)
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
@@ -75,23 +75,23 @@ def test_the_trade_numbers_every_point_and_explains_its_marks() -> None:
 @pytest.mark.parametrize("front", [0, 1])
 def test_no_number_lies_under_the_mark_of_the_recommended_plan(front: int) -> None:
     for point in traded()[front].points:
-        (axes,) = trade.trade_figure(BODY, traded(), point.plan).axes
+        (axes,) = studies.trade_figure(BODY, traded(), point.plan).axes
         assert axes.xaxis.get_major_formatter()(2.0) == "2"  # no powers of ten
         check_star(axes, np.array([point.plan.end, point.cost]), 0.36 * 11.0)
 
 
 @pytest.mark.deep
 def test_fronts_without_points_say_why() -> None:
-    figure = trade.trade_figure(spinner(), (Front(0.0, (), "no channel"),))
+    figure = studies.trade_figure(spinner(), (Front(0.0, (), "no channel"),))
     check_layout(figure)
     assert not figure.axes
     assert any("H ends where it was \N{EN DASH} none: no channel" in text.get_text() for text, _ in texts(figure))
     missing = Front(0.0, (), "within 40 s H cannot be kept where it is; " + "set limits.horizon to more " * 5)
-    figure = trade.trade_figure(BODY, (missing, traded()[1]))
+    figure = studies.trade_figure(BODY, (missing, traded()[1]))
     check_layout(figure)
     said = " ".join(figure.axes[0].get_title(loc="left").split())
     assert said.startswith("H ends where it was \N{EN DASH} none: within 40 s H cannot be kept")
-    assert not any("none" in text.get_text() for text, _ in texts(trade.trade_figure(BODY, traded())))
+    assert not any("none" in text.get_text() for text, _ in texts(studies.trade_figure(BODY, traded())))
 
 
 @pytest.mark.weekly
@@ -101,7 +101,7 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_th
     both = tradeoff.fronts(body, OptimalOptions(), count=3, shifts=(0.0, math.inf))
     plans = [point for _, _, point in tradeoff.numbered(both)]
     failing = {(point.plan.end, point.cost) for point in plans if point.plan.meets_requirement is False}
-    figure = trade.trade_figure(body, both)
+    figure = studies.trade_figure(body, both)
     check_layout(figure)
     low, high = figure.axes[0].get_xlim()
     assert all(low < point.plan.pulses.end < high for point in plans)
@@ -118,7 +118,7 @@ def test_points_that_do_not_meet_the_requirement_are_crossed_out_and_all_have_th
 def test_points_close_together_keep_numbers_that_can_be_read(count: int, later: float, cheaper: float) -> None:
     """Nearest to their own points or joined to them."""
     close = Front(0.0, tuple(traded_point(later * step, 1.0 - cheaper * step) for step in range(count)))
-    figure = trade.trade_figure(BODY, (close,))
+    figure = studies.trade_figure(BODY, (close,))
     check_layout(figure, crowded=count > 5)
     assert {str(number) for number in range(1, count + 1)} <= {text.get_text() for text, _ in texts(figure)}
     (axes,) = figure.axes
@@ -139,14 +139,14 @@ def test_the_envelope_of_the_primer_is_nowhere_below_zero_but_where_a_channel_is
 ) -> None:
     """It reaches as far as the plan fires, and the firings stand on it."""
     made = planning.plan(spinner(channels=cross(torque), limits=Limits(horizon=horizon)), "optimal")
-    figure = trade.certificate_figure(certificate(made))
+    figure = studies.certificate_figure(certificate(made))
     check_layout(figure)
     check_colours(figure)
     (axes,) = figure.axes
     envelope, fired = line(axes, "least 1 − q of all channels"), line(axes, "firings of the plan")
     assert made.pulses.end < envelope[-1, 0] <= 2.0 * max(made.pulses.end, made.spacecraft.body_period)
     assert sorted(fired[:, 0]) == pytest.approx([pulse.t for pulse in made.pulses])
-    assert bool(envelope[:, 1].min() < -trade.SHALLOW) is long
+    assert bool(envelope[:, 1].min() < -studies.SHALLOW) is long
     assert ("is taken off the bound" in axes.get_title("left")) is long
     assert np.interp(fired[:, 0], *envelope.T) == pytest.approx(fired[:, 1], abs=1e-2)
 

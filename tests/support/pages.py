@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
-from nutdamp.page import content
-from nutdamp.page.content import Repeat, report_page
+from nutdamp.page import report
 from nutdamp.page.document import Page, Prose
+from nutdamp.page.report import Repeat, report_page
 from nutdamp.planning.decision import Comparison
 
 
@@ -17,9 +17,7 @@ from nutdamp.planning.decision import Comparison
 def unpictured() -> Iterator[None]:
     """Pages are made without pictures."""
     one, several = (lambda *_: Prose("")), (lambda *_: ())
-    with patch.multiple(
-        content, moving_of=one, flight_pictures=several, trade_picture=one, dispersion_pictures=several
-    ):
+    with patch.multiple(report, moving_of=one, flight_pictures=several, trade_picture=one, dispersion_pictures=several):
         yield
 
 

@@ -18,7 +18,7 @@ from nutdamp.flight.propagation import Flight, Track
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.study import Results, run
 from nutdamp.page.document import Page
-from nutdamp.page.html import page_html
+from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC

@@ -25,7 +25,7 @@ import nutdamp
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.figures import style
 from nutdamp.files import schedules, tabular
-from nutdamp.page import html
+from nutdamp.page import report
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 
@@ -299,5 +299,5 @@ def test_notebooks_show_less_without_matplotlib_and_jinja(monkeypatch: pytest.Mo
     assert text is not None
     assert ("<table" in text, "<svg" in text) == (True, False)
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    html._templates.cache_clear()
+    report._templates.cache_clear()
     assert CRAFT._repr_html_() is None

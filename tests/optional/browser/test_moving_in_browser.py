@@ -20,9 +20,8 @@ from support.places import case
 from support.process import Run
 
 from nutdamp.files.reader import example_text, read_spacecraft
-from nutdamp.page.content import Repeat, report_page
-from nutdamp.page.html import page_html
 from nutdamp.page.moving import LEAD
+from nutdamp.page.report import Repeat, page_html, report_page
 from nutdamp.planning.decision import compare
 from nutdamp.schemes.catalogue import CLASSIC
 

@@ -11,9 +11,8 @@ import pytest
 from support import places
 
 from nutdamp.files.reader import example_text, read_spacecraft
-from nutdamp.page.content import Repeat, report_page
 from nutdamp.page.document import Page
-from nutdamp.page.html import page_html
+from nutdamp.page.report import Repeat, page_html, report_page
 from nutdamp.planning.decision import compare
 
 pytestmark = [pytest.mark.browser, pytest.mark.usefixtures("plans_shared")]

@@ -26,8 +26,8 @@ from nutdamp.files.reader import example_text
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.page.document import Moving
-from nutdamp.page.html import page_html
 from nutdamp.page.moving import moving, moving_of
+from nutdamp.page.report import page_html
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Goal
 from nutdamp.spacecraft.schedule import Schedule

@@ -22,8 +22,8 @@ from support.shown import cells, facts, section, sheet, tree
 import nutdamp
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import spin_phases
-from nutdamp.page.content import Repeat
 from nutdamp.page.document import Control, number_in
+from nutdamp.page.report import Repeat
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Disturbance

@@ -20,8 +20,8 @@ from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.flight.propagation import flown
 from nutdamp.montecarlo.checkpoints import CASES, Checkpoints, even, first_pulses
 from nutdamp.montecarlo.study import Results, run, study_of
-from nutdamp.page.content import Repeat
 from nutdamp.page.document import Control
+from nutdamp.page.report import Repeat
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import compare

@@ -27,8 +27,8 @@ from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.page import moving
 from nutdamp.page.document import Circle, Moving, NamedDirection, PageSection
-from nutdamp.page.html import page_html
 from nutdamp.page.moving import EDGES, LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
+from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Requirement

@@ -25,9 +25,8 @@ from nutdamp.api import trade
 from nutdamp.figures import style
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.montecarlo.study import Results, run, study_of
-from nutdamp.page.content import CONDITIONS, Repeat, assumptions, report_page
 from nutdamp.page.document import Prose, Sheet, blocks_of, number_in
-from nutdamp.page.html import block_html, page_html
+from nutdamp.page.report import CONDITIONS, Repeat, assumptions, block_html, page_html, report_page
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.views import guide

@@ -1,0 +1,515 @@
+"""Pictures of studies: dispersed cases, fronts of cost over time and proofs of a least cost, fits of telemetry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nutdamp.common.numerics import down
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.results import Estimate, estimates
+from nutdamp.figures import geometry, labels, style
+from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION, PULSE
+from nutdamp.flight.propagation import model_name
+from nutdamp.montecarlo.statistics import VECTORS, Distribution
+from nutdamp.montecarlo.study import EARLY, Results
+from nutdamp.physics import attitude
+from nutdamp.planning.plan import Plan
+from nutdamp.planning.tradeoff import Certificate, Front, numbered
+from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.views.decisions import cases_verdict, exact_percent
+from nutdamp.views.fit import in_shown
+from nutdamp.views.text import cost as written
+from nutdamp.views.trade import FAILS, fails, front_name, missing, schemes_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from nutdamp.control_loop.dispersion import LoopResults
+
+
+BINS = 60
+"""Bars of a histogram, at most."""
+
+TAIL, KNEE = 2.0, 0.999
+"""The axis is logarithmic where the largest value is more than TAIL times the quantile KNEE."""
+
+DECADES = 6.0
+"""Largest number of decades of that axis: its first bin holds all smaller values."""
+
+STEPS = 400
+"""Steps of the curve of the cases within a value, besides the last ones."""
+
+HIGHEST = 60.0
+"""Height of the highest bar of a histogram, on the scale of the curve over it, %."""
+
+ALIKE = 1e-9
+"""Relative difference up to which the values of all cases are one, but for rounding."""
+
+NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
+"""Degrees below which all cases together are not worth a picture, and their text."""
+
+FAR = 4.0
+"""A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
+
+DOTS = 2_000
+"""Largest number of cases shown as dots: more would only make the picture heavy."""
+
+DENSE = 0.8
+"""Opacity of a dot: fainter ones are not seen (less than 3:1 on white)."""
+
+TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}
+"""Look of the title of a panel."""
+
+PANELS = {"overview": 3, "cases": 2, "momentum": 1}
+"""Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
+
+
+def dispersion_figure(name: str, results: Results, *, scheme: str) -> Figure:
+    """The figure ``overview``, ``cases`` or ``momentum``; raises KeyError for others."""
+    return _figure(name, results, f"{scheme} by {model_name([results.study.model.schedule])}")
+
+
+def loop_cases_figure(results: LoopResults) -> Figure:
+    """Largest nutation after the loop falls quiet, and how far H has moved, of dispersed cases of a loop."""
+    return _figure("cases", results, "closed loop by real pulse widths")
+
+
+@style.styled
+def _figure(name: str, results: Results | LoopResults, how: str) -> Figure:
+    panels, body, share = PANELS[name], results.study.model.spacecraft, results.met_fraction
+    figure = style.sheet((4.1, 7.4, 10.8)[panels - 1], 4.4 if panels != 2 else 3.9)
+    axes = list(figure.subplots(1, panels, squeeze=False)[0])
+    if name != "momentum":
+        _cases(axes[:2], results, body)
+    if isinstance(results, Results) and name != "cases":
+        _momentum(axes[-1], results)
+    style.legend(figure, axes, 2 if name == "momentum" else 8)
+    verdict = "" if share is None else f"\nrequirement {cases_verdict(share, results.probability)}"
+    style.heading(figure, body, f"{how}, {results.done:,} dispersed cases{verdict}")
+    return figure
+
+
+def _cases(panels: list[Axes], results: Results | LoopResults, body: Spacecraft) -> None:
+    """Share of the cases within each value of nutation and momentum shift, over a histogram."""
+    for axes, part in zip(panels, (Part.NUTATION, requirements.aim(body)), strict=True):
+        distribution = results.distribution(part.value)
+        nutation = "nutation left" if isinstance(results, Results) else "largest nutation"
+        name = nutation if part is Part.NUTATION else style.part_name(part)
+        limit = style.limit_of(body, part)
+        required = "" if limit is None else f", required {style.number(limit)}°"
+        axes.set_title(name, **TITLE)
+        alike = "no case ends" if distribution is None else _alike(distribution)
+        if distribution is None or alike is not None:
+            style.words(axes, f"all {results.done:,} cases:\n{alike}{required}")
+            continue
+        reached = math.degrees(float(distribution.quantiles(np.array([results.probability]))[0]))
+        share = exact_percent(results.probability)
+        shown = limit if limit is not None and limit <= FAR * math.degrees(distribution.maximum) else None
+        draw_distribution(axes, distribution, f"{name}, °", shown, min(BINS, 2 * math.isqrt(results.done)))
+        axes.axvline(reached, color=GREY, linewidth=0.8, linestyle=":")
+        axes.plot(reached, 100.0 * results.probability, "o", color=INK, markersize=4)
+        missed = limit is not None and reached > limit
+        text = f"{name}\n{share} within {style.number(reached)}°{required}"
+        axes.set_title(text, color=MISSED if missed else INK, **TITLE)
+
+
+def _alike(distribution: Distribution) -> str | None:
+    """Text for cases of which a curve would show nothing; None where it shows something."""
+    least, most = math.degrees(distribution.minimum), math.degrees(distribution.maximum)
+    if most < NOTHING:
+        return f"below {NEXT_TO_NOTHING}"
+    return f"{style.number(most)}°" if most - least <= ALIKE * most else None
+
+
+def draw_distribution(axes: Axes, distribution: Distribution, name: str, limit: float | None, bins: int) -> None:
+    """Curve and histogram to the largest value: on a log axis where few cases lie far beyond the others."""
+    low, high = distribution.minimum, distribution.maximum
+    if high > TAIL * float(distribution.quantiles(np.array([KNEE]))[0]):
+        axes.set_xscale("log")
+        style.log_axis(axes.xaxis)
+        edges = np.geomspace(max(low, high * 10.0**-DECADES), high, bins + 1)
+        name += " (log)"
+    else:
+        edges = np.linspace(low, high, bins + 1)
+        axes.locator_params(axis="x", nbins=6)
+    counts = distribution.histogram(np.concatenate([[min(low, edges[0])], edges[1:-1], [high]]))
+    bars = HIGHEST * counts / max(counts.max(), 1.0)
+    look: dict[str, Any] = {"facecolor": (MOTION, 0.3), "edgecolor": MOTION, "linewidth": 0.5}
+    axes.stairs(bars, np.degrees(edges), fill=True, label="histogram, scaled", **look)
+    shares = np.append(np.linspace(0.0, 0.99, STEPS), 1.0 - np.geomspace(0.01, 1e-6, STEPS))
+    values = np.degrees(np.append(distribution.quantiles(shares), high))
+    axes.plot(values, 100.0 * np.append(shares, 1.0), color=MOTION, linewidth=1.6, label="cases within")
+    if limit is not None:
+        axes.axvline(limit, **style.LIMIT)
+        axes.set_xlim(right=max(axes.get_xlim()[1], 1.04 * limit))
+    axes.set(xlabel=name, ylabel="cases within, %", ylim=(0.0, 104.0))
+    axes.grid()
+
+
+def momentum_cases(results: Results) -> Vector:
+    """(n, 2): final H of the first cases as angles in degrees, from the target or from its initial direction.
+
+    Directions are those of `geometry.sky_plane`; the distance from zero is the error or the momentum shift.
+    """
+    model = results.study.model
+    vectors = results.early[VECTORS[requirements.aim(model.spacecraft).value], : min(results.done, EARLY)].T
+    turn = model.spacecraft.initial.quaternion
+    plane = geometry.sky_plane(results.study.nominal, attitude.rotate(turn, model.target))
+    across = (attitude.rotate(turn, vectors) @ plane.T)[:, :2]
+    size = np.linalg.norm(across, axis=1)
+    angle = np.degrees(2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(vectors, axis=1), 0.0, 1.0)))
+    return np.asarray(across * np.divide(angle, size, out=np.zeros_like(angle), where=size > 0.0)[:, None])
+
+
+def ellipse(points: Vector, share: float) -> Vector:
+    """(m, 2): the ellipse about the mean of ``points`` (n, 2), of their covariance, that holds ``share`` of them."""
+    middle = points.mean(axis=0)
+    variances, vectors = np.linalg.eigh((points - middle).T @ (points - middle) / len(points))
+    sizes = np.sqrt(np.maximum(variances, 0.0))
+    along = (points - middle) @ vectors
+    away = np.hypot(*np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 0.0).T)
+    return np.asarray(middle + geometry.circle() * sizes * float(np.quantile(away, share)) @ vectors.T)
+
+
+def _momentum(axes: Axes, results: Results) -> None:
+    """Final direction of H in each case, seen from outside, with the ellipse that holds as many as must comply."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    body = results.study.model.spacecraft
+    aim = requirements.aim(body)
+    points, limit = momentum_cases(results), style.limit_of(body, aim)
+    # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the centre in each.
+    centre, about = ("H(0)", "the H(0) of each case") if aim is Part.SHIFT else ("the target", "the target")
+    sky = geometry.sky_names(results.study.nominal, centre)
+    widest = float(np.hypot(*points.T).max())
+    if widest < NOTHING:
+        axes.set_title(f"Where H ends, about {about}", **TITLE)
+        style.words(axes, f"all {results.done:,} cases:\nwithin {NEXT_TO_NOTHING} of {centre}")
+        return
+    around = ellipse(points, results.probability)
+    # One path for all dots, as short in a file as can be: strokes of next to no length with round caps.
+    few = points[:DOTS]
+    short = np.array([1e-3 * float(np.ptp(few, axis=0).max()), 0.0])
+    dots = Path(np.stack([few, few + short], axis=1).reshape(-1, 2), [Path.MOVETO, Path.LINETO] * len(few))
+    dots.should_simplify = False
+    # Above the ellipse: where all cases lie on a line, it would hide them.
+    look: dict[str, Any] = {"linewidth": 1.6, "capstyle": "round", "alpha": DENSE, "zorder": 2.5}
+    axes.add_patch(PathPatch(dots, edgecolor=MOTION, facecolor="none", **look))
+    some = f"{len(few):,} of the {results.done:,} cases" if len(few) < results.done else f"the {results.done:,} cases"
+    axes.plot([], [], ".", color=MOTION, alpha=DENSE, label=some)
+    held = f"holds {exact_percent(results.probability)} of the cases"
+    axes.plot(*around.T, color=MOMENTUM, linewidth=1.5, label=held)
+    shown = [points, around]
+    if limit is not None and limit <= FAR * widest:
+        shown.append(limit * geometry.circle())
+        axes.plot(*shown[-1].T, **style.LIMIT)
+    style.square(axes, np.vstack(shown), margin=0.08)
+    if all(low < 0.0 < high for low, high in (axes.get_xlim(), axes.get_ylim())):
+        mark: dict[str, Any] = {"marker": "+", "color": INK, "markersize": 9, "linestyle": "", "zorder": 3}
+        axes.plot(0.0, 0.0, label=centre.removeprefix("the "), **(mark if aim is Part.SHIFT else style.TARGET))
+    axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
+    axes.set(xlabel=sky.x, ylabel=sky.y)
+    axes.set_title(f"Where H ends, about {about}\n{sky.view}", **TITLE)
+
+
+LOOKS = ((MOTION, "o", "-"), (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))), (INK, "s", (0, (5, 1.5))), (GREY, "v", ":"))
+"""Colour, mark and line of the fronts in turn."""
+
+SAME_ENDS = (0.02, 0.002)
+"""Relative differences in end and in cost of points that are drawn as one."""
+
+WIDTH = 14.0
+"""Characters of a line above the picture in an inch of it."""
+
+FEWEST = 3
+"""Ticks of a decade's 1, 2 and 5 below which the axis of time has others."""
+
+
+REACH = 1.4
+"""End of the axis of time over the last end of a schedule: to there its cost holds, as far as the horizon reaches."""
+
+CROSS: dict[str, Any] = {"color": MISSED, "markersize": 9, "markeredgewidth": 1.4, "linestyle": "", "zorder": 3.8}
+"""Look of an x over the mark of a plan that does not meet the requirement."""
+
+CHOSEN: dict[str, Any] = {"color": INK, "markersize": 11, "markerfacecolor": "none", "linestyle": "", "zorder": 4}
+"""Look of the mark of the recommended plan."""
+
+
+@style.styled
+def trade_figure(
+    spacecraft: Spacecraft, fronts: Sequence[Front], chosen: Plan | None = None, *, narrow: bool = False
+) -> Figure:
+    """End of the last firing against propellant (impulse where that is unknown), numbered as in the table.
+
+    ``chosen``: a plan to be marked among them. Fronts that have no points are named, with the reason. ``narrow``: for a
+    phone.
+    """
+    width = style.PHONE if narrow else 7.4
+    figure = style.sheet(width, 4.8)
+    points = [point for _, _, point in numbered(fronts)]
+    how = model_name(point.plan.pulses for point in points)
+    style.heading(figure, spacecraft, f"finish time against cost, {', '.join(schemes_of(fronts))} by {how}")
+    reasons = "\n".join(fill(reason, int(WIDTH * width)) for reason in missing(spacecraft, fronts))
+    if not points:
+        figure.text(0.5, 0.5, reasons, ha="center", va="center", linespacing=1.6)
+        return figure
+    axes = figure.subplots()
+    axes.set_title(reasons, loc="left", **style.NOTE)
+    # A firing of no width at t = 0 ends there, which a log axis has no place for.
+    ends = [point.plan.pulses.end for point in points]
+    ends += [chosen.pulses.end] if chosen is not None and len(chosen.pulses) else []
+    log = min(ends) > 0.0
+    axes.set_xscale("log" if log else "linear")
+    scale, unit = (1e3, "propellant, g") if points[0].unit == "kg" else (1.0, "impulse, N m s")
+    reach = max(min(REACH * max(ends), spacecraft.horizon), 1.03 * max(ends))
+    _draw_fronts(axes, spacecraft, fronts, scale, reach)
+    proved = [point.bounds.rigorous for point in points]
+    if None not in proved:
+        least = min(scale * value for value in proved if value is not None)
+        name = f"lower bound, {written(down(least) / scale, points[0].unit)}"
+        axes.axhline(least, **{**style.LIMIT, "label": name})
+    if chosen is not None and len(chosen.pulses):
+        place = chosen.pulses.end, scale * chosen.pulses.cost_in(points[0].unit)
+        ideal = ", ideal impulses" * chosen.pulses.idealised
+        other = "" if chosen.scheme in schemes_of(fronts) else f" (not traded{ideal})"
+        axes.plot(*place, "D", label=f"recommended: {chosen.scheme}{other}", **CHOSEN)
+    axes.set_xlim(right=reach if reach > 1.03 * max(ends) else 1.03 * reach)
+    axes.margins(y=0.12)
+    axes.set(xlabel="end of the last firing, s", ylabel=unit)
+    if log:
+        _graduate(axes)
+    axes.grid(True, which="both")
+    style.legend(figure, [axes], 3)
+    labels.settle(figure)
+    return figure
+
+
+def _graduate(axes: Axes) -> None:
+    """Ticks at 1, 2 and 5 of each decade, or evenly spaced within part of one."""
+    from matplotlib.ticker import LogLocator, MaxNLocator
+
+    low, high = axes.get_xlim()
+    few = sum(low <= value <= high for value in LogLocator(subs=(1.0, 2.0, 5.0)).tick_values(low, high)) < FEWEST
+    axes.xaxis.set_major_locator(MaxNLocator(6) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+    style.log_axis(axes.xaxis)
+
+
+def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], scale: float, reach: float) -> None:
+    """Step lines to ``reach`` s, with their names, and numbered marks; a schedule of two fronts has one mark."""
+    shown: list[tuple[float, float, list[int]]] = []
+    points = [(index, owner, point.plan.pulses.end, scale * point.cost) for index, owner, point in numbered(fronts)]
+    for front, (colour, mark, line) in zip(fronts, LOOKS * math.ceil(len(fronts) / len(LOOKS)), strict=False):
+        if not front.points:
+            continue
+        own = [(index, end, cost) for index, owner, end, cost in points if owner is front]
+        ends, costs = [end for _, end, _ in own], [cost for _, _, cost in own]
+        name = front_name(front, pointing=spacecraft.goal.axis is not None).replace(" deg", "°")
+        # A schedule serves for every later end, until a cheaper one does.
+        times, levels = np.repeat([*ends, reach], 2)[1:], np.repeat([*costs, costs[-1]], 2)[:-1]
+        axes.plot(times, levels, color=colour, linestyle=line)
+        axes.plot(ends, costs, mark, color=colour, markersize=5, zorder=3.5, clip_on=False)
+        axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
+        for index, end, cost in own:
+            same = next((place for place in shown if _same_ends((end, cost), place[:2])), None)
+            if same is None:
+                shown.append((end, cost, [index]))
+            else:
+                same[2].append(index)
+    failing = [(point.plan.pulses.end, scale * point.cost) for _, _, point in numbered(fronts) if fails(point)]
+    if failing:
+        axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
+    places = np.array([place[:2] for place in shown])
+    for row, (_, _, numbers) in enumerate(shown):
+        meant = labels.Meant(places[[row]], np.delete(places, row, axis=0))
+        labels.add(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
+
+
+def _same_ends(first: tuple[float, float], second: tuple[float, float]) -> bool:
+    return all(math.isclose(a, b, rel_tol=near) for a, b, near in zip(first, second, SAME_ENDS, strict=True))
+
+
+ROWS = 6000
+"""Moments of the envelope, over all windows."""
+
+AFTER = 1.25
+"""End of the time shown over the end of the last firing of the plan."""
+
+TURNS = 2.0
+"""Periods of the nutation that are shown at least."""
+
+SHALLOW = 1e-3
+"""Depth of the envelope below 0 that is the step of the linear program in time."""
+
+
+@style.styled
+def certificate_figure(proof: Certificate) -> Figure:
+    """Envelope of 1 − q of all channels, as far as the plan fires, with the firings of program and plan.
+
+    q is the worth of a second of firing over its cost, by the prices of the proof: where 1 − q > 0, to fire costs more
+    than it is worth.
+    """
+    times = moments(proof)
+    curves = [1.0 - proof.primer(span).max(axis=1) for span in times]
+    figure = style.sheet(7.4, 3.9)
+    axes = figure.subplots()
+    for span, curve in zip(times, curves, strict=True):
+        axes.plot(span, curve, color=MOTION, label="least 1 − q of all channels")
+    last, later = float(times[-1][-1]), 0
+    for name, fired, mark in _firings(proof):
+        places = [(t, 1.0 - proof.primer(np.array([t]))[0, index]) for t, index in fired if t <= last]
+        later += len(fired) - len(places)
+        look = {"color": PULSE, "markersize": 5, "linestyle": "", "fillstyle": "none", "markeredgewidth": 1.3}
+        axes.plot(*np.array(places).reshape(-1, 2).T, marker=mark, label=name, **look)  # type: ignore[arg-type]
+    axes.axhline(0.0, color=GREY, linewidth=1.0)
+    lowest = min(float(curve.min()) for curve in curves)
+    axes.margins(x=0.02, y=0.08)
+    axes.set(xlabel="time, s", ylabel="1 − q: cost less worth, over cost")
+    text = "below 0 a firing would be worth more than it costs: nowhere here"
+    if lowest < -SHALLOW:
+        gain = written(proof.proof.gained, proof.problem.unit)
+        text = f"below 0 a channel is on for long: the gain there, {gain}, is taken off the bound"
+    text += f"; firings of the program after {style.number(last)} s: {later}" * bool(later)
+    axes.set_title(text, loc="left", color=INK, **style.NOTE)
+    axes.grid()
+    style.legend(figure, [axes])
+    bound = written(proof.bound, proof.problem.unit)
+    style.heading(figure, proof.spacecraft, f"primer by the linear program of small angles\nsmall-angle bound {bound}")
+    return figure
+
+
+def moments(proof: Certificate) -> list[Vector]:
+    """Moments (n,) s of each window that matters: until soon after the last firing of the plan."""
+    shortest = TURNS * proof.spacecraft.body_period
+    until = max(AFTER * proof.plan.pulses.end, min(shortest, proof.windows[-1][1]))
+    spans = [(begins, min(ends, until)) for begins, ends in proof.windows if begins < until]
+    pace = ROWS / max(sum(ends - begins for begins, ends in spans), 1e-9)
+    return [np.linspace(begins, ends, int((ends - begins) * pace) + 2) for begins, ends in spans]
+
+
+def _firings(proof: Certificate) -> list[tuple[str, list[tuple[float, int]], str]]:
+    """Firings of the linear program and of the plan: moments, s, and channels, with name and mark."""
+    names = [channel.name for channel in proof.program.channels]
+    program = [(burn.t, names.index(burn.channel.name)) for burn in proof.burns]
+    plan = [(pulse.t, names.index(pulse.channel)) for pulse in proof.plan.pulses]
+    return [("firings of the program", program, "o"), ("firings of the plan", plan, "x")]
+
+
+SPREAD = 6.0
+"""Standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge."""
+
+ROUNDING = 1e-3
+"""Share of the noise taken for the digits below which all residuals are rounding: of real noise some are above it."""
+
+SIGNAL_LOOKS = tuple((colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY))
+"""Colour and line of the signals in turn."""
+
+FARTHEST = 6.0
+"""Pulls beyond are drawn at the edge."""
+
+
+@style.styled
+def fit_figure(fit: Fit) -> Figure:
+    """Residuals of the signals below each other; beside them autocorrelations, and pulls of the parameters."""
+    signals = fit.model.signals
+    figure = style.sheet(8.6, max(4.8, 1.2 + 1.15 * len(signals)))
+    sides = figure.add_gridspec(1, 2, width_ratios=[1.2, 1.0])
+    rows, others = sides[0].subgridspec(len(signals), 1), sides[1].subgridspec(2, 1)
+    left: list[Axes] = []
+    for index in range(len(signals)):
+        left.append(figure.add_subplot(rows[index], sharex=left[0] if left else None))
+        _residuals(left[-1], fit, index)
+        left[-1].tick_params(labelbottom=index + 1 == len(signals))
+    left[0].set_title("Residuals: data less fit")
+    left[-1].set_xlabel("time, s")
+    white, pulls = figure.add_subplot(others[0]), figure.add_subplot(others[1])
+    _autocorrelation(white, fit)
+    _pulls(pulls, [row for row in estimates(fit, 0.0) if row.change is not None and row.prior])
+    style.legend(figure, [*left, white])
+    shape = "symmetric" if fit.model.body(fit.named).symmetric else "triaxial"
+    count = int(np.count_nonzero(fit.used))
+    style.heading(figure, fit.model.spacecraft, f"fit of a free rigid body, {shape}, to {count:,} samples")
+    return figure
+
+
+def _residuals(axes: Axes, fit: Fit, index: int) -> None:
+    """Residuals of a signal with three sigma of its noise."""
+    unit, factor = in_shown(fit.model.signals[index])
+    unit = unit.replace("deg", "°")
+    rows, noise = fit.model.signal == index, float(fit.noise[index])
+    axes.set_ylabel(f"{fit.model.signals[index]}, {unit}")
+    if _rounding(fit, index):
+        axes.text(0.5, 0.5, "only rounding", transform=axes.transAxes, ha="center", va="center")
+        axes.set_yticks([])
+        return
+    limit = factor * SPREAD * noise
+    left, kept = np.clip(factor * fit.residuals[rows], -limit, limit), fit.used[rows]
+    times = fit.model.times[rows]
+    axes.plot(
+        times[kept],
+        left[kept],
+        color=SIGNAL_LOOKS[index % len(SIGNAL_LOOKS)][0],
+        linestyle="",
+        marker=".",
+        markersize=2.0,
+    )
+    if not kept.all():
+        axes.plot(times[~kept], left[~kept], color=INK, linestyle="", marker="x", label="left out")
+    for side in (-3.0, 3.0):
+        axes.axhline(side * factor * noise, color=GREY, linewidth=0.9, linestyle="--", label="3 sigma")
+    axes.set_ylim(-1.08 * limit, 1.08 * limit)
+    axes.grid()
+
+
+def _rounding(fit: Fit, index: int) -> bool:
+    """True where data and fit are the same but for the rounding of their numbers."""
+    rows = (fit.model.signal == index) & fit.used
+    largest = np.abs(fit.residuals[rows]).max(initial=0.0)
+    return bool(largest <= ROUNDING * float(fit.noise[index]))
+
+
+def _autocorrelation(axes: Axes, fit: Fit) -> None:
+    """Autocorrelation of the residuals of all signals, with the band of white noise."""
+    axes.set_title("Autocorrelation of the residuals")
+    bands = []
+    for index, (name, (colour, line)) in enumerate(zip(fit.model.signals, SIGNAL_LOOKS, strict=False)):
+        correlations = fit.whiteness(index)
+        if len(correlations) and not _rounding(fit, index):
+            lags = np.arange(1, len(correlations) + 1)
+            axes.plot(lags, correlations, color=colour, linestyle=line, linewidth=1.0, label=name)
+            bands.append(1.96 / np.sqrt(int((fit.used & (fit.model.signal == index)).sum())))
+    if not bands:
+        style.words(axes, "too few samples, or only rounding")
+        return
+    axes.axhspan(-max(bands), max(bands), facecolor=GREY, alpha=0.25, linewidth=0.0, label="95 % of white noise")
+    most = max(float(np.abs(line.get_ydata()).max()) for line in axes.lines)
+    size = min(1.0, 1.15 * max(most, 2.0 * max(bands)))
+    axes.set(xlabel="lag, samples", ylim=(-size, size))
+    axes.grid()
+
+
+def _pulls(axes: Axes, rows: list[Estimate]) -> None:
+    """Value less that of the file, with one sigma after the fit, both over the sigma of the file."""
+    axes.set_title("Pulls: change from the file")
+    if not rows:
+        style.words(axes, "the file has no tolerances of what is fitted")
+        return
+    places = -np.arange(len(rows), dtype=float)
+    changes = np.clip([row.change or 0.0 for row in rows], -FARTHEST, FARTHEST)
+    sigmas = [min(row.sigma / (row.prior or 1.0), FARTHEST) for row in rows]
+    axes.axvspan(-1.0, 1.0, facecolor=GREY, alpha=0.25, linewidth=0.0)
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    look: dict[str, Any] = {"fmt": "o", "color": MOTION, "markersize": 4, "elinewidth": 1.2, "capsize": 2.0}
+    axes.errorbar(changes, places, xerr=sigmas, **look)
+    reach = max(2.0, 1.1 * float((np.abs(changes) + sigmas).max()))
+    axes.set(xlabel="sigmas of the file", xlim=(-reach, reach), ylim=(0.6 - len(rows), 0.6))
+    axes.set_yticks(places, [row.label for row in rows])
+    axes.grid(axis="x")
