@@ -62,6 +62,9 @@ SHARES = np.linspace(0.0, 1.0, 13)[1:]
 CHEAPER = 0.9
 """Multiple of the cost of a sequence below which one that leaves more is looked at, too."""
 
+DEAR = 1.5
+"""Multiple of the least cost of lowering the nutation above which further blocks are looked for though one complies."""
+
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
 
@@ -118,7 +121,7 @@ class BlockSearch:
         firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
             self.most = self.least_cost(sequences)
-            if work.exhausted() or (self.most < math.inf and not self.small):
+            if work.exhausted() or (self.most < math.inf and not (self.small or self._dear)):
                 break
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
@@ -154,6 +157,22 @@ class BlockSearch:
                 if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return sequence.rank[1]
         return math.inf
+
+    @property
+    def _dear(self) -> bool:
+        """True where the nutation alone has to be lowered, and more blocks may cost much less than those that comply.
+
+        The least is what kicks cost that all point against ω, or two pulses.
+        """
+        if self._free == 1:
+            return False
+        kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(self.body.axial)
+        least = math.inf
+        for channel in filter(lambda each: each.transverse, self.channels):
+            shortest = float(acts(channel, commandable_widths(self.commands, channel)).on_time.min())
+            lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
+            least = min(least, channel.cost_rate(by_propellant=True) * lasts)
+        return self.most > DEAR * least
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
