@@ -164,7 +164,7 @@ def _prospect(
     known = carried(imagined, time - (fitted.model.record.end - length))
     body = plan.spacecraft
     dispersed = replace(body, dispersions=posterior(fitted.model.spacecraft.dispersions, known))
-    nutation, met = _left(dispersion.study_of(dispersed, plan.pulses), level)
+    nutation, met = left_in_cases(dispersion.study_of(dispersed, plan.pulses), level)
     at = imagined.index("C/A")
     assert at is not None
     return Prospect(
@@ -179,7 +179,7 @@ def _prospect(
     )
 
 
-def _left(study: Study, level: float) -> tuple[float, float | None]:
+def left_in_cases(study: Study, level: float) -> tuple[float, float | None]:
     """Nutation, rad, that the share ``level`` of the cases stays below, and the share that meets the requirement.
 
     The closed form tells which cases are near one or the other, by as much as it errs for those: these are flown.
