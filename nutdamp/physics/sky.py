@@ -210,7 +210,7 @@ class AxisWatch:
 
 
 def _extreme(rise: Array, before: Array, after: Array) -> Array:
-    """Where the cubic that gains a ``rise`` from 0 to 1, with slopes of either sign there, is level."""
+    """Level point of a cubic from 0 to 1 that gains a ``rise``, with slopes ``before`` and ``after`` of either sign."""
     square, linear = 3.0 * (before + after - 2.0 * rise), 6.0 * rise - 4.0 * before - 2.0 * after
     root = np.sqrt(np.maximum(linear * linear - 4.0 * square * before, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
