@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
     from nutdamp.errors import NutdampError
     from nutdamp.estimation.forecast import Fitted
-    from nutdamp.flight.propagation import Flight, Residual
-    from nutdamp.flight.track import Track
+    from nutdamp.flight.propagation import Flight, Residual, Track
     from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.html import Report
     from nutdamp.planning.decision import Comparison, Simulation
@@ -111,8 +110,7 @@ _HOMES = {
     "nutdamp.control_loop.evaluation": ("LoopPlan", "LoopVerification"),
     "nutdamp.errors": ("NutdampError",),
     "nutdamp.estimation.forecast": ("Fitted",),
-    "nutdamp.flight.propagation": ("Flight", "Residual"),
-    "nutdamp.flight.track": ("Track",),
+    "nutdamp.flight.propagation": ("Flight", "Residual", "Track"),
     "nutdamp.montecarlo.study": ("Dispersion",),
     "nutdamp.page.html": ("Report",),
     "nutdamp.planning.decision": ("Comparison", "Simulation"),

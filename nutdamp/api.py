@@ -322,7 +322,7 @@ def disperse(
     >>> nutdamp.disperse(nutdamp.plan(nutdamp.example(), "two-pulse"), 100)
     <Dispersion: 100 of 100 cases comply>
     """
-    from nutdamp.files import samples as rows
+    from nutdamp.files import export as rows
     from nutdamp.montecarlo import study as dispersion
     from nutdamp.planning.plan import feasible
 
@@ -363,7 +363,7 @@ def disperse_loop(
     <LoopDispersion: 2 of 2 cases comply>
     """
     from nutdamp.control_loop import dispersion
-    from nutdamp.files.samples import streamed
+    from nutdamp.files.export import streamed
     from nutdamp.views.loop_cases import LoopCasesWriter
 
     end = None if until is None else units.end_of_flight(until)

@@ -13,6 +13,7 @@ from nutdamp.cli.job import (
     DEFAULT_FILE,
     FileInput,
     Job,
+    SessionCommand,
     deliver,
     expect_outputs,
     quiet_option,
@@ -21,7 +22,7 @@ from nutdamp.cli.job import (
     spacecraft_argument,
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
-from nutdamp.cli.options import FILE, OUTPUT, SessionCommand, goal_options
+from nutdamp.cli.options import FILE, OUTPUT, goal_options
 from nutdamp.cli.screen import console, say, show, units_of_screen
 from nutdamp.errors import nearest, printable
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from nutdamp.errors import Fault
-    from nutdamp.files.overrides import Setting
+    from nutdamp.files.editing import Setting
 
 
 @click.command("check")
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @screen_options
 @quiet_option
-def command(
+def check_command(
     files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
 ) -> None:
     """Check spacecraft files: all faults of all files, derived quantities, channel torques, smallest steps."""

@@ -120,7 +120,7 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
     """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
     from nutdamp.errors import Infeasible
     from nutdamp.planning.notes import comparison_warnings, reasons
-    from nutdamp.views.notes import joined
+    from nutdamp.views.text import joined
 
     compared = compared_with(job, ())
     plan = compared.recommended

@@ -16,10 +16,23 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import click
 
-from nutdamp.cli.options import END, FILE, OUTPUT, Aim, Command, FileName, NameType, OutputName, options_in
+from nutdamp.cli.options import (
+    END,
+    FILE,
+    GOAL,
+    NO_SUN,
+    OUTPUT,
+    WIDEST,
+    Aim,
+    Command,
+    FileName,
+    NameType,
+    OutputName,
+    options_in,
+)
 from nutdamp.cli.screen import UNITS, say, show, units_of_screen, working
 from nutdamp.errors import Fault, FaultyFile, NutdampError, Unsuitable, printable
-from nutdamp.schemes.catalogue import Options
+from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, Options, names_of
 from nutdamp.units import SI, US
 
 if TYPE_CHECKING:
@@ -30,7 +43,7 @@ if TYPE_CHECKING:
 
     from nutdamp.common.results import Note
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.overrides import Setting
+    from nutdamp.files.editing import Setting
     from nutdamp.files.reader import Source
     from nutdamp.planning.plan import Plan
     from nutdamp.spacecraft.model import Spacecraft
@@ -84,7 +97,7 @@ class FileInput(NamedTuple):
 def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]) -> tuple[Setting, ...]:
     if not texts:
         return ()
-    from nutdamp.files.overrides import parse_setting
+    from nutdamp.files.editing import parse_setting
 
     try:
         return tuple(parse_setting(text) for text in texts)
@@ -265,7 +278,7 @@ class Job:
 
     def note(self, notes: Iterable[Note]) -> None:
         """Print notes on results on standard error, unless quiet."""
-        from nutdamp.views.notes import message
+        from nutdamp.views.text import message
 
         with units_of_screen():
             for entry in notes:
@@ -346,7 +359,7 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
     """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
-    from nutdamp.views.plan_json import infeasible_json
+    from nutdamp.views.pulses import infeasible_json
 
     path, spacecraft = context.meta[UNDER_WAY]
     deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
@@ -392,3 +405,46 @@ def _file_of(content: Content, path: str) -> str | bytes | Callable[[IO[bytes]],
     from nutdamp.figures.image import rendered
 
     return rendered(content, path)
+
+
+class SessionCommand(click.Command):
+    """A command whose help page has headings, and whose errors say where the options of the schemes are.
+
+    The parameters that commands share are gathered into ``job``.
+    """
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an unsuitable value of the spacecraft file is a fault with its place there."""
+        ctx.params = {"job": (job := job_of(self, ctx.params)), **ctx.params}
+        try:
+            return super().invoke(ctx)
+        except Unsuitable as wrong:
+            raise placed(wrong, job.given) from None
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options under their headings, those without one first."""
+        groups: dict[str, list[tuple[str, str]]] = {"Options": [], GOAL: []}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None and isinstance(parameter, click.Option):
+                groups.setdefault(getattr(parameter, "group", "Options"), []).append(record)
+        for heading, records in groups.items():
+            if records:
+                with formatter.section(heading):
+                    formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse as click does; the error for an option of a scheme that is not taken here says where to give it."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as wrong:
+            name = wrong.option_name.removeprefix("--").replace("-", "_")
+            readers = SUNLIT if name == "sun" else [each for each in SCHEMES if name in names_of(SCHEMES[each].options)]
+            if not readers or all(parameter.name != "target" for parameter in self.params):
+                raise
+            if name == "sun":
+                raise click.UsageError(NO_SUN, ctx) from None
+            message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
+            if any(parameter.name == "schedule" for parameter in self.params):
+                message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
+            raise click.UsageError(message, ctx) from None

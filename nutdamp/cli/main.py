@@ -165,40 +165,28 @@ def _explain(wrong: Exception) -> int:
 
 
 COMMANDS = {
-    "plan": "Plan pulse schedules that damp the nutation, and compare them.",
-    "simulate": "Propagate a scheme or a schedule; cone angles and axis track.",
-    "trade": "Trade finish time against propellant.",
-    "loop": "Fire from a gyro or an accelerometer, in a closed loop.",
-    "budget": "Hold the nutation: pulses a day, propellant a year.",
-    "fit": "Estimate motion, C/A and thrust from telemetry; re-plan.",
-    "disperse": "Fly many dispersed cases; percentiles, tolerance budget.",
-    "verify": "Fly a schedule by independent means; an error budget.",
-    "report": "Write a report, one page of HTML.",
-    "animate": "Film the body cone rolling on the space cone.",
-    "check": "Check spacecraft files: all faults, derived quantities.",
-    "export": "A schedule for other tools: CCSDS, STK, Basilisk, JSON.",
-    "import": "A spacecraft file from a CCSDS attitude parameter message.",
-    "explain": "The schemes, the equations, the keys of the file, the units.",
-    "init": "Write a commented spacecraft file to start from.",
-    "schema": "JSON Schema of the spacecraft file, for editors.",
+    "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
+    "simulate": ("plan", "Propagate a scheme or a schedule; cone angles and axis track."),
+    "trade": ("studies", "Trade finish time against propellant."),
+    "loop": ("studies", "Fire from a gyro or an accelerometer, in a closed loop."),
+    "budget": ("studies", "Hold the nutation: pulses a day, propellant a year."),
+    "fit": ("studies", "Estimate motion, C/A and thrust from telemetry; re-plan."),
+    "disperse": ("studies", "Fly many dispersed cases; percentiles, tolerance budget."),
+    "verify": ("check", "Fly a schedule by independent means; an error budget."),
+    "report": ("export", "Write a report, one page of HTML."),
+    "animate": ("plan", "Film the body cone rolling on the space cone."),
+    "check": ("check", "Check spacecraft files: all faults, derived quantities."),
+    "export": ("export", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
+    "import": ("export", "A spacecraft file from a CCSDS attitude parameter message."),
+    "explain": ("check", "The schemes, the equations, the keys of the file, the units."),
+    "init": ("check", "Write a commented spacecraft file to start from."),
+    "schema": ("check", "JSON Schema of the spacecraft file, for editors."),
 }
-"""The subcommands in the order of a first use, with their lines on the help page."""
-
-
-SHARED = {
-    "animate": "simulate",
-    "budget": "loop",
-    "explain": "check",
-    "import": "export",
-    "init": "check",
-    "schema": "check",
-    "verify": "check",
-}
-"""Commands whose module is that of another one."""
+"""The subcommands in the order of a first use, with their modules and their lines on the help page."""
 
 
 class CommandGroup(click.Group):
-    """Group whose subcommands live in modules of their name, or as `SHARED` has it, and load little of others."""
+    """Group whose subcommands are loaded from their modules when they are used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - signature of click
         """Names in the order of a first use."""
@@ -207,7 +195,7 @@ class CommandGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """The commands on the help page, without loading any of them."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -233,8 +221,8 @@ class CommandGroup(click.Group):
         """The command of that name."""
         if cmd_name not in COMMANDS:
             return None
-        module, function = SHARED.get(cmd_name, cmd_name), f"{cmd_name}_command" if cmd_name in SHARED else "command"
-        command: click.Command = getattr(import_module(f"nutdamp.cli.{module}"), function)
+        module = import_module(f"nutdamp.cli.{COMMANDS[cmd_name][0]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
         return command
 
 

@@ -17,7 +17,7 @@ from click.shell_completion import CompletionItem
 
 from nutdamp import units
 from nutdamp.cli.screen import debug_option
-from nutdamp.errors import BadRequest, SenselessOption, Unsuitable, nearest
+from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, SchemeOptions, names_of
 
 if TYPE_CHECKING:
@@ -234,51 +234,6 @@ class Grouped(click.Option):
     def __init__(self, *args: Any, group: str, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.group = group
-
-
-class SessionCommand(click.Command):
-    """A command whose help page has headings, and whose errors say where the options of the schemes are.
-
-    The parameters that commands share are gathered into ``job``.
-    """
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an unsuitable value of the spacecraft file is a fault with its place there."""
-        from nutdamp.cli.job import job_of, placed
-
-        ctx.params = {"job": (job := job_of(self, ctx.params)), **ctx.params}
-        try:
-            return super().invoke(ctx)
-        except Unsuitable as wrong:
-            raise placed(wrong, job.given) from None
-
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The options under their headings, those without one first."""
-        groups: dict[str, list[tuple[str, str]]] = {"Options": [], GOAL: []}
-        for parameter in self.get_params(ctx):
-            record = parameter.get_help_record(ctx)
-            if record is not None and isinstance(parameter, click.Option):
-                groups.setdefault(getattr(parameter, "group", "Options"), []).append(record)
-        for heading, records in groups.items():
-            if records:
-                with formatter.section(heading):
-                    formatter.write_dl(records, col_max=WIDEST if groups[GOAL] else 30)
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse as click does; the error for an option of a scheme that is not taken here says where to give it."""
-        try:
-            return super().parse_args(ctx, args)
-        except click.NoSuchOption as wrong:
-            name = wrong.option_name.removeprefix("--").replace("-", "_")
-            readers = SUNLIT if name == "sun" else [each for each in SCHEMES if name in names_of(SCHEMES[each].options)]
-            if not readers or all(parameter.name != "target" for parameter in self.params):
-                raise
-            if name == "sun":
-                raise click.UsageError(NO_SUN, ctx) from None
-            message = f"{wrong.option_name} is for {' and '.join(readers)}, an option of `nutdamp plan`"
-            if any(parameter.name == "schedule" for parameter in self.params):
-                message += ": save its pulses with --csv FILE, and name them here with --schedule FILE"
-            raise click.UsageError(message, ctx) from None
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:

@@ -1,18 +1,438 @@
-"""Propellant and pulses a year that hold the nutation against energy dissipation, and how long the tank lasts."""
+"""Propellant and pulses a year that hold the nutation against energy dissipation, and how long the tank lasts.
+
+They are those of the limit cycle of the loop from event to event. Coasts are in closed form, firings by the law itself.
+Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ; noise decides in
+which sample a threshold is first reached. Only the few samples in which a channel may come to fire are worked out one
+by one. Many cycles are followed side by side, from random phases, until their mean is known. tan θ = tan θ0 e^{κt}
+tells by when damping must begin.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from nutdamp.common import results
-from nutdamp.control_loop.limit_cycle import Cycle, Map
-from nutdamp.control_loop.stability import Band, dead_band, feeding, margins, too_late
-from nutdamp.errors import BadRequest, Infeasible
+from nutdamp.control_loop.controller import SAMPLED, Watch
+from nutdamp.control_loop.law import Actuator, ComplexArray, Law
+from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_damping, transfer
+from nutdamp.errors import Infeasible
+from nutdamp.flight.propellant import Supply
+from nutdamp.physics.thruster import Ramp, shape_factor
 from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.equipment import Loop
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, channel_pulse
+
+Rows = NDArray[np.int64]
+
+
+class Cycle(NamedTuple):
+    """Limit cycle; rates are 1/s.
+
+    ``pulses``, ``cycles`` (from pause to pause; 0 where the loop never pauses), ``impulse`` N m s/s and ``propellant``
+    kg/s (None where it is not known), ``spin_rate`` rad/s², ``doubt``: one sigma of ``pulses`` over it. Nutation, rad:
+    ``high`` as firings begin (mean), ``low`` as they have ended (geometric mean), of each cycle, and the ``largest``.
+    """
+
+    pulses: float
+    cycles: float
+    impulse: float
+    propellant: float | None
+    spin_rate: float
+    doubt: float
+    high: float
+    low: float
+    largest: float
+
+
+class Sums(NamedTuple):
+    """Sums of a chain up to the last pulse: its time (s), and its largest and last |z|, rad/s."""
+
+    time: float = 0.0
+    pulses: float = 0.0
+    impulse: float = 0.0
+    propellant: float = 0.0
+    spin: float = 0.0
+    cycles: float = 0.0
+    largest: float = 0.0
+    last: float = 0.0
+
+
+ADDED = 6
+"""Columns of `Sums` of which differences count."""
+
+
+@dataclass(eq=False)
+class Chains:
+    """State of each chain: z at the sample ``number``, previous waits of its channels, noise of its samples.
+
+    ``fresh``: at the first estimate after a firing. ``ready`` s: from when on it may fire again.
+    """
+
+    z: ComplexArray
+    number: Rows
+    active: NDArray[np.bool_]
+    fresh: NDArray[np.bool_]
+    ready: Vector
+    carried: Vector
+    white: ComplexArray
+    sums: list[Sums]
+    firings: list[list[Sums]]
+    cycles: list[list[Sums]]
+
+    def some(self, rows: list[int]) -> Chains:
+        """Sums of some of the chains."""
+        return replace(self, firings=[self.firings[row] for row in rows], cycles=[self.cycles[row] for row in rows])
+
+
+CHAINS, CYCLES, SETTLING = 64, 16, 2
+"""Cycles followed side by side, counted cycles of each, and cycles before those."""
+
+FIRINGS = 200
+"""Firings of each, at most."""
+
+FEW = 4
+"""Cycles per so many firings below which firings are counted instead."""
+
+MOST_STEPS = 100_000
+"""Stretches in all, at most."""
+
+ROWS = 128
+"""Largest number of samples computed one by one at a time."""
+
+EARLY, LATE = 0.003, 3.0
+"""Probabilities of the start threshold between which samples are examined one by one."""
+
+LONGEST_LOOKED = 10_000
+"""Largest number of samples examined one by one."""
+
+SIGMAS = 5.0
+"""Reach of noise, sigmas, in which a channel may come to fire."""
+
+OUTGROWN = 4.0
+"""Multiple of the expected dead band at which a loop does not hold the nutation."""
+
+OVERSHOOT = 0.82
+"""Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times."""
+
+RISING = 1.1
+"""Growth of the nutation from the first of many firings to the middle, and on, where it is not held."""
+
+TOO_FAST = "the nutation grows faster than the firings damp it"
+
+REFINED = 4
+"""Steps in which the moment of a firing is found on a continuous signal."""
+
+
+class Map:
+    """From event to event of the ``loop`` of a ``spacecraft`` with growing nutation, ``used`` kg of propellant gone.
+
+    Raises Infeasible where no law can work. Blackout windows, and nozzles that are cold at first, are left out.
+    """
+
+    def __init__(self, spacecraft: Spacecraft, loop: Loop, *, used: float = 0.0, seed: int = 1) -> None:
+        limits = replace(spacecraft.limits, blackout=(), earliest=0.0)
+        tank = spacecraft.tank and spacecraft.tank.doubled  # so that none runs empty amid a cycle
+        self.truth, self.used = replace(spacecraft, cold=None, tank=tank, limits=limits), used
+        self.law, self.spin = Law(self.truth, loop), spacecraft.spin
+        self.watch, self.rng = Watch(self.law, 0.0), np.random.default_rng(seed)
+        self.seen = transfer(self.law, self.spin)
+        self.turn = complex(self.law.growth, -float(self.law.rate(self.spin)))
+        self.start, self.stop = (self.law.size(angle, self.spin) for angle in (loop.start, loop.stop))
+        self.channels = {channel.name: channel for channel in spacecraft.channels}
+        self.up = Odds(self.seen, self.start, self.law.growth, below=False)
+        self.down = Odds(self.seen, self.stop, self.law.growth, below=True) if self.stop > 0.0 else None
+        self.near = self._near()
+        reach, half = SIGMAS * self.seen.sigma + abs(self.seen.offset), abs(0.5 * self.turn.imag)
+        acts = [abs(actuator.kick) * abs(math.sin(half * actuator.shortest)) / half for actuator in self.law.actuators]
+        self.smallest = min(acts)
+        self.reach, self.helps = reach, (0.5 * min(acts) - reach) / abs(self.seen.direct)
+        self.bound = OUTGROWN * (max(self.start, *acts) + 2.0 * reach) / abs(self.seen.direct)
+        self.memory = len(self.seen.weights) if len(self.seen.weights) > 1 else 0
+        self.shapes: dict[tuple[str, float], complex] = {}
+
+    def cycle(self, chains: int = CHAINS, cycles: int = CYCLES) -> Cycle:
+        """Limit cycle; raises Infeasible where the loop does not hold the nutation."""
+        at = self._begin(chains)
+        self._follow(at, SETTLING + cycles, FIRINGS)
+        return self._summed(at)
+
+    def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
+        """Limit cycles that chains converge to, by their number: with pauses, and without.
+
+        They begin as for `cycle`, or fire already at ``z`` rad/s. Raises Infeasible as that does.
+        """
+        at = self._begin(chains)
+        if z is not None:
+            self.bound = max(self.bound, 1.1 * abs(z))
+            at.z[:], at.number[:], at.active[:], at.carried[:] = z, 0, True, math.nan
+        # Until each has paused or fires on at the same size.
+        self._follow(at, 0, FIRINGS + round(abs(z or 0.0) / max(self.smallest, 1e-9 * abs(z or 1.0))))
+        at.sums = [total._replace(pulses=0.0, cycles=0.0) for total in at.sums]
+        at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
+        self._follow(at, SETTLING + CYCLES, FIRINGS)
+        parts = [[row for row, cycle in enumerate(at.cycles) if bool(cycle) is pauses] for pauses in (True, False)]
+        return tuple(self._summed(at.some(part)) for part in sorted(parts, key=len, reverse=True) if part)
+
+    def _follow(self, at: Chains, cycles: int, firings: int) -> None:
+        """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
+        going = np.ones(len(at.z), dtype=bool)
+        for _ in range(MOST_STEPS):
+            self._wake(at, np.flatnonzero(going & ~at.active))
+            self._skip(at, np.flatnonzero(going & at.active & ~at.fresh))
+            self._look(at, np.flatnonzero(going))
+            going = np.array([total.cycles <= cycles and total.pulses < firings for total in at.sums])
+            if not going.any():
+                return
+        raise Infeasible(f"the limit cycle is not reached within {MOST_STEPS} coasts")
+
+    def _near(self) -> float | None:
+        """Size of z from which on every sample is examined until one shows the start threshold.
+
+        None where the chances of the samples add up: where the noise of each is new, or z grows little while it lasts.
+        """
+        seen = self.seen
+        if not any(seen.grain) and (seen.fresh > 0.5 or seen.sigma == 0.0):
+            return None
+        # No more likely than if each sample had a chance of its own.
+        bound = Odds(seen._replace(fresh=1.0), self.start, self.law.growth, below=False)
+        first, last = (
+            float(odds.size(1e-3 * self.start, chance)) for odds, chance in ((bound, EARLY), (self.up, LATE))
+        )
+        return first if math.log(last / first) / (self.turn.real * seen.step) < LONGEST_LOOKED else None
+
+    def _begin(self, count: int) -> Chains:
+        """Coasts at half the start threshold, in random phases."""
+        z = 0.5 * self.start / abs(self.seen.direct) * np.exp(1j * self.rng.uniform(0.0, 2.0 * math.pi, count))
+        number = self.rng.integers(1, 2 + round(self.law.period / self.seen.step), count)
+        quiet, waits = np.zeros(count, dtype=bool), np.full((len(self.law.actuators), count), math.nan)
+        firings: list[list[Sums]] = [[] for _ in range(count)]
+        cycles: list[list[Sums]] = [[] for _ in range(count)]
+        sums, white = [Sums() for _ in range(count)], self._drawn(count)
+        return Chains(z, number, quiet, quiet.copy(), np.zeros(count), waits, white, sums, firings, cycles)
+
+    def _drawn(self, rows: int) -> ComplexArray:
+        return self.seen.drawn(self.rng, rows, len(self.seen.weights))
+
+    def _waits(self, seen: ComplexArray) -> Vector:
+        """`Law.waits` of all channels, (channels, ...)."""
+        return self.watch.waits(seen, np.full(seen.shape, self.spin))
+
+    def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
+        """Advance coasts by some samples, and forget the noise of those before."""
+        at.z[rows] *= np.exp(self.turn * self.seen.step * samples)
+        at.number[rows] += samples
+        at.white[rows] = self._drawn(len(rows))
+        at.carried[:, rows] = self._waits(self.seen.mean(at.z[rows] * np.exp(-self.turn * self.seen.step)))
+
+    def _until(self, size: Vector | float, now: Vector) -> Rows:
+        """Samples until |z| has grown from ``now`` to ``size``."""
+        samples = np.log(np.maximum(size / now, 1.0)) / (self.turn.real * self.seen.step)
+        return np.asarray(np.ceil(samples - SAMPLED), dtype=np.int64)
+
+    def _wake(self, at: Chains, rows: Rows) -> None:
+        """From pauses to the sample that first shows the start threshold, or to where each is looked at."""
+        now = np.abs(at.z[rows])
+        if (now <= FARTHEST * self.start).any():
+            raise Infeasible("a firing leaves nothing that could grow: sensor and valves have no errors")
+        if self.near is not None:
+            far = now < self.near
+            self._goes(at, rows[far], self._until(self.near, now[far]))
+            return
+        self._goes(at, rows, self._until(self.up.size(now, self.rng.exponential(size=len(rows))), now))
+        at.active[rows] = True
+        if not any(self.seen.scatter):
+            return
+        for row in rows.tolist():
+            mean = complex(self.seen.mean(at.z[row]))
+            short = (self.start - abs(mean)) / self.seen.sigma
+            if short > 0.0:  # the noise of this sample is what was missing, and a little more
+                more = short + self.rng.exponential() * min(
+                    1.0 / max(short, 1.0), OVERSHOOT * math.sqrt(self.seen.fresh)
+                )
+                at.white[row] += self.seen.change(at.white[row], mean / abs(mean), more * self.seen.sigma)
+
+    def _skip(self, at: Chains, rows: Rows) -> None:
+        """Over the samples in which no channel can come to fire: to the first that may, or to a pause."""
+        size, mean = np.abs(at.z[rows]), self.seen.mean(at.z[rows])
+        waits = self._waits(mean)
+        share = np.minimum(self.reach / np.maximum(np.abs(mean), self.reach + 1e-300), 1.0)
+        slack = 3.0 * self.seen.step + 0.25 * share * self.law.period
+        ahead = self._ahead
+        due = np.where(waits < ahead - slack, waits + self.law.period, waits) - ahead - slack
+        idle = np.isnan(due).all(axis=0)
+        soonest = np.where(idle, 0.0, np.where(np.isnan(due), math.inf, due).min(axis=0))
+        samples = np.maximum(np.floor(soonest / self.seen.step), 0.0).astype(np.int64)
+        samples[samples < self.memory] = 0
+        useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
+        samples[useless] = self._until(self.helps, size[useless])
+        for row in rows[useless].tolist():
+            self._rest(at, row)
+        if self.down is not None:
+            event = self.down.size(size, self.rng.exponential(size=len(rows)))
+            quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
+            samples[quiet] = self._until(event[quiet], size[quiet])
+            at.active[rows[quiet]] = False
+            for row in rows[quiet & ~useless].tolist():
+                self._rest(at, row)
+        moved = samples > 0
+        self._goes(at, rows[moved], samples[moved])
+
+    @property
+    def _ahead(self) -> float:
+        """Lead of the decision on a firing before its start, s."""
+        return self.seen.step if self.law.loop.predict or self.law.loop.sensor.rate is None else 0.0
+
+    def _look(self, at: Chains, rows: Rows) -> None:
+        """Examine the next samples one by one, up to the first event of each."""
+        step = self.seen.step
+        count = min(max(math.ceil(0.5 * self.law.period / step), 4), ROWS)
+        white = np.concatenate([at.white[rows], self.seen.drawn(self.rng, len(rows), count)], axis=1)
+        course = np.exp(self.turn * step * np.arange(count))
+        seen = self.seen.stepped(self.seen.mean(at.z[rows][:, None] * course) + self.seen.noise(white))
+        awake = np.logical_or.accumulate((np.abs(seen) >= self.start) | at.active[rows, None], axis=1)
+        waits = np.full((len(at.carried), *seen.shape), math.nan)
+        some = awake[:, -1]
+        waits[:, some] = self._waits(seen[some])
+        waits[:, ~some, -1] = self._waits(seen[~some, -1])
+        fires = self.watch.triggered(np.concatenate([at.carried[:, rows, None], waits], axis=2), self._ahead)
+        downs = awake & (np.abs(seen) <= self.stop)
+        firsts = np.where(downs.any(axis=1), downs.argmax(axis=1), count)
+        at.active[rows] = awake[:, -1]
+        fires &= awake & (np.arange(count) < firsts[:, None])
+        passes = np.ones(len(rows), dtype=bool)
+        for index in np.flatnonzero(fires.any(axis=(0, 2))).tolist():
+            passes[index] = not self._fires(at, int(rows[index]), seen[index], fires[:, index])
+        for row in rows[passes & (firsts < count)].tolist():
+            at.active[row] = False
+            self._rest(at, row)
+        places, going = np.flatnonzero(passes), rows[passes]
+        passed = np.minimum(firsts[places] + 1, count)
+        at.z[going] *= np.exp(self.turn * step * passed)
+        at.number[going] += passed
+        at.white[going] = white[places[:, None], passed[:, None] + np.arange(white.shape[1] - count)]
+        at.carried[:, going], at.fresh[going] = waits[:, places, passed - 1], False
+
+    def _fires(self, at: Chains, row: int, seen: ComplexArray, fires: NDArray[np.bool_]) -> bool:
+        """First firing at one of the moments at which a channel triggers, if any."""
+        for moment in np.flatnonzero(fires.any(axis=0)).tolist():
+            time = (int(at.number[row]) + moment) * self.seen.step
+            actuators = (self.law.actuators[index] for index in np.flatnonzero(fires[:, moment]).tolist())
+            firings = [
+                firing for each in actuators if (firing := self._firing(each, complex(seen[moment]), time)) is not None
+            ]
+            if not firings:
+                continue
+            start, lasts, pulse, actuator = min(firings, key=lambda firing: firing[0])
+            if self.law.windows.allows(start, lasts, float(at.ready[row])):
+                self._fire(at, row, pulse, actuator)
+                return True
+        return False
+
+    def _firing(self, actuator: Actuator, seen: complex, time: float) -> tuple[float, float, Pulse, Actuator] | None:
+        """Start, length and pulse of a firing decided on z ``seen`` at ``time`` s."""
+        now, law = time + self.law.loop.sensor.delay, self.law
+        firing = law.firing(actuator, seen, self.spin)
+        for _ in range(REFINED if law.loop.sensor.rate is None else 0):  # a continuous signal shows the moment itself
+            if firing is None:
+                return None
+            now, seen = now + firing.wait, seen * complex(np.exp(self.turn * firing.wait))
+            firing = law.firing(actuator, seen, self.spin)
+        if firing is None:
+            return None
+        begins = now + (max(firing.wait, 0.0) if law.loop.predict else 0.0)
+        start = law.windows.nearest_tick(begins)
+        start = law.windows.tick_after(begins) if start < now else start
+        pulse = channel_pulse(self.channels[actuator.channel.name], start + firing.lead, firing.on_time)
+        return start, firing.lasts, pulse if pulse.command is None else commandable(self.truth, pulse), actuator
+
+    def _fire(self, at: Chains, row: int, pulse: Pulse, actuator: Actuator) -> None:
+        """Propagate through a pulse, and on to the first estimate after it."""
+        given = Supply(self.truth, used=self.used).fire(pulse, actuator.channel)
+        level = given.magnitude / pulse.magnitude
+        (begins, ends), time = pulse.thrust, int(at.number[row]) * self.seen.step
+        before, sums = complex(at.z[row]), at.sums[row]
+        size = abs(before) * math.exp(self.turn.real * (begins - time))
+        if size > self.bound:
+            raise Infeasible(TOO_FAST)
+        acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
+        after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
+        spin = actuator.spin_rate * level * pulse.on_time - self._slowed(sums.last, size)
+        spent = math.nan if given.propellant is None else given.propellant
+        at.sums[row] = Sums(
+            pulse.t,
+            sums.pulses + 1.0,
+            sums.impulse + given.magnitude,
+            sums.propellant + spent,
+            sums.spin + spin,
+            sums.cycles,
+            max(sums.largest, size),
+            abs(after),
+        )
+        at.firings[row].append(at.sums[row]._replace(largest=size))
+        at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
+        number = math.ceil((ends + self.seen.first) / self.seen.step - SAMPLED)
+        at.z[row], at.number[row] = after * np.exp(self.turn * (number * self.seen.step - ends)), number
+        at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
+        at.fresh[row] = at.active[row] = True
+
+    def _slowed(self, last: float, size: float) -> float:
+        """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
+        before, after = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (last, size))
+        return float(self.law.inertia.equivalent(self.spin)) * (1.0 - after / before)
+
+    def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
+        """Factor on the effect of a pulse on z by its width, with the growth in it."""
+        key = (pulse.channel, round(pulse.on_time, 9))
+        if key not in self.shapes:
+            ramps = (Ramp(pulse.start, pulse.end, 1.0, 1.0),) if pulse.command is None else pulse.command.ramps
+            moved = [ramp._replace(begin=ramp.begin - pulse.t, end=ramp.end - pulse.t) for ramp in ramps]
+            rate, slope = float(self.law.rate(self.spin)), self.law.slope * actuator.spin_rate
+            self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
+        return self.shapes[key]
+
+    def _rest(self, at: Chains, row: int) -> None:
+        """Record the sums of a finished cycle, if anything was fired in it."""
+        sums = at.sums[row]
+        if sums.largest > 0.0:
+            sums = sums._replace(cycles=sums.cycles + 1.0)
+            at.cycles[row].append(sums)
+            at.sums[row] = sums._replace(largest=0.0)
+
+    def _summed(self, at: Chains) -> Cycle:
+        """Mean of all chains, between the first and the last counted cycle, or firing."""
+        if all(len(cycle) >= SETTLING + FEW for cycle in at.cycles):
+            counted = [cycle[SETTLING:] for cycle in at.cycles]
+        else:
+            counted = [firing[len(firing) // 4 :] for firing in at.firings]
+            places = [[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]
+            sizes = np.array(places).mean(axis=0)
+            if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:
+                raise Infeasible(TOO_FAST)
+        spans = np.array([np.subtract(cycle[-1], cycle[0])[:ADDED] for cycle in counted])
+        total = spans.sum(axis=0)
+        rates = (total / total[0]).tolist()
+        apart = spans[:, 1] - rates[1] * spans[:, 0]
+        angles = self.law.nutation(np.concatenate([np.array(cycle[1:])[:, ADDED:] for cycle in counted]), self.spin)
+        return Cycle(
+            pulses=rates[1],
+            cycles=rates[5],
+            impulse=rates[2],
+            propellant=None if math.isnan(rates[3]) else rates[3],
+            spin_rate=rates[4],
+            doubt=math.sqrt(float((apart**2).sum())) / float(total[1]),
+            high=float(angles[:, 0].mean()),
+            low=float(np.exp(np.log(np.maximum(angles[:, 1], 1e-300)).mean())),
+            largest=float(angles[:, 0].max()),
+        )
+
 
 DAY = 86400.0
 YEAR = 365.25 * DAY
@@ -105,15 +525,6 @@ class Budget(results.Data, results.Written):
         return None if not meets or None in meets else any(meets)
 
 
-def expect_dissipation(spacecraft: Spacecraft) -> None:
-    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor decays."""
-    if spacecraft.dissipation is None:
-        raise BadRequest(
-            "the spacecraft file has no dissipation: it does not say how fast the nutation grows. For example:\n\n"
-            "dissipation: {time_constant: 600 s}"
-        )
-
-
 def budget(
     spacecraft: Spacecraft,
     pairs: Sequence[Thresholds] = (),
@@ -127,7 +538,7 @@ def budget(
     ``largest`` rad: θ_max, default the nutation required. Nothing is held where the nutation does not grow, or the file
     has no loop. ``progress`` is called with the number of pairs done.
     """
-    expect_dissipation(spacecraft)
+    requirements.expect_dissipation(spacecraft)
     required = spacecraft.requirement
     if largest is None and required is not None:
         largest = required.nutation
@@ -147,7 +558,7 @@ def _held(spacecraft: Spacecraft, loop: Loop, seed: int) -> HeldNutation:
     result = HeldNutation(body, pair, requirements.reached(body, loop.start))
     try:
         result = replace(result, band=dead_band(body, loop))
-        _expect_damping(body, loop)
+        expect_damping(body, loop)
         cycles = Map(body, loop, seed=seed)
         cycle, *others = _attractors(body, loop, cycles)
         if cycles.seen.sigma > NOISY * cycles.start:
@@ -174,16 +585,6 @@ def _attractors(body: Spacecraft, loop: Loop, cycles: Map) -> list[Cycle]:
             if all(abs(cycle.pulses - each.pulses) > DIFFERENT * each.pulses for each in distinct):
                 distinct.append(cycle)
     return distinct
-
-
-def _expect_damping(body: Spacecraft, loop: Loop) -> None:
-    """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
-    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
-    if turned:
-        raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
-    late = feeding(body, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
 
 
 def _lasts(body: Spacecraft, loop: Loop, seed: int) -> float | None:

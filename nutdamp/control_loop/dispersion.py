@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.batch import Case, FlownLoops, expects_alone, fly_alone, fly_together
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.simulation import until_default
+from nutdamp.control_loop.simulation import Case, FlownLoops, expects_alone, fly_alone, fly_together, until_default
 from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple

@@ -1,8 +1,11 @@
-"""Stability of the loop channel by channel: nutation removed by a firing against its growth until the next.
+"""Stability of the loop channel by channel, and first passage of its thresholds.
 
 A firing that comes ε late against z leaves |z - J e^{iε}|: its gain is that over |z|, below 1 while cos ε > J/(2|z|).
-Meanwhile energy dissipation lets the nutation grow by e^{κT} in a period T: the loop damps where the
-product is below 1.
+Meanwhile energy dissipation lets the nutation grow by e^{κT} in a period T: the loop damps where the product is below
+1.
+
+On a coast z runs as e^{(κ - iω)t}, ω the rate at which it turns back in the body. An estimate is Σ h_j s_{k-j} of the
+samples s, which shows z times T = Σ h_j e^{-(κ - iω)jΔ}, a constant offset, and of white noise w the sum Σ h_j w_{k-j}.
 """
 
 from __future__ import annotations
@@ -10,15 +13,17 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nutdamp.control_loop.law import Actuator, Law
-from nutdamp.control_loop.sensor import Estimator, lag
+from nutdamp.control_loop.controller import GRID
+from nutdamp.control_loop.law import Actuator, ComplexArray, Law
+from nutdamp.control_loop.sensor import HARMONIC, Estimator, lag
+from nutdamp.errors import Infeasible
 from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
-from nutdamp.spacecraft.equipment import Loop
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
+from nutdamp.spacecraft.model import Spacecraft, Vector
 
 HALVINGS = 60
 """Steps in which the largest lateness that still damps is found."""
@@ -157,3 +162,230 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
 def _shortest(spacecraft: Spacecraft, actuator: Actuator) -> float:
     least = shortest_on_time(spacecraft, actuator.channel)
     return max(actuator.shortest, effective_on_time(actuator.channel, least))
+
+
+FORGOTTEN = 12.0
+"""Time constants of the low-pass filter after which a sample counts no more."""
+
+ENOUGH = 64
+"""Samples of a nutation period that an accelerometer is followed by, at most about twice as many."""
+
+LONGEST_RESPONSE = 4096
+"""Samples that count, at most."""
+
+
+class Transfer(NamedTuple):
+    """An estimate of z by samples ``step`` s apart: ``weights`` h (n,), the newest sample first.
+
+    It shows ``direct`` z + ``mirrored`` conj(z) + ``offset``, and noise of ``sigma`` rad/s in each direction, of which
+    in the frame that turns with z the share ``fresh`` is new in each sample. ``scatter``: sigma of a sample by parts
+    (real, imaginary), the imaginary zero for an accelerometer. ``first`` s after a pulse is the first estimate.
+    """
+
+    step: float
+    weights: ComplexArray
+    direct: complex
+    mirrored: complex
+    offset: complex
+    sigma: float
+    fresh: float
+    scatter: tuple[float, float]
+    grain: tuple[float, float]
+    first: float
+
+    def mean(self, z: Any) -> Any:
+        """Observed z without noise, numbers or arrays."""
+        return self.direct * z + self.mirrored * np.conj(z) + self.offset
+
+    def noise(self, white: ComplexArray) -> ComplexArray:
+        """Noise of the estimates (m, k) by that of the samples (m, n + k), of which the oldest is older than needed."""
+        count = len(self.weights)
+        if count == 1:
+            return np.asarray(self.weights[0] * white[:, :-1])
+        parts = np.lib.stride_tricks.sliding_window_view(white[:, :-1], count, axis=1)
+        return np.asarray(parts @ self.weights[::-1])
+
+    def drawn(self, rng: np.random.Generator, rows: int, count: int) -> ComplexArray:
+        """White noise of samples, (rows, count)."""
+        real, other = self.scatter
+        if real == other == 0.0:
+            return np.zeros((rows, count), dtype=complex)
+        noise = (real * rng.standard_normal((rows, count))).astype(complex)
+        return noise + 1j * other * rng.standard_normal((rows, count)) if other > 0.0 else noise
+
+    def stepped(self, seen: ComplexArray) -> ComplexArray:
+        """Observed z quantised by the steps of a gyro."""
+        if not any(self.grain):
+            return seen
+        raw, (first, second) = seen / self.weights[0], self.grain
+        return np.asarray(
+            self.weights[0] * (np.rint(raw.real / first) * first + 1j * np.rint(raw.imag / second) * second)
+        )
+
+    def change(self, white: ComplexArray, towards: complex, level: float) -> ComplexArray:
+        """Most likely change of the noise that makes the newest estimate ``level`` rad/s in a direction."""
+        newest = self.weights[::-1]
+        pull = newest.conj() * towards
+        real, other = (part * part for part in self.scatter)
+        missing = level - (complex(newest @ white) * towards.conjugate()).real
+        along = real * pull.real + 1j * other * pull.imag
+        return np.asarray(missing / float((along.real * pull.real + along.imag * pull.imag).sum()) * along)
+
+
+def transfer(law: Law, spin: float) -> Transfer:
+    """Transfer of the estimates of a law at a spin of ``spin`` rad/s."""
+    sensor, rate = law.loop.sensor, float(law.rate(spin))
+    estimator, accelerometer = Estimator(law, sensor, 0.0), sensor.kind == ACCELEROMETER
+    every = 1
+    if accelerometer and law.loop.predict and sensor.low_pass == 0.0:
+        every = max(estimator.window // ENOUGH, 1)  # as good as all, each with so much less noise
+    step = every * estimator.step or law.period / GRID
+    smooth, weights = _smoothing(sensor, step), np.ones(1, dtype=complex)
+    if accelerometer:
+        weights = _fitted(law, spin, step, round(estimator.window / every))
+    first = estimator.since + (len(weights) - 1) * step
+    weights = np.convolve(weights, smooth)[:LONGEST_RESPONSE]
+    if law.loop.predict:
+        behind = complex(smooth @ np.exp(1j * rate * step * np.arange(len(smooth))))
+        weights = weights * np.exp(-1j * rate * sensor.delay) / behind
+    gain = complex(weights @ np.exp(-complex(law.growth, -rate) * step * np.arange(len(weights))))
+    direct, mirrored, parts = gain * sensor.scale, 0j, law.gauge
+    if accelerometer:
+        shown = 0.5 * sensor.scale * spin * estimator.seen_gain
+        image = complex(weights @ np.exp(-complex(law.growth, rate) * step * np.arange(len(weights))))
+        direct, mirrored, parts = gain * shown.conjugate(), image * shown, (1.0, 0.0)
+    noise, grain = (0.0, 0.0) if sensor.rate is None else (sensor.noise / math.sqrt(every), sensor.quantisation)
+    size = math.hypot(noise, grain / math.sqrt(12.0 * every))
+    if accelerometer or len(weights) > 1:
+        noise, grain = size, 0.0
+    power = float((abs(weights) ** 2).sum())
+    lasting = complex(np.vdot(weights[:-1], weights[1:]) * np.exp(1j * rate * step)).real / power
+    return Transfer(
+        step=step,
+        weights=weights,
+        direct=direct,
+        mirrored=mirrored,
+        offset=complex(weights.sum()) * sensor.bias * complex(*parts),
+        sigma=size * math.hypot(*parts) * math.sqrt(0.5 * power),
+        fresh=min(max(1.0 - lasting, 1e-6), 1.0),
+        scatter=(noise * parts[0], noise * parts[1]),
+        grain=(grain * parts[0], grain * parts[1]),
+        first=first,
+    )
+
+
+def _smoothing(sensor: Sensor, step: float) -> ComplexArray:
+    """Weights of the low-pass filter, newest sample first."""
+    if sensor.low_pass == 0.0:
+        return np.ones(1, dtype=complex)
+    count = min(math.ceil(FORGOTTEN * sensor.low_pass / step), LONGEST_RESPONSE)
+    memory = math.exp(-step / sensor.low_pass)
+    return np.asarray((1.0 - memory) * memory ** np.arange(count), dtype=complex)
+
+
+def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
+    """Weights of the sine fitted to ``size`` samples of an accelerometer, over its gain for z."""
+    angle = -float(law.rate(spin)) * step * np.arange(size)
+    orders = (1, 2) if size >= HARMONIC else (1,)
+    waves = [wave(order * angle) for order in orders for wave in (np.cos, np.sin)]
+    rows = np.linalg.pinv(np.column_stack([np.ones(size), *waves]))
+    return np.asarray((rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin))
+
+
+FINE = 1500
+"""Sizes of z at which the probability of an event is computed, far off and again near the threshold."""
+
+FARTHEST = 1e-12
+"""Share of a threshold below which a nutation is none."""
+
+REACH = 12.0
+"""Sigmas of noise within which sizes lie closer together."""
+
+PHASES = 16
+"""Directions of z against the bias over which a chance is averaged."""
+
+CURVED = 12.0
+"""Sigmas within which a size is so small that noise across it counts."""
+
+
+DEGREES = 240
+"""Terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger."""
+
+
+class Odds:
+    """First passage: probability of an estimate of at least ``limit`` rad/s, or at most (``below``), while z grows.
+
+    ``growth`` (1/s) is that of z. The chances of the samples add up along a coast: an event is there where the sum has
+    come to an exponential number.
+    """
+
+    def __init__(self, seen: Transfer, limit: float, growth: float, *, below: bool) -> None:
+        gain, offset = abs(seen.direct), abs(seen.offset)
+        reach = offset + REACH * seen.sigma + 1e-6 * limit
+        wide = np.geomspace(FARTHEST * (limit + reach), 100.0 * (limit + reach), FINE)
+        near = limit + reach * np.linspace(-1.0, 1.0, FINE)
+        shown = np.union1d(wide, near[near > wide[0]])
+        sigma = max(seen.sigma, 1e-9 * limit, 1e-300)
+        phases = PHASES if offset > 0.0 else 1
+        turns = np.exp(2j * np.pi * np.arange(phases) / phases)
+        sizes = np.abs(shown[:, None] * turns + seen.offset)
+        chance = exceeds(limit / sigma, sizes / sigma)
+        chance = 1.0 - chance if below else chance
+        chance = (chance * _clustered(seen.fresh, np.abs(limit - sizes) / sigma)).mean(axis=1)
+        expected = -np.log1p(-np.minimum(chance, 1.0 - 1e-15)) / (growth * seen.step)
+        self.sizes = np.log(shown / gain)
+        pieces = 0.5 * (expected[1:] + expected[:-1]) * np.diff(self.sizes)
+        self.sum = np.concatenate([[0.0], np.cumsum(pieces)])
+
+    def size(self, now: Any, drawn: Any) -> Any:
+        """Size |z| (rad/s) at the event, from ``now`` on, by exponential numbers; infinite where it does not come."""
+        reached = np.interp(np.log(now), self.sizes, self.sum) + drawn
+        sizes = np.maximum(np.exp(np.interp(reached, self.sum, self.sizes)), now)
+        return np.where(reached > self.sum[-1], math.inf, sizes)
+
+
+def _clustered(fresh: float, apart: Vector) -> Any:
+    """Share of the samples beyond a threshold, ``apart`` sigmas off, that are the first of a cluster of such.
+
+    Where ``fresh`` is the share of noise that is new in each sample: x²/2 ν(x), x = apart sqrt(2 fresh), as of a random
+    walk with drift, ν(x) = (2/x) (Φ(x/2) - 1/2) / (x/2 Φ(x/2) + φ(x/2)) (Siegmund and Yakir 2007).
+    """
+    if fresh > 0.5:
+        return 1.0
+    half = 0.5 * np.maximum(apart, 1.0) * math.sqrt(2.0 * fresh)
+    below = _normal(half)
+    return 2.0 * half * (below - 0.5) / (half * below + np.exp(-0.5 * half * half) / math.sqrt(2.0 * math.pi))
+
+
+def _normal(values: Vector) -> Vector:
+    """Probability that a standard normal number is below each of the ``values``."""
+    scaled = (values.ravel() / -math.sqrt(2.0)).tolist()
+    return 0.5 * np.array([math.erfc(value) for value in scaled]).reshape(values.shape)
+
+
+def exceeds(limit: float, shown: Vector) -> Vector:
+    """Probability of |``shown`` + n| >= ``limit`` with n normal, one sigma in each direction (Rice).
+
+    |shown + n|² is χ² of 2 + 2k degrees of freedom, k by Poisson with the mean shown²/2.
+    """
+    chances, near = _normal(shown - limit), shown < CURVED
+    if limit < 3.0 * CURVED and near.any():
+        mean, half = 0.5 * shown[near] ** 2, 0.5 * limit * limit
+        share, more = np.exp(-mean), math.exp(-half)
+        total, tail = share * more, more
+        for number in range(1, DEGREES):
+            share, more = share * (mean / number), more * half / number
+            tail += more
+            total += share * tail
+        chances[near] = total
+    return np.clip(chances, 0.0, 1.0)
+
+
+def expect_damping(body: Spacecraft, loop: Loop) -> None:
+    """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
+    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
+    if turned:
+        raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
+    late = feeding(body, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))

@@ -8,8 +8,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude, triaxial
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule

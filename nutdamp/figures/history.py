@@ -9,8 +9,7 @@ import numpy as np
 
 from nutdamp.figures import geometry, labels, style
 from nutdamp.figures.style import GREY, INK, MISSED, MOTION, PULSE, UNCHECKED
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part

@@ -10,8 +10,7 @@ import numpy as np
 
 from nutdamp.figures import geometry, labels, style
 from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from nutdamp.figures import geometry, history, labels, motion, sphere, style
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight, model_name
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.views.spacecraft import angle_names, angle_texts
 

@@ -11,8 +11,7 @@ import numpy as np
 from nutdamp.figures import geometry, labels, style
 from nutdamp.figures.geometry import DrawnCones
 from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.model import Vector
 
 if TYPE_CHECKING:

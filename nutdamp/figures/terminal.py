@@ -12,8 +12,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from nutdamp.figures import geometry
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.model import Vector
 
 PATH, PULSE, MOMENTUM = "cyan", "bold red", "green"

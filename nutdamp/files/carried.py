@@ -1,27 +1,44 @@
-"""Spacecraft file carried on: the same file with the state that a flight has at a later time, which is its new t = 0.
+"""Spacecraft files that flights and fits of telemetry lead to: the same file, with a later state as its t = 0.
 
-Attitude, rates, epoch, moments, mass and the propellant and pressure of the tank are as they are then. What no key of
-the file follows is noted.
+Attitude, rates, epoch, moments, mass and the propellant and pressure of the tank are as they are then; a fit adds its
+estimates and how well they are known. What no key of the file follows is noted.
 """
 
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterator
+import math
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
-from nutdamp.files.editing import Edits, Later, as_before, carry_text, epoch_after, motion_edits, number
-from nutdamp.files.overrides import overlay
+from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
+from nutdamp.estimation.signals import ACCELERATION
+from nutdamp.files.editing import (
+    Edits,
+    Later,
+    Setting,
+    as_before,
+    carry_text,
+    epoch_after,
+    motion_edits,
+    number,
+    overlay,
+)
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
+from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import touching
+from nutdamp.spacecraft.tolerances import Tolerance
+from nutdamp.units import parse
 
 
 def later(flight: Flight, time: float) -> Later:
@@ -136,3 +153,213 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
         for axis in range(2):
             path = ("disturbances", index, "torque", axis)
             yield path, as_before(tree.get(*path), float(torque[axis]), "torque", "N m")
+
+
+SEEN = 3.0
+"""Standard deviations from which on a growth of the nutation, or a delay, counts as seen."""
+
+UNWRITTEN = {
+    "bias": ("bias of {}", "deg/s"),
+    "misalignment": ("tilt of the gyros about {}", "deg"),
+    "wobble": ("tilt of the axis about {}", "deg"),
+}
+"""Estimates of sensors that have no key in the file: the bias of a loop is one for both of its gyros."""
+
+
+def fitted_text(text: str, name: str, settings: Sequence[Setting], fit: Fit, carried: Carried) -> str:
+    """The text of a spacecraft file, called ``name``, with the estimates; ``settings`` become part of it.
+
+    Raises BadRequest for values that an alias stands for.
+    """
+    return carry_text(text, name, settings, lambda tree: _fitted_edits(tree, fit, carried))
+
+
+def fitted_file(fit: Fit, carried: Carried) -> str:
+    """`fitted_text` of the file that the fitted spacecraft was read from; raises BadRequest where there is none."""
+    source = fit.model.spacecraft.source
+    if not isinstance(source, Source):
+        raise BadRequest("fit: expected a spacecraft from nutdamp.load, read or example, with no field replaced")
+    return fitted_text(*source, fit, carried)
+
+
+def fitted_spacecraft(_: object, text: str) -> Spacecraft:
+    """Spacecraft of a file with estimates."""
+    return Source(text, "fitted").read()
+
+
+def notes(fit: Fit, carried: Carried) -> Iterator[str]:
+    """Sentences on estimates that the file cannot hold, and on entries that still count from the old t = 0."""
+    body = fit.model.spacecraft
+    growth = fit.index("growth")
+    if growth is not None:
+        value, sigma = float(fit.values[growth]), float(fit.sigmas[growth])
+        if abs(value) > SEEN * sigma and not (carried.body.wheel or _grows_so(carried, value)):
+            way = "grows" if value > 0.0 else "decays"
+            yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
+    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("delay ")):
+        at = fit.index(name)
+        assert at is not None
+        if abs(fit.values[at]) > SEEN * fit.sigmas[at]:
+            channel = name.removeprefix("delay ")
+            if channel not in dict(_delays(fit)):
+                yield f"the delay of {channel}, {1e3 * fit.values[at]:.4g} ms, is not written: see the key valve"
+    yield from _off(fit)
+    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("thrust ")):
+        if fit.named[name] <= LEAST_THRUST:
+            channel = name.removeprefix("thrust ")
+            factor = fit.named[name]
+            share = f"{channel} gave {100.0 * factor:.3g} % of its thrust"
+            doubt = (
+                "did it fire?" if factor > -LEAST_THRUST else "it pushes the other way: another channel, or reversed?"
+            )
+            yield f"{share}: {doubt} Its force stays as it was"
+    limits = body.limits
+    if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
+        yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
+    if body.tank is not None and len(fit.model.record.schedule):
+        yield "tank.propellant is that before the pulses of the schedule"
+
+
+def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
+    before = fit.model.spacecraft
+    after, given = replaced(before, carried), before.attitude
+    if given is not None and given.epoch is not None and after.attitude is not None and carried.time != 0.0:
+        after = replace(after, attitude=replace(after.attitude, epoch=epoch_after(given.epoch, carried.time)))
+    yield from motion_edits(tree, Later(before, after, carried.state))
+    yield from _dissipation(tree, fit, carried)
+    yield from _thrusts(tree, carried)
+    for channel, late in _delays(fit):
+        yield from _valve(tree, channel, late)
+    yield from _sensor(tree, fit)
+    yield from _dispersions(fit, carried)
+
+
+def _grows_so(carried: Carried, growth: float) -> bool:
+    """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a wheel not known."""
+    if carried.body.wheel:
+        return False
+    first, second, third = carried.body.moments
+    return (0.5 * (first + second) - third) * growth > 0.0
+
+
+def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
+    index = fit.index("growth")
+    if index is None:
+        return
+    value, sigma = float(fit.values[index]), float(fit.sigmas[index])
+    given = tree.get("dissipation", "time_constant")
+    if abs(value) > SEEN * sigma:
+        yield ("dissipation", "time_constant"), as_before(given, 1.0 / abs(value), "time", "s")
+        if tree.get("dissipation", "nutation") is not None or not _grows_so(carried, value):
+            yield ("dissipation", "nutation"), "grows" if value > 0.0 else "decays"
+
+
+def _thrusts(tree: Node, carried: Carried) -> Edits:
+    """Force or torque of the thrusters times their factors."""
+    factors = carried.factors
+    entries = tree.get("thrusters")
+    for index, _ in entries.children() if entries is not None else ():
+        name = tree.get("thrusters", index, "name")
+        if name is None or name.value not in factors:
+            continue
+        factor = factors[str(name.value)][0]
+        force = tree.get("thrusters", index, "force")
+        if force is not None:
+            value = parse(force.value, "force") * factor
+            yield ("thrusters", index, "force"), as_before(force, value, "force", "N")
+            continue
+        for axis in range(3):
+            part = tree.get("thrusters", index, "torque", axis)
+            if part is not None:
+                value = parse(part.value, "torque") * factor
+                yield ("thrusters", index, "torque", axis), as_before(part, value, "torque", "N m")
+
+
+def _dispersions(fit: Fit, carried: Carried) -> Edits:
+    sigmas = dict(zip(carried.names, carried.sigmas.tolist(), strict=True))
+    values = dict(zip(carried.names, carried.values.tolist(), strict=True))
+    for key in ("A", "C"):
+        if sigmas[key] > 0.0:
+            yield ("dispersions", key), f"{{normal: {100.0 * sigmas[key] / values[key]:.6g} %}}"
+    rates = ", ".join(f"{{normal: {math.degrees(sigmas[f'omega0_{axis}']):.6g} deg/s}}" for axis in (1, 2, 3))
+    yield ("dispersions", "omega0"), f"[{rates}]"
+    if WHEEL in sigmas:
+        yield ("dispersions", "wheel_momentum"), f"{{normal: {sigmas[WHEEL]:.6g} N m s}}"
+    factors, given = carried.factors, fit.model.spacecraft.dispersions
+    if factors:
+        before = {} if given is None else given.thrust
+        parts = [f"{_quoted(name)}: {_tolerance(size)}" for name, size in before.items() if name not in factors]
+        parts += [
+            f"{_quoted(name)}: {{normal: {100.0 * sigma / factor:.6g} %}}" for name, (factor, sigma) in factors.items()
+        ]
+        yield ("dispersions", "thrust"), "{" + ", ".join(parts) + "}"
+    if carried.tilt is not None:
+        yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
+    pairs = correlations(carried, given)
+    if pairs:
+        rows = ", ".join(f"[{_quoted(first)}, {_quoted(second)}, {value:.{DIGITS}f}]" for first, second, value in pairs)
+        yield ("dispersions", "correlation"), f"[{rows}]"
+
+
+def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
+    """Channels whose thrust is later than by the file, s, as far as a valve of their own can have such delays."""
+    for channel in fit.model.spacecraft.channels:
+        at, known = fit.index(f"delay {channel.name}"), channel.thrusters[0].valve or Trapezoid()
+        if at is None or len(channel.thrusters) > 1 or not isinstance(known, Trapezoid):
+            continue
+        late = float(fit.values[at])
+        possible = abs(late) <= LATE and min(known.open_delay, known.close_delay) + late >= 0.0
+        if possible and abs(late) > SEEN * fit.sigmas[at]:
+            yield channel.thrusters[0].name, late
+
+
+def _valve(tree: Node, name: str, late: float) -> Edits:
+    """The delays of the valve of a thruster, ``late`` s longer; one with the valve of the whole file gets its own."""
+    entries = tree.get("thrusters")
+    for index, entry in entries.children() if entries is not None else ():
+        named = entry.get("name")
+        if named is None or named.value != name:
+            continue
+        own = entry.get("valve")
+        known = own or tree.get("valve")
+        values = {} if known is None else {str(key): str(node.value) for key, node in known.children()}
+        for key in ("open_delay", "close_delay"):
+            before = None if known is None else known.get(key)
+            values[key] = as_before(
+                before, (0.0 if before is None else parse(before.value, "time")) + late, "time", "s"
+            )
+        if own is None:
+            yield (
+                ("thrusters", index, "valve"),
+                "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}",
+            )
+        else:
+            yield from ((("thrusters", index, "valve", key), values[key]) for key in ("open_delay", "close_delay"))
+
+
+def _sensor(tree: Node, fit: Fit) -> Edits:
+    """The bias of the accelerometer of the loop."""
+    at = fit.index("bias_acceleration")
+    if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
+        given = tree.get("loop", "sensor", "bias")
+        yield ("loop", "sensor", "bias"), as_before(given, float(fit.values[at]), "acceleration", "m/s^2")
+
+
+def _off(fit: Fit) -> Iterator[str]:
+    """Sentence on sensor errors that no key of the file holds."""
+    seen = []
+    for parameter, value, sigma in zip(fit.model.parameters, fit.values, fit.sigmas, strict=True):
+        kind, _, which = parameter.name.partition("_")
+        if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
+            what, unit = UNWRITTEN[kind]
+            seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
+    if seen:
+        yield f"not written, as the file has no key for it: {', '.join(seen)}"
+
+
+def _tolerance(tolerance: Tolerance) -> str:
+    return f"{{{tolerance.kind}: {100.0 * tolerance.size:.6g} %}}"
+
+
+def _quoted(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z_+-][\w +-]*", name) else "'" + name.replace("'", "''") + "'"

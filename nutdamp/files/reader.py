@@ -22,6 +22,7 @@ from nutdamp import units
 from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
 from nutdamp.files.dispersion_rules import dispersion_findings
+from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.keys import (
     AttitudeSection,
@@ -37,7 +38,6 @@ from nutdamp.files.keys import (
     SunSensorSection,
     ThrusterSection,
 )
-from nutdamp.files.overrides import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from nutdamp.common.numerics import cleaned, finite
 from nutdamp.errors import CannotWrite, Fault, FaultyFile, nearest
 from nutdamp.files.yaml import read_utf8
-from nutdamp.flight.track import Track, in_file_axes
+from nutdamp.flight.propagation import Track, in_file_axes
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.units import shown
 

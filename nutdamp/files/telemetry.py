@@ -41,6 +41,7 @@ from nutdamp.units import shown
 Vector = NDArray[np.float64]
 
 TIMES = ("t_s", "utc")
+JUMPS = "; the track of an impulse sum has two rows at each pulse: write it by `simulate --flown --csv`"
 RATES = {f"{name}_rad_s": (name, 1.0) for name in GYROS} | {f"{name}_deg_s": (name, math.pi / 180.0) for name in GYROS}
 ANGLES = ("axis_ra_deg", "axis_dec_deg")
 CROSSED = ("crossing_azimuth_deg", "crossing_elevation_deg")
@@ -236,7 +237,7 @@ def _times(table: Table, rows: list[tuple[int, Cells]], spacecraft: Spacecraft) 
             continue
         if time <= latest:
             text = f"{cells[column]} does not rise: the sample before is at {latest:.9g} s"
-            table.fault(line, column, text)
+            table.fault(line, column, text + (JUMPS if TRACK[-1] in table.header else ""))
         times[index] = latest = time
     table.check()
     return times

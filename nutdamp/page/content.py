@@ -51,12 +51,11 @@ from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, guide
 from nutdamp.views.check import check_screen
+from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Formula, Topic
-from nutdamp.views.notes import WARNING, joined, severity, text
 from nutdamp.views.pulses import pulse_table
-from nutdamp.views.schemes import scheme_table
 from nutdamp.views.spacecraft import beyond_floors, turn_floor
-from nutdamp.views.text import mass, quantity, sentence
+from nutdamp.views.text import WARNING, joined, mass, quantity, sentence, severity, text
 from nutdamp.views.trade import apart, beats, front_parts
 from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 

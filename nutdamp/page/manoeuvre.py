@@ -22,11 +22,10 @@ from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import decisions
-from nutdamp.views.notes import text
+from nutdamp.views.glance import limits
 from nutdamp.views.pulses import MILLISECONDS, channel_text
-from nutdamp.views.schemes import limits
 from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
-from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle
+from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle, text
 
 if TYPE_CHECKING:
     from nutdamp.montecarlo.checkpoints import Checkpoints

@@ -15,8 +15,7 @@ import numpy as np
 
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.document import Circle, Moving, NamedDirection
 from nutdamp.page.scales import LEAD, Panel, panel, placed, strip_of
 from nutdamp.page.workbench import Room, absence, workbench_data, workbench_of

@@ -16,16 +16,14 @@ from nutdamp.planning.decision import Comparison, Simulation
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.notes import joined, sentences
-from nutdamp.views.plan_json import decided_json
-from nutdamp.views.pulses import pulse_table
-from nutdamp.views.schemes import scheme_table
-from nutdamp.views.text import degrees
+from nutdamp.views.glance import scheme_table
+from nutdamp.views.pulses import decided_json, pulse_table
+from nutdamp.views.text import degrees, joined, sentences
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from nutdamp.flight.track import Track
+    from nutdamp.flight.propagation import Track
     from nutdamp.montecarlo.study import Dispersion
     from nutdamp.page.document import Block
     from nutdamp.planning.robust import RobustComparison
@@ -37,13 +35,13 @@ _TABLED = ("csv", "table", "figure", "line", "html")
 VIEWS = {
     "object.save": "page.results:save",
     "object.write": "page.results:write",
-    "Spacecraft.data": "views.plan_json:spacecraft_json",
+    "Spacecraft.data": "views.pulses:spacecraft_json",
     **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
-    "Plan.data": "views.plan_json:plan_json",
+    "Plan.data": "views.pulses:plan_json",
     "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
     **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
-    "Comparison.data": "views.plan_json:comparison_json",
+    "Comparison.data": "views.pulses:comparison_json",
     "Comparison.sentences": "page.results:comparison_sentences",
     "Comparison.reason": "page.results:comparison_reason",
     **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in _TABLED},
@@ -69,15 +67,15 @@ VIEWS = {
     "LoopVerification.screen": "views.loop:verification_screen",
     "Fitted.data": "views.fit:fit_json core",
     "Fitted.figure": "figures.fit:fit_figure core",
-    "Fitted.text": "files.fitted:fitted_file core",
+    "Fitted.text": "files.carried:fitted_file core",
     "Plan.carried": "files.carried:carried_spacecraft",
-    "Fitted.spacecraft": "files.fitted:fitted_spacecraft",
+    "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
     "Verified.screen": "views.verification:verification_screen plan core",
-    "Budget.data": "views.budget:budget_json",
-    "Budget.csv": "views.budget:budget_csv",
+    "Budget.data": "views.loop:budget_json",
+    "Budget.csv": "views.loop:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
-    "Budget.screen": "views.budget:budget_screen",
+    "Budget.screen": "views.loop:budget_screen",
 }
 """Functions of results, see `nutdamp.common.results.view`."""
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from nutdamp.figures import geometry
 from nutdamp.figures.geometry import ticks
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.model import Vector
 from nutdamp.views.text import most
 

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nutdamp.figures import geometry
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.page.scales import EDGES
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import channel_of

@@ -16,8 +16,7 @@ from nutdamp.common import results, work
 from nutdamp.errors import NutdampError
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
-from nutdamp.flight.propagation import Final, Flight
-from nutdamp.flight.track import Extremes, Track, extremes
+from nutdamp.flight.propagation import Extremes, Final, Flight, Track, extremes
 from nutdamp.planning.plan import Plan, plan, reaches_spin, spinning
 from nutdamp.planning.recommendation import Recommendation, Share, Standing, recommend
 from nutdamp.schemes import catalogue, planner

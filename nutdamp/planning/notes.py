@@ -1,6 +1,6 @@
 """Notes on plans and decisions, as data: codes of sentences with their values.
 
-The sentences stand in ``guide/notes.md``; `nutdamp.views.notes` makes texts of them.
+The sentences stand in ``guide/notes.md``; `nutdamp.views.text` makes texts of them.
 """
 
 from __future__ import annotations

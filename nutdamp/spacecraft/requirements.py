@@ -271,3 +271,12 @@ def expect_loop(spacecraft: Spacecraft) -> Loop:
     if spacecraft.loop is None:
         raise BadRequest(LOOP)
     return spacecraft.loop
+
+
+def expect_dissipation(spacecraft: Spacecraft) -> None:
+    """Raise BadRequest, with the keys to add, for a spacecraft whose nutation neither grows nor decays."""
+    if spacecraft.dissipation is None:
+        raise BadRequest(
+            "the spacecraft file has no dissipation: it does not say how fast the nutation grows. For example:\n\n"
+            "dissipation: {time_constant: 600 s}"
+        )

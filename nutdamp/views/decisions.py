@@ -20,18 +20,9 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views.notes import joined, ordered, screen_line
 from nutdamp.views.spacecraft import FRAME_N, aspect_facts, cone_margins, direction_text, required, spin_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
-from nutdamp.views.text import (
-    MISSING,
-    degrees,
-    duration,
-    mass,
-    moment,
-    most,
-    quantity,
-)
+from nutdamp.views.text import MISSING, degrees, duration, joined, mass, moment, most, ordered, quantity, screen_line
 
 VERDICT = {True: "met", False: "NOT met", None: MISSING}
 """Words for the values of `Plan.meets_requirement`."""

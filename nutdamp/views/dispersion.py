@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.files.samples import OUTPUT_COLUMNS
+from nutdamp.files.export import OUTPUT_COLUMNS
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
@@ -25,12 +25,8 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views.decisions import end_rows
-from nutdamp.views.plan_json import final_json, heading, target_json
-from nutdamp.views.spacecraft import bounds_text, requested
-from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
-from nutdamp.views.text import degrees, digits
-from nutdamp.views.tolerances import (
+from nutdamp.views.pulses import final_json, heading, target_json
+from nutdamp.views.robust import (
     budgeted_outputs,
     in_words,
     inputs_table,
@@ -38,6 +34,10 @@ from nutdamp.views.tolerances import (
     tolerance_budget,
     unused_table,
 )
+from nutdamp.views.spacecraft import bounds_text, requested
+from nutdamp.views.summary import summary
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
+from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopResults

@@ -55,7 +55,7 @@ class Format(NamedTuple):
 def _json(request: Request) -> str:
     from nutdamp.files.tabular import json_text
     from nutdamp.planning.decision import compare_plans
-    from nutdamp.views.plan_json import comparison_json
+    from nutdamp.views.pulses import comparison_json
 
     return json_text(comparison_json(compare_plans((request.plan,))))
 
@@ -67,7 +67,7 @@ def _basilisk(request: Request) -> str:
 
 
 def _spin_table(request: Request) -> str:
-    from nutdamp.views.spin_table import spin_table
+    from nutdamp.views.simulation import spin_table
 
     plan, until = request.plan, request.until
     return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)

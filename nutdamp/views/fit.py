@@ -14,10 +14,10 @@ from nutdamp.estimation.forecast import Outlook, Prospect
 from nutdamp.estimation.parameters import in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
 from nutdamp.estimation.signals import KIND
-from nutdamp.files.fitted import notes
+from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, percent
-from nutdamp.views.plan_json import heading
+from nutdamp.views.pulses import heading
 from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
 from nutdamp.views.text import degrees, mass

@@ -14,10 +14,10 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from nutdamp import __version__
-from nutdamp.control_loop.batch import FlownLoops
 from nutdamp.control_loop.dispersion import OUTPUTS, LoopResults, LoopStudy
 from nutdamp.control_loop.law import Ending
-from nutdamp.files.samples import column, cone_columns
+from nutdamp.control_loop.simulation import FlownLoops
+from nutdamp.files.export import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
@@ -39,10 +39,10 @@ from nutdamp.views.dispersion import (
     shown,
 )
 from nutdamp.views.loop import described
-from nutdamp.views.plan_json import heading
+from nutdamp.views.pulses import heading
+from nutdamp.views.robust import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import MISSING, degrees, duration
-from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
 
 class LoopOutput(NamedTuple):

@@ -1,28 +1,46 @@
-"""The simulation of a schedule: ends of both models, cone angles around each pulse, extremes of the axis track."""
+"""The simulation of a schedule: ends of both models, cone angles around each pulse, extremes of the axis track.
+
+Also the schedule spin by spin, as operators of spinners count: one row a spin, with its firings. Where the file has a
+Sun sensor a spin begins with its pulse, 1 with the first one, as in command blocks; the time before that is spin 0.
+Else spin 1 begins at t = 0, and each is a turn of the body about axis 3: ∫ω3 dt grows by 2π.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
 
+import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.flight import end_state
-from nutdamp.flight.end_state import aspects
+from nutdamp.errors import BadRequest
+from nutdamp.files.tabular import number
+from nutdamp.flight import end_state, propagation
+from nutdamp.flight.end_state import LEGENDRE, aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
 from nutdamp.planning.notes import decision_notes, model_warnings
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views.decisions import cost, margin_lines, statement
-from nutdamp.views.plan_json import aspects_json, decision_json, final_json, heading, residual_json, target_json
-from nutdamp.views.pulses import pulse_table, shown_rows
+from nutdamp.views.pulses import (
+    aspects_json,
+    decision_json,
+    final_json,
+    heading,
+    pulse_table,
+    residual_json,
+    shown_rows,
+    target_json,
+)
 from nutdamp.views.spacecraft import FRAME_N, angle_names, angle_texts, aspect_facts
 from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
 from nutdamp.views.text import degrees, longitude, moment, pointing
 
 IMPULSES, WIDTHS = "impulse approximation (17)", "full simulation"
@@ -149,3 +167,136 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
             "declination_deg": None if attitude is None else [math.degrees(v) for v in extremes.declination],
         },
     }
+
+
+BETWEEN = "; "
+"""Separator of the values of several pulses in one spin."""
+
+MOST_SPINS = 100_000
+"""Largest number of spins: more make no table that anyone reads."""
+
+DIGITS = 9
+"""Decimals of seconds and degrees that are written."""
+
+SAME = 1e-9
+"""Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
+
+PIECES = 16
+"""Pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`."""
+
+NEWTON = 3
+"""Newton steps to the end of a turn within its piece: the second one is at rounding already."""
+
+
+class SpinRow(NamedTuple):
+    """A spin by its number, with its date, begin, end and period, s, and the pulses commanded in it."""
+
+    number: int
+    utc: str | None
+    begin: float
+    end: float
+    period: float
+    fired: list[Pulse]
+
+
+def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], str]:
+    """Seconds or degrees of each pulse of a spin."""
+    return lambda row: BETWEEN.join(number(_rounded(value(row, pulse))) for pulse in row.fired)
+
+
+def _rounded(value: float) -> float:
+    """Seconds or degrees without the rounding of the search."""
+    return round(value, DIGITS)
+
+
+SPINS = (
+    Column("spin", "", "", attrgetter("number"), where="csv", kind=WHOLE),
+    Column("start_utc", "", "", attrgetter("utc"), where="csv", kind=TEXT),
+    Column("start_s", "", "", lambda row: _rounded(row.begin), where="csv"),
+    Column("period_s", "", "", lambda row: _rounded(row.period), where="csv"),
+    Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
+    Column("channel", "", "", lambda row: BETWEEN.join(pulse.channel for pulse in row.fired), where="csv", kind=TEXT),
+    Column("phase_deg", "", "", _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
+           where="csv", kind=TEXT),
+    Column("on_time_s", "", "", _several(lambda _, pulse: pulse.loaded[1]), where="csv", kind=TEXT),
+)  # fmt: skip
+
+
+def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
+    """The spins from t = 0 to ``until`` s as CSV, those after that to the last pulse too; the last one is whole.
+
+    ``phase_deg`` is the part of its spin before a pulse is commanded, ``on_time_s`` the length of the command.
+    Without an epoch ``start_utc`` is empty. Raises BadRequest for more than `MOST_SPINS`, Infeasible where the sensor
+    does not see the Sun.
+    """
+    last = max(until, max((pulse.loaded[0] for pulse in schedule), default=0.0))
+    if last * abs(body.spin) > 2.0 * math.pi * MOST_SPINS:
+        raise BadRequest(f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)")
+    first, begins = _begins(body, schedule, last)
+    fired: dict[int, list[Pulse]] = {}
+    starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])
+    for pulse, index in zip(starts, np.searchsorted(begins, [each.loaded[0] for each in starts], "right"), strict=True):
+        fired.setdefault(max(int(index) - 1, 0), []).append(pulse)
+    rows = []
+    spins = pairwise(begins[: int(np.searchsorted(begins, last, "right")) + 1].tolist())
+    for index, (begin, end) in enumerate(spins):
+        firing = fired.get(index, [])
+        # Spin 0 is the rest of a spin: it ends a whole period after it began.
+        period = end - begin if first + index > 0 else begins[2] - begins[1]
+        rows.append(SpinRow(first + index, body.utc(begin), begin, end, period, firing))
+    return DataTable("Spins", SPINS, rows).csv()
+
+
+def _begins(body: Spacecraft, schedule: Schedule, last: float) -> tuple[int, Vector]:
+    """Number of the first spin, and begins of it and those after it, s: to after ``last``, and three at least."""
+    from nutdamp.schemes.block_model import spin_turn, sun_pulses
+
+    if body.spin == 0.0:
+        raise BadRequest("a table of spins needs a body that spins")
+    turn = spin_turn(body)
+    until = last + 3.0 * turn
+    for _ in range(2):  # where the spin falls, turns get longer
+        flown = propagation.flown(body, schedule, until)
+        if body.sun is not None and body.sun_sensor is not None:
+            times = sun_pulses(flown, until)
+            at_once = len(times) > 0 and times[0] < SAME * turn
+            first, begins = (1, times) if at_once else (0, np.append(0.0, times))
+        else:
+            first, begins = 1, _turns(flown, until)
+        if len(begins) > 2 and begins[-1] > last:
+            return first, begins
+        until = last + 6.0 * 2.0 * math.pi / max(abs(flown.settled.spin), 1e-3 * abs(body.spin))
+    raise BadRequest(f"no whole spin ends after {last:.4g} s: the spin comes to a halt")
+
+
+def _turns(flown: Flight, until: float) -> Vector:
+    """Times of 0, 1, 2, … turns of the body about axis 3, up to ``until`` s, (n,); none after the spin ends."""
+    spin = abs(flown.spacecraft.spin)
+    edges = [np.array([0.0])]
+    for leg in flown.legs:
+        if leg.start < until and leg.end > leg.start:
+            count = math.ceil((leg.end - leg.start) * spin * PIECES / (2.0 * math.pi)) + 1
+            edges.append(np.linspace(leg.start, leg.end, count + 1)[1:])
+    times = np.concatenate(edges)
+    gained = _turned(flown, times[:-1], times[1:])
+    reversed_ = np.flatnonzero(gained <= 0.0)
+    if len(reversed_):
+        gained = gained[: reversed_[0]]
+    total = np.append(0.0, np.cumsum(gained))
+    whole = 2.0 * math.pi * np.arange(math.floor(total[-1] / (2.0 * math.pi)) + 1)
+    piece = np.clip(np.searchsorted(total, whole, "right") - 1, 0, len(gained) - 1)
+    begin, length = times[piece], np.diff(times)[piece]
+    ends = begin + length * (whole - total[piece]) / gained[piece]
+    for _ in range(NEWTON):
+        ends += (whole - total[piece] - _turned(flown, begin, ends)) * length / gained[piece]
+    return np.asarray(ends)
+
+
+def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
+    """∫ω3 dt over stretches (n,), rad, positive in the sense of the spin at t = 0; each within one leg."""
+    sense, half = math.copysign(1.0, flown.spacecraft.spin), 0.5 * (ends - begins)
+    turned = np.zeros(len(begins))
+    for node, weight in ((sign * node, weight) for node, weight in LEGENDRE for sign in (1.0, -1.0)):
+        rates, _ = flown.motion(begins + half * (1.0 + node))
+        turned += weight * half * sense * rates[:, 2]
+    return turned

@@ -18,17 +18,7 @@ from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views.tables import WIDTH, facts
-from nutdamp.views.text import (
-    RPM,
-    degrees,
-    duration,
-    longitude,
-    moment,
-    most,
-    pointing,
-    quantity,
-    short_angle,
-)
+from nutdamp.views.text import RPM, degrees, duration, longitude, moment, most, pointing, quantity, short_angle
 
 FRAME_N = "tilt from H(0); azimuth about it, from the initial tilt direction"
 """Frame of the two angles of a direction without an attitude in the file."""

@@ -15,11 +15,10 @@ from nutdamp.common.results import Note
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.views.notes import NOTE, WARNING, screen_line
 from nutdamp.views.pulses import block_table
 from nutdamp.views.spacecraft import angle_names, angle_texts, header, spin_text, title
 from nutdamp.views.tables import facts, lines_of
-from nutdamp.views.text import degrees, mass, moment, quantity
+from nutdamp.views.text import NOTE, WARNING, degrees, mass, moment, quantity, screen_line
 
 LINES = 40
 """Lines of a default screen."""

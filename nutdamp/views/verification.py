@@ -17,7 +17,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import decisions
 from nutdamp.views.decisions import coloured, size
-from nutdamp.views.plan_json import final_json, heading, target_json
+from nutdamp.views.pulses import final_json, heading, target_json
 from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, angle_of

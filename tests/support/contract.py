@@ -17,7 +17,7 @@ from support.cases import deep
 from support.golden import check_text
 
 from nutdamp.errors import FaultyFile, printable
-from nutdamp.files.overrides import parse_setting
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan

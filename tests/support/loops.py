@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from support.builders import channel, spinner
 
-from nutdamp.control_loop import limit_cycle
-from nutdamp.control_loop.limit_cycle import Map
+from nutdamp.control_loop import budget
+from nutdamp.control_loop.budget import Map
 from nutdamp.spacecraft.equipment import Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
@@ -69,4 +69,4 @@ def follow_few_cycles(patch: pytest.MonkeyPatch) -> None:
     """Budgets by 8 chains of 4 cycles or 20 firings: known to some 3 %, which changes none of their texts."""
     patch.setattr(Map.cycle, "__defaults__", (8, 4))
     patch.setattr(Map.attractors, "__defaults__", (8,))
-    patch.setattr(limit_cycle, "FIRINGS", 20)
+    patch.setattr(budget, "FIRINGS", 20)

@@ -14,8 +14,7 @@ from support.markup import Node, parsed
 
 from nutdamp.figures import geometry, overview
 from nutdamp.files.reader import read_spacecraft
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.study import Results, run
 from nutdamp.page.document import Page

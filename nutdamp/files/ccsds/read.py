@@ -14,16 +14,23 @@ import numpy as np
 
 from nutdamp.common.time import DIGITS, Epoch
 from nutdamp.errors import Fault, FaultyFile, printable
-from nutdamp.files.ccsds.checked import BODY, SAME_AXES, UNIT, Checked, Frames, expect_version, kvn_text, unit_length
 from nutdamp.files.ccsds.message import (
     APM_BLOCKS,
     APM_METADATA,
+    BODY,
     HEADER,
     MOMENTUM,
+    SAME_AXES,
+    UNIT,
     VERSION,
+    Checked,
+    Frames,
     Keyword,
     MessageBlock,
+    expect_version,
     from_kvn,
+    kvn_text,
+    unit_length,
 )
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.physics import attitude

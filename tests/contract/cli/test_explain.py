@@ -22,14 +22,14 @@ from support.process import Run
 from nutdamp.cli.main import group
 from nutdamp.cli.options import SHARED
 from nutdamp.errors import BadRequest
-from nutdamp.files import samples, tabular, telemetry
-from nutdamp.files.overrides import parse_setting
+from nutdamp.files import export, tabular, telemetry
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
 from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
-from nutdamp.views import explain, guide, loop_cases, spin_table
+from nutdamp.views import explain, guide, loop_cases, simulation
 from nutdamp.views.explain import WIDEST, flow, keys
 from nutdamp.views.guide import EQUATIONS, SYMBOLS, CommandHelp, Formula
 
@@ -265,9 +265,9 @@ def columns_written() -> Iterator[str]:
         *tabular.HEADER,
         *telemetry.TIMES,
         *telemetry.MEASURED,
-        *(column.key for column in spin_table.SPINS),
+        *(column.key for column in simulation.SPINS),
     )
-    yield from (*samples.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
+    yield from (*export.OUTPUT_COLUMNS, *(output.key for output in loop_cases.SHOWN_OUTPUTS))
     for key in (key for key, where in keys_of_columns() if "csv" in where or "json" not in where):
         yield from [key.replace("#", f"_{axis}") for axis in (1, 2, 3)] if "#" in key else [key]
 
@@ -285,19 +285,19 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 def keys_written() -> Iterator[str]:
     """Names that the code gives to numbers in JSON."""
     names = (
-        "budget",
         "check",
         "dispersion",
         "fit",
         "loop",
         "loop_cases",
+        "pulses",
         "robust",
         "simulation",
         "trade",
         "verification",
     )
-    paths = (*VIEWS.glob("*_json.py"), *(VIEWS / f"{name}.py" for name in names))
-    for node in nodes(paths):
+    functions = (node for node in nodes(VIEWS / f"{name}.py" for name in names) if isinstance(node, ast.FunctionDef))
+    for node in itertools.chain.from_iterable(map(ast.walk, functions)):
         for key in node.keys if isinstance(node, ast.Dict) else ():
             if isinstance(key, ast.Constant) and isinstance(key.value, str):
                 yield key.value

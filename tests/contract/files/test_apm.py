@@ -15,7 +15,7 @@ from support.golden import check_text
 from support.places import case
 
 from nutdamp.errors import CannotRead, FaultyFile
-from nutdamp.files.ccsds.checked import MOST_BYTES
+from nutdamp.files.ccsds.message import MOST_BYTES
 from nutdamp.files.ccsds.read import ApmContents, euler, imported, read_apm
 from nutdamp.physics import attitude
 

@@ -21,7 +21,7 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import Fault, FaultyFile
-from nutdamp.files.overrides import parse_setting
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import example_text, load_spacecraft, read_spacecraft
 from nutdamp.files.study_keys import LoopFaultsSection, LoopSection, LoopSensorSection
 from nutdamp.spacecraft.model import Spacecraft

@@ -16,19 +16,18 @@ from support.golden import check_text, refused
 from support.loops import fired_by, fires, follow_few_cycles, four, rad
 
 import nutdamp
-from nutdamp.control_loop.budget import DAY, YEAR, Budget, HeldNutation, Thresholds, budget
-from nutdamp.control_loop.first_passage import Odds, Transfer, exceeds, transfer
+from nutdamp.control_loop.budget import DAY, YEAR, Budget, Cycle, HeldNutation, Map, Thresholds, budget
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.limit_cycle import Cycle, Map
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
+from nutdamp.control_loop.stability import Odds, Transfer, exceeds, transfer
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.figures.loop import budget_figure
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
-from nutdamp.views.budget import _notes, _warnings
+from nutdamp.views.loop import _notes, _warnings
 
 
 def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:

@@ -13,10 +13,9 @@ from support.builders import spinner
 from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
-from nutdamp.control_loop.batch import Case, expects_alone, fly_together
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, gain
-from nutdamp.control_loop.simulation import LoopRun, fly
+from nutdamp.control_loop.simulation import Case, LoopRun, expects_alone, fly, fly_together
 from nutdamp.control_loop.stability import Cause, Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
@@ -284,7 +283,7 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
     craft = replace(craft, dissipation=200.0)
     known, cases = Law(craft, loop), truths(rng, craft, loop, 9)
     whole = fly_together(known, cases, 40.0)
-    monkeypatch.setattr("nutdamp.control_loop.batch.TOGETHER", 100)
+    monkeypatch.setattr("nutdamp.control_loop.simulation.TOGETHER", 100)
     parts, alone = fly_together(known, cases, 40.0), fly_together(known, cases[7:8], 40.0)
     assert np.abs(whole.rates - parts.rates).max() < 1e-12
     assert np.abs(whole.rates[:, 7] - alone.rates[:, 0]).max() < 1e-12

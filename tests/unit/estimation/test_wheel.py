@@ -18,7 +18,7 @@ from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.results import carried
 from nutdamp.estimation.signals import ACCELERATION, GYROS, Record
-from nutdamp.files.fitted import fitted_text
+from nutdamp.files.carried import fitted_text
 from nutdamp.views.fit import fit_screen
 
 FILE: dict[str, Any] = {

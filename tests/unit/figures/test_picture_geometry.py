@@ -14,8 +14,7 @@ from support.golden import check_text
 
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
 from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning

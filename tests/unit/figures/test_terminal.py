@@ -16,8 +16,7 @@ import nutdamp
 from nutdamp.figures.geometry import ticks
 from nutdamp.figures.terminal import FAINT, BraillePanel, framed, motion_drawing
 from nutdamp.flight import propagation
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.planning import plan as planning
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector

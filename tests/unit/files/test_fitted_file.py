@@ -11,8 +11,8 @@ from support.golden import check_text
 from support.hand_made_fit import silent, told
 
 from nutdamp.estimation.results import carried, posterior, replaced
-from nutdamp.files.fitted import fitted_text, notes
-from nutdamp.files.overrides import parse_setting
+from nutdamp.files.carried import fitted_text, notes
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse

@@ -18,8 +18,8 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import BadRequest, Fault, FaultyFile
+from nutdamp.files.editing import parse_setting
 from nutdamp.files.fields import KeyPath
-from nutdamp.files.overrides import parse_setting
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.files.yaml import dotted, read_tree
 from nutdamp.spacecraft.model import Spacecraft

@@ -21,9 +21,8 @@ from support.process import Run
 
 from nutdamp.common.numerics import SAME_ANGLE
 from nutdamp.files.tabular import HEADER, number, track_array, write_track
-from nutdamp.flight import propagation, track
-from nutdamp.flight.propagation import Flight
-from nutdamp.flight.track import Track
+from nutdamp.flight import propagation
+from nutdamp.flight.propagation import Flight, Track
 from nutdamp.physics import attitude
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Attitude
@@ -156,7 +155,7 @@ TILTS = [(0, 80), (90, 70), (180, 60), (270, 85)]
 def test_ranges_of_the_spin_axis(places: list[tuple[float, float]], expected: dict[str, tuple[float, float]]) -> None:
     """By right ascensions and declinations, deg."""
     r, d = np.radians(places).T
-    found = track.extremes([pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))])
+    found = propagation.extremes([pointing(np.column_stack([np.cos(d) * np.cos(r), np.cos(d) * np.sin(r), np.sin(d)]))])
     assert {name: np.degrees(getattr(found, name)) for name in expected} == {
         name: pytest.approx(ends, abs=1e-12) for name, ends in expected.items()
     }
@@ -169,7 +168,7 @@ def test_ranges_of_the_spin_axis(places: list[tuple[float, float]], expected: di
 def test_free_nutation_circles_h_at_the_nutation_angle(spin: float) -> None:
     body = spinner(spin=spin, degrees=12.0)
     until = body.inertial_period
-    found = track.extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
+    found = propagation.extremes([propagation.flown(body, Schedule(), until).sampled(4001, until)])
     for ends in (found.x, found.y):
         assert np.degrees(ends) == pytest.approx([-12, 12], abs=1e-4)  # samples 0.09° apart on the circle
     assert np.degrees([found.farthest[0], found.nearest[0]]) == pytest.approx([12.0, 12.0], abs=1e-12)
@@ -183,7 +182,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
     place = np.array([[0, math.sin(r), math.cos(r)], [0, -math.cos(r), math.sin(r)], [1, 0, 0]])
     facing = attitude.from_matrix(place @ attitude.matrix(spinner(degrees=12.0).initial.quaternion))
     there = spinner(degrees=12.0, attitude=Attitude(facing))
-    found = track.extremes([propagation.flown(there, Schedule(), until).sampled(4001, until)])
+    found = propagation.extremes([propagation.flown(there, Schedule(), until).sampled(4001, until)])
     west = (right_ascension - 12) % 360
     assert np.degrees(found.declination) == pytest.approx([-12, 12], abs=1e-4)
     assert np.degrees(found.right_ascension) == pytest.approx([west, west + 24], abs=1e-4)
@@ -193,7 +192,7 @@ def test_extremes_in_the_frame_of_the_file(right_ascension: float) -> None:
 def test_even_times_are_those_of_linspace(samples: int, first: float, second: float, until: float) -> None:
     start, end = min(first, second), max(first, second)
     even = np.linspace(0.0, until, samples)
-    parts = list(track.even_times(samples, until, start, end))
+    parts = list(propagation.even_times(samples, until, start, end))
     assert np.concatenate([part.times for part in parts]).tolist() == even[(even > start) & (even < end)].tolist()
     assert [part.first for part in parts] == [True] + [False] * (len(parts) - 1)
     assert [part.last for part in parts] == [False] * (len(parts) - 1) + [True]
@@ -203,8 +202,7 @@ def test_even_times_are_those_of_linspace(samples: int, first: float, second: fl
 def test_the_pieces_of_a_track_are_its_rows(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = some_flight()
     whole = made.sampled(samples, UNTIL)
-    for module in (track, propagation):
-        monkeypatch.setattr(module, "PIECE", FEW)
+    monkeypatch.setattr(propagation, "PIECE", FEW)
     pieces = list(made.pieces(samples, UNTIL))
     assert len(pieces) >= len(whole.t) // (2 * FEW)
     assert max(len(piece.t) for piece in pieces) <= 2 * FEW + 4
@@ -217,14 +215,14 @@ def test_extremes_of_pieces_are_those_of_the_whole() -> None:
     made, generator = some_flight(), np.random.default_rng(4)
     for count in (1, 5, 40, 500):
         whole = made.sampled(count, UNTIL)
-        found = track.extremes([whole])
-        assert track.extremes(cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())) == found
+        found = propagation.extremes([whole])
+        assert propagation.extremes(cut(whole, np.sort(generator.integers(0, len(whole.t), 3)).tolist())) == found
         assert (found.rows, found.until) == (len(whole.t), UNTIL)
     # Of what is equal but for rounding the first time counts.
     angles = np.array([0.1, 0.3, 0.2, 0.3 + 0.4 * SAME_ANGLE, 0.25, 0.3 + 0.9 * SAME_ANGLE, 0.1])
     whole = pointing(np.column_stack([np.sin(angles), np.zeros(7), np.cos(angles)]))
     for size in (1, 2, 3, 7):
-        found = track.extremes(cut(whole, range(size, 7, size)))
+        found = propagation.extremes(cut(whole, range(size, 7, size)))
         assert found.farthest == pytest.approx((0.3, 1.0), abs=1e-15)
         assert found.nearest == pytest.approx((0.1, 0.0), abs=1e-15)
 
@@ -246,7 +244,7 @@ def test_memory_does_not_grow_with_the_rows() -> None:
     for samples in (150_000, 450_000):
         tracemalloc.start()
         try:
-            track.extremes(made.pieces(samples, UNTIL))
+            propagation.extremes(made.pieces(samples, UNTIL))
             with io.BytesIO() as nowhere:
                 nowhere.write = len  # type: ignore[method-assign, assignment]
                 write_track(made.pieces(samples, UNTIL), made.spacecraft.inertia, nowhere)

@@ -31,7 +31,7 @@ from nutdamp.page.html import block_html, page_html
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.views import guide
-from nutdamp.views.plan_json import comparison_json
+from nutdamp.views.pulses import comparison_json
 from nutdamp.views.tables import Heading
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

@@ -40,8 +40,8 @@ from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.spacecraft.tolerances import Dispersions
-from nutdamp.views.notes import joined
 from nutdamp.views.robust import robust_json
+from nutdamp.views.text import joined
 
 SAMPLES = 2_048
 """Cases of each plan: enough for what is tested here."""

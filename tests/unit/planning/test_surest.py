@@ -29,9 +29,8 @@ from nutdamp.schemes.optimal.linear_program import ProgramColumns
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
-from nutdamp.views import notes
-from nutdamp.views.robust import robust_notes
-from nutdamp.views.tolerances import stated_text
+from nutdamp.views import text
+from nutdamp.views.robust import robust_notes, stated_text
 
 EARLY = ("earliest end", "by ")
 """How variants begin that end as early as they can, or little later."""
@@ -193,20 +192,20 @@ def test_the_tolerances_that_have_to_shrink_are_named_with_their_sizes(
     assert needed.least >= probability
     checked = complying(needed.factor, needed.seed, needed.cases)
     assert (checked.met_fraction, checked.interval[0]) == (needed.complied, needed.least)
-    shown = re.search(r"A \{normal: ([0-9.]+) %\} instead of 0.5 %", notes.text(robust_notes(found)[0]))
+    shown = re.search(r"A \{normal: ([0-9.]+) %\} instead of 0.5 %", text.text(robust_notes(found)[0]))
     assert shown is not None
     assert 0.99 * 0.5 * needed.factor <= float(shown[1]) <= 0.5 * needed.factor
 
 
 def test_sizes_are_those_of_the_file_and_never_rounded_up() -> None:
-    for kind, unit, relative, size, nominal, text in (
+    for kind, unit, relative, size, nominal, written in (
         ("triangular", "", False, 0.0146789, 1.0, "1.46 %"),
         ("uniform", "m", False, 0.004999, 0.0, "4.99 mm"),
         ("normal", "kg m²", True, 0.6, 120.0, "0.5 %"),
         ("normal", "kg m²", False, 0.6, 120.0, "0.6 kg m²"),
         ("normal", "rad/s", False, 0.0, 0.0, "0 deg/s"),
     ):
-        assert stated_text(DispersedInput("x", "x", kind, size, nominal, unit), relative, down=True) == text
+        assert stated_text(DispersedInput("x", "x", kind, size, nominal, unit), relative, down=True) == written
 
 
 @pytest.mark.weekly

@@ -15,7 +15,7 @@ from nutdamp.common.results import Note, Value, note
 from nutdamp.planning.decision import compare, decide
 from nutdamp.planning.notes import GAINS, TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.views.guide import note_entries
-from nutdamp.views.notes import NAME, NOTE, REASON, WARNING, message, note_json, ordered, text
+from nutdamp.views.text import NAME, NOTE, REASON, WARNING, message, note_json, ordered, text
 
 SOURCE = Path(nutdamp.__file__).parent
 

@@ -1,0 +1,353 @@
+"""``nutdamp trade``, ``loop``, ``budget``, ``fit`` and ``disperse``."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nutdamp.cli.flown import flown_options, fronts_of, plan_or_read
+from nutdamp.cli.job import (
+    Files,
+    Job,
+    Output,
+    SessionCommand,
+    carry_options,
+    plot_options,
+    quiet_option,
+    screen_options,
+    spacecraft_argument,
+)
+from nutdamp.cli.main import leave, stoppable
+from nutdamp.cli.options import (
+    END,
+    FILE,
+    FOLDER,
+    OUTPUT,
+    SAMPLES,
+    Angles,
+    Bare,
+    Count,
+    Direction,
+    NameType,
+    UnitType,
+    expect_read,
+    goal_options,
+    reading_of,
+)
+from nutdamp.cli.screen import say
+from nutdamp.schemes.catalogue import LEAST, OPTIMAL
+from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from nutdamp.errors import CannotWrite
+    from nutdamp.montecarlo.study import Dispersed
+    from nutdamp.planning.plan import Plan
+    from nutdamp.planning.tradeoff import Front
+
+
+@click.command("trade", cls=SessionCommand)
+@spacecraft_argument
+@click.option(
+    "--allow",
+    type=UnitType("angle", lambda shift: shifts([shift]), "expected an angle of at least 0, or any", any=math.inf),
+    multiple=True,
+    metavar="ANGLE|any",
+    help="How far from its target H may end; repeatable, a front for each. Default: 0 deg and any.",
+)
+@click.option("--points", type=click.IntRange(1, 1000), default=10, show_default=True, help="Horizons tried per front.")
+@click.option(
+    "--least",
+    type=NameType(LEAST[:2]),
+    default=LEAST[0],
+    show_default=True,
+    help="What is traded against time; impulse where propellant is unknown.",
+)
+@partial(goal_options, several=False)
+@click.option("--csv", type=OUTPUT, help="Write the points.")
+@click.option("--json", type=OUTPUT, help="Write the points with their pulses.")
+@click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
+@click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
+@screen_options
+@quiet_option
+def trade_command(
+    job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool
+) -> None:
+    """Trade time against propellant: the cheapest schedules found for ends from the earliest to the horizon.
+
+    Each front is of the scheme optimal (of the others where that finds none) and holds no schedule that another beats
+    in both. SPACECRAFT and FILE are as for `nutdamp plan`.
+    """
+    from nutdamp.planning.decision import CUT
+    from nutdamp.planning.tradeoff import numbered
+    from nutdamp.views.trade import schedule_paths, trade_brief
+
+    allowed = allow or (0.0, math.inf)
+    for shift in allow:
+        if isinstance(shift, Bare) and shift:
+            job.remark(f"--allow: warning: {reading_of(shift, 'angle', 'deg')}")
+    job.begin([] if schedules is None else schedule_paths(schedules, points * len({*allowed})))
+    expect_read((OPTIMAL.name,), job.options, job.spacecraft, job.remark)
+    traded = fronts_of(job, points, allowed, least)
+    for index, _, point in numbered(traded.fronts):
+        if point.plan.cut:
+            job.remark(f"point {index}: {CUT}")
+    files, unsaved = ([], []) if schedules is None else _schedules(traded.fronts, schedules)
+    brief = [] if verbose else [partial(trade_brief, traded.spacecraft, traded.fronts)]
+    job.deliver(traded, *brief, files=files, unsaved=unsaved)
+    leave(infeasible=not traded.plans)
+
+
+def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list[CannotWrite]]:
+    """A file of each schedule, or the error where the folder cannot be made."""
+    from nutdamp.errors import CannotWrite
+    from nutdamp.files.tabular import make_folder
+    from nutdamp.views.trade import schedule_files
+
+    try:
+        make_folder(folder)
+    except CannotWrite as wrong:
+        return [], [wrong]
+    return [(path, partial(str, text)) for path, text in schedule_files(fronts, folder)], []
+
+
+@click.command("loop", cls=SessionCommand)
+@spacecraft_argument
+@click.option("--until", type=END, help="End; default: the horizon after the nutation is at start.")
+@click.option(
+    "--seed", type=click.IntRange(0, LARGEST_SEED), default=1, show_default=True, help="Of the noise of the sensor."
+)
+@click.option("--case", type=Count(), help="Fly this dispersed case, as `disperse --loop` does with that seed.")
+@click.option(
+    "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
+)
+@click.option("--csv", type=OUTPUT, help="Write the pulses, as `plan --csv` does.")
+@click.option("--track", type=OUTPUT, help="Write the track, as `simulate --csv` does.")
+@click.option("--json", type=OUTPUT, help="Write firings, dead band, margins.")
+@carry_options("end of the run")
+@click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
+@screen_options
+@quiet_option
+def loop_command(
+    job: Job, until: float | None, seed: int, case: int | None, samples: int, at: float | None, verbose: bool
+) -> None:
+    """Fly the closed loop of the file: fire from what its gyro or accelerometer shows, and see where it ends.
+
+    A channel wired backwards, a reversed sensor and firings that come too late are found and named by the first
+    firings that can be judged: exit status 3. SPACECRAFT and FILE are as for `nutdamp plan`.
+    """
+    body = job.begin()
+
+    from nutdamp.api import loop
+    from nutdamp.files.tabular import write_track
+    from nutdamp.views.loop import loop_screen, stopped, warnings
+
+    with job.working("flying"):
+        plan = loop(body, until, seed=seed, case=case)
+    run = plan.flown_run
+    if job.silent:
+        job.warn(warnings(body))
+    pieces = partial(run.flight.pieces, samples, run.until)
+    track: Files = {"track": lambda: partial(write_track, pieces(), run.flight.spacecraft.inertia)}
+    job.deliver(plan, partial(loop_screen, plan, verbose=verbose), more=track | job.carried(plan, at))
+    if run.stop.fault:
+        say(f"nutdamp: the loop was stopped {stopped(run)}")
+    leave(infeasible=run.stop.fault, missed=plan.meets_requirement is False)
+
+
+@click.command("budget", cls=SessionCommand)
+@spacecraft_argument
+@click.option(
+    "--thresholds",
+    "pairs",
+    type=Direction(thresholds, "expected START above STOP, both below 90 deg, such as 0.5deg,0.1deg"),
+    multiple=True,
+    metavar="START,STOP",
+    help="Fire from START to STOP, such as 0.5deg,0.1deg; repeatable. Default: start and stop of loop.",
+)
+@click.option(
+    "--largest",
+    type=UnitType("angle", tilt, "expected an angle between 0 and 90 deg"),
+    help="By which damping must begin; default: requirement.nutation.",
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the noise of the sensor.")
+@click.option("--csv", type=OUTPUT, help="Write a row for each two thresholds.")
+@click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
+@click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
+@screen_options
+@quiet_option
+def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool) -> None:
+    """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.
+
+    The limit cycle of the loop in the file, from event to event in closed form; and how long until damping must begin.
+    A body whose nutation decays needs none. SPACECRAFT and FILE are as for `nutdamp plan`.
+    """
+    body = job.begin()
+    for reading in (text for pair in pairs for text in pair.readings):
+        job.remark(f"--thresholds: warning: {reading}")
+
+    from nutdamp.api import budget
+    from nutdamp.views.loop import budget_screen
+
+    with job.working("following cycles"):
+        result = budget(body, pairs, largest=largest, seed=seed)
+    job.deliver(result, partial(budget_screen, result, verbose=verbose))
+    leave(infeasible=not result.feasible, missed=result.meets_requirement is False)
+
+
+@click.command("fit", cls=SessionCommand)
+@click.argument("telemetry", type=FILE, metavar="TELEMETRY.csv")
+@spacecraft_argument
+@click.option("--schedule", type=FILE, help="Pulses fired during the record, a CSV file as `plan --csv` writes it.")
+@click.option("--sun-pulses", type=FILE, help="Times of Sun pulses, a CSV file: t_s or utc, and any sun_aspect_deg.")
+@click.option("--at", type=UnitType("time"), default=0.0, help="Show and write the motion at this time; default 0 s.")
+@click.option("-o", "--output", type=OUTPUT, help="Write the spacecraft file with the estimates in it.")
+@click.option("--json", type=OUTPUT, help="Write estimates, covariance and signals.")
+@click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
+@click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
+@screen_options
+@quiet_option
+def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
+    """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
+
+    TELEMETRY.csv has t_s or utc, and any of omega_1_rad_s, omega_2_rad_s, omega_3_rad_s (or _deg_s), axis_ra_deg and
+    axis_dec_deg, axis_x, axis_y and axis_z, q_w to q_z, acceleration_m_s2, crossing_azimuth_deg and
+    crossing_elevation_deg of crossing_ra_deg and crossing_dec_deg (of the Sun where they are empty), sun_aspect_deg,
+    sun_pulse (0 or 1); empty cells are missing samples.
+    Least squares on the closed forms of the coast; what the data do not tell stays at the tolerances of the file.
+    -o writes the file with its comments kept: motion at --at, moments, and as dispersions how well all is known.
+
+    \b
+      nutdamp fit flight.csv -o now.yaml --at 90s
+      nutdamp plan now.yaml
+
+    Exit status 3 where nothing can be estimated, several nutation rates fit equally well, or residuals are no noise,
+    as with a pulse that --schedule does not have. SPACECRAFT and FILE are as for `nutdamp plan`.
+    """
+    body = job.begin()
+
+    from nutdamp.api import fit
+    from nutdamp.estimation.results import carried
+    from nutdamp.files.carried import notes
+    from nutdamp.views.fit import fit_screen
+
+    with job.working("fitting"):
+        fitted = fit(telemetry, body, schedule=job.flown.schedule, sun_pulses=sun_pulses, ignored=job.doubt)
+    job.warn(notes(fitted.core, carried(fitted.core, at)))
+    with job.working("looking ahead"):
+        prospects = fitted.outlook(at) if ahead else None
+    files: Files = {"output": partial(fitted.text, at), "json": partial(fitted.to_dict, at, prospects)}
+    job.deliver(fitted, partial(fit_screen, fitted.core, at, prospects, verbose=verbose), more=files)
+
+
+FIGURES = ("overview", "cases", "momentum")
+"""Figures that ``--plot`` draws."""
+
+
+@click.command("disperse", cls=SessionCommand)
+@spacecraft_argument
+@flown_options("Disperse")
+@goal_options
+@click.option(
+    "--samples",
+    type=Count(),
+    show_default=f"{SAMPLES}; of --loop what shows the share required, 2000 or more",
+    help="Dispersed cases to fly.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, LARGEST_SEED), default=1, show_default=True, help="Same seed, same draws, always."
+)
+@click.option("--threads", type=click.IntRange(1, 1024), help="Default: the processors there are.")
+@click.option("--loop", "looped", is_flag=True, help="Disperse the closed loop of the file: body, valves and sensor.")
+@click.option("--until", type=END, help="End of --loop; default: the horizon after the nutation is at start.")
+@click.option("--case", type=Count(), help="Show this one case alone, with all its inputs.")
+@click.option(
+    "--worst", type=click.IntRange(0, 1000), default=5, show_default=True, metavar="N", help="Worst cases with -v."
+)
+@click.option("--csv", type=OUTPUT, help="Write inputs and outcome of every case, with angles to cones.")
+@click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
+@plot_options(FIGURES)
+@screen_options
+@quiet_option
+def disperse_command(
+    job: Job,
+    samples: int | None,
+    seed: int,
+    threads: int | None,
+    looped: bool,
+    until: float | None,
+    case: int | None,
+    worst: int,
+    verbose: bool,
+) -> None:
+    """Fly one schedule, or the closed loop, in many cases, dispersed as the spacecraft file says.
+
+    Shows percentiles of what is left, the share of cases that comply, and which tolerance counts; with -v the tolerance
+    budget and the worst cases. Ctrl-C ends the run and shows what is done. SPACECRAFT and FILE are as for `nutdamp
+    plan`.
+    """
+    if case is not None and (job.written["csv"] or job.written["plot"]):
+        raise click.UsageError("--case shows a single case: --csv and --plot are for a study")
+    if until is not None and not looped:
+        raise click.UsageError("--until is for --loop")
+    others = {**job.flown._asdict(), "threads": threads, "figure": job.figure != FIGURES[0]} if looped else {}
+    for name in (name for name, value in others.items() if value):
+        raise click.UsageError(f"--loop flies the loop of the file, all in one way: leave --{name} out")
+    body = job.begin()
+
+    from nutdamp import api
+    from nutdamp.spacecraft.requirements import expect_dispersions, expect_loop
+    from nutdamp.views.dispersion import dispersion_brief
+
+    if looped:
+        expect_loop(body)
+        job.figure = None
+    expect_dispersions(body)
+    plan = None if looped else plan_or_read(job)
+    if case is not None:
+        deliver_case(job, plan, case - 1, seed=seed, until=until)
+        return
+    brief: list[Callable[[], RenderableType]] = []
+    with stoppable() as stopped, job.working("flying"):
+        hooks: dict[str, Any] = {"seed": seed, "csv": job.written["csv"], "stopped": stopped}
+        if plan is None:
+            flown: Dispersed = api.disperse_loop(body, samples, until=until, remark=job.remark, **hooks)
+        else:
+            flown = study = api.disperse(plan, samples or SAMPLES, threads=threads, remark=job.remark, **hooks)
+            brief += [partial(dispersion_brief, study.core, scheme=plan.scheme)] * (not verbose)
+    job.deliver(flown, *brief, unsaved=[flown.unsaved], worst=worst)
+    if stopped.number is not None and flown.core.done < flown.core.requested:
+        say(f"interrupted: {flown.core.done} of {flown.core.requested} cases are done")
+        sys.exit(128 + stopped.number)
+    leave(missed=flown.meets_requirement is False)
+
+
+def deliver_case(job: Job, plan: Plan | None, case: int, *, seed: int, until: float | None) -> None:
+    """Show a single case (from 0) of a schedule, or without ``plan`` of the closed loop."""
+    data: Callable[[], dict[str, Any]]
+    screen: Callable[[], RenderableType]
+    if plan is None:
+        from nutdamp.control_loop.dispersion import loop_study
+        from nutdamp.views.loop_cases import loop_case_json, loop_case_screen
+
+        loops = loop_study(job.spacecraft, until, seed=seed)
+        flown = loops.fly([loops.case(case)])
+        data = partial(loop_case_json, loops, case, flown)
+        screen = partial(loop_case_screen, loops, case, flown)
+    else:
+        from nutdamp.montecarlo.study import study_of
+        from nutdamp.views.dispersion import case_json, case_screen
+
+        study = study_of(plan.spacecraft, plan.pulses, seed=seed)
+        if study.lightening_error:
+            job.remark(study.lightening_error)
+        draws, scheme = study.draws_of(case), plan.scheme
+        data = lambda: {"scheme": scheme, "seed": seed, **case_json(study, case, draws)}  # noqa: E731
+        screen = partial(case_screen, study, case, draws, scheme=scheme)
+    job.deliver(None, screen, more={"json": data})
