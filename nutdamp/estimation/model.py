@@ -185,11 +185,9 @@ class Model:
     def predicted(self, values: Values) -> Vector:
         """Samples of `measured` as they would be without noise, (m,)."""
         work.spend(PREDICTION + SHOWN * len(self.measured))
-        _, back = self._all_times
-        rates, quaternion = (part[back] for part in self._remembered(values))
+        rates, quaternion = self._remembered(values)
         moments, parts = self._moments(values), []
-        for index, (name, samples) in enumerate(zip(self.signals, self.samples, strict=True)):
-            rows = np.flatnonzero(self.signal == index)[: len(samples)]
+        for name, samples, rows in zip(self.signals, self.samples, self._rows, strict=True):
             seen = Sighting(self.spacecraft, values, moments, samples, rates[rows], quaternion[rows])
             parts.append(KIND[name].predicted(seen))
         return np.concatenate(parts)
@@ -225,6 +223,13 @@ class Model:
         since = times - self.start
         omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, since, body.wheel)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
+
+    @cached_property
+    def _rows(self) -> list[NDArray[np.intp]]:
+        """Rows of the motion at all times that show each sample of a signal."""
+        _, back = self._all_times
+        firsts = np.searchsorted(self.signal, np.arange(len(self.signals)))
+        return [back[first : first + len(samples)] for first, samples in zip(firsts, self.samples, strict=True)]
 
     @cached_property
     def _all_times(self) -> tuple[Vector, NDArray[np.intp]]:

@@ -77,23 +77,24 @@ class Series:
         quaternion = self.turns[: self.order + 1].sum(axis=0)
         return rates, quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
 
-    def at(self, way: Array | float, cases: Any = ...) -> tuple[Array, Array]:
-        """Rates (3, m), unit quaternions (4, m) of ``cases`` after a ``way``, (m,) or one, in shares of the step."""
-        rates, turns = self.rates[: self.order + 1], self.turns[: self.order + 1]
-        if np.ndim(way) == 0:
-            powers = way ** np.arange(self.order + 1)
-            rate, quaternion = (np.tensordot(powers, part, 1)[:, cases] for part in (rates, turns))
-        else:
-            rates, turns = rates[:, :3, cases], turns[:, :, cases]
-            rate, quaternion = rates[-1], turns[-1]
-            for order in range(self.order - 1, -1, -1):
-                rate, quaternion = rate * way + rates[order], quaternion * way + turns[order]
+    def at(self, way: Array, cases: Any) -> tuple[Array, Array]:
+        """Rates (3, m), unit quaternions (4, m) of ``cases`` after a ``way`` (m,) in shares of the step."""
+        rates, turns = (part[: self.order + 1].take(cases, axis=2) for part in (self.rates, self.turns))
+        rate, quaternion = rates[-1], turns[-1]
+        for order in range(self.order - 1, -1, -1):
+            rate, quaternion = rate * way + rates[order], quaternion * way + turns[order]
         return rate[:3], quaternion / np.sqrt(np.sum(quaternion * quaternion, axis=0))
+
+    def along(self, ways: Array) -> tuple[Array, Array]:
+        """Rates (k, 3, n), quaternions (k, 4, n), of unit length to rounding, after each of the ``ways`` (k,)."""
+        powers = ways[:, None] ** np.arange(self.order + 1)
+        rates, turns = (np.tensordot(powers, part[: self.order + 1], 1) for part in (self.rates, self.turns))
+        return rates[:, :3], turns
 
     def _size(self, order: int) -> float:
         """Size of the terms of one order."""
-        turned = self.rates[order, :3] * self.step
-        return max(float(np.max(np.abs(turned))), float(np.max(np.abs(self.turns[order]))))
+        parts = self.rates[order, :3] * self.step, self.turns[order]
+        return max(float(size) for part in parts for size in (part.max(), -part.min()))
 
     def _next(self) -> None:
         """Append the next order: products of series are sums over the orders so far."""
@@ -303,14 +304,24 @@ class DenseStretch(NamedTuple):
     length: Array
     series: Series | None = None
 
-    def at(self, way: Array | float, cases: Any = ...) -> MotionStretch:
-        """Motion of ``cases`` after a ``way``, (m,) or one, as a share of the length."""
+    def at(self, way: Array, cases: Any) -> MotionStretch:
+        """Motion of ``cases`` after a ``way`` (m,), as a share of the length."""
         here = self.start.some(cases)
         since = here.since + way * self.length[cases]
         if self.series is None:
             return here.moved(since)
         rates, quaternion = self.series.at(way, cases)
         return here._replace(since=since, rates=rates, quaternion=quaternion)
+
+    def steps(self, count: int) -> Iterator[MotionStretch]:
+        """Motion at the end of each of ``count`` steps of equal length."""
+        ways = np.arange(1, count + 1) / count
+        times = self.start.since + ways[:, None] * self.length
+        if self.series is None:
+            yield from map(self.start.moved, times)
+            return
+        for since, rates, quaternion in zip(times, *self.series.along(ways), strict=True):
+            yield self.start._replace(since=since, rates=rates, quaternion=quaternion)
 
 
 def pieces(here: MotionStretch, duration: Array) -> Iterator[DenseStretch]:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.physics.batch import DenseStretch, MotionStretch, pieces
+from nutdamp.physics.batch import MotionStretch, pieces
 
 OBLIQUITY = math.radians(23.43928)
 """Obliquity of the ecliptic at J2000.0."""
@@ -58,9 +58,6 @@ Array = NDArray[np.float64]
 
 ROWS = 24
 """Steps per turn of the axis, where it is followed in steps."""
-
-SECANTS = 2
-"""Steps of the secant method to the extreme of the angle between two steps."""
 
 CIRCLE = 2.0 * math.pi
 
@@ -150,64 +147,75 @@ class AxisWatch:
                 self.some(cases)._steps(begins.some(cases), lasts[cases])
 
     def _steps(self, here: MotionStretch, duration: Array) -> None:
-        """Record start and end of each step, and extremes between them."""
+        """Record start, end, and the extremes between the steps on the way."""
         first, second, _ = here.bodies.moments
         pace = _momentum(here) / np.minimum(first, second)
         if not np.array_equal(first, second):
             pace = pace + np.abs(here.rates[2])
-        nearing = [self._look(here, ...)]
+        self._record(here, ...)
+        before = self._look(here)
         for piece in pieces(here, duration):
             count = max(math.ceil(float(np.max(pace * piece.length)) * ROWS / CIRCLE), 1)
-            nearing = [nearing[-1], *(self._look(piece.at((index + 1) / count), ...) for index in range(count))]
-            for number, rates in enumerate(np.array(nearing).swapaxes(0, 1)):
+            looks = np.array([before, *(self._look(here := step) for step in piece.steps(count))])
+            before = looks[-1]
+            for cosines, rates in looks.transpose(1, 2, 0, 3):
                 steps, cases = np.nonzero(rates[:-1] * rates[1:] < 0.0)  # in between it comes nearest, or goes farthest
                 if len(cases):
-                    ends = rates[steps, cases], rates[steps + 1, cases]
-                    self._between(piece, steps / count, (steps + 1) / count, ends, number, cases)
+                    slopes = (rates[steps + late, cases] * piece.length[cases] / count for late in (0, 1))
+                    way = _extreme(cosines[steps + 1, cases] - cosines[steps, cases], *slopes)
+                    self._record(piece.at((steps + way) / count, cases), cases)
+        self._record(here, ...)
 
-    def _between(
-        self, piece: DenseStretch, begin: Array, end: Array, rates: tuple[Array, Array], number: int, cases: Any
-    ) -> None:
-        """Record extremes between two shares of a piece, by `SECANTS` from the ``rates`` (nearer, farther) there."""
-        rise, fall = rates
-        for _ in range(SECANTS):
-            way = begin + (end - begin) * rise / (rise - fall)
-            here = self._look(piece.at(way, cases), cases)[number]
-            before = here * rise > 0.0
-            begin, rise = np.where(before, way, begin), np.where(before, here, rise)
-            end, fall = np.where(before, end, way), np.where(before, fall, here)
-
-    def _look(self, here: MotionStretch, cases: Any) -> list[Array]:
-        """Record the angles at one instant; returns the rate at which the axis comes nearer, in cosines per s."""
-        bodies, quaternion = here.bodies, here.quaternion
-        axis, (first, second, _) = self._axis(quaternion), here.rates
-        moving = self.sense * _rotated(quaternion, np.array([second, -first, np.zeros_like(first)]))  # ω × e3
-        momentum = _rotated(quaternion, bodies.momentum(here.rates))
-        size = np.sqrt(np.sum(momentum * momentum, axis=0))
-        momentum /= size
-        if bodies.forcing.growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
-            cosine = np.sum(momentum * axis, axis=0)
-            moving = moving + bodies.forcing.growth * cosine * (cosine * axis - momentum)
-        nearing = []
-        for number, direction in enumerate(self._towards(momentum, cases)):
-            angles = _angles(axis, direction)
+    def _record(self, here: MotionStretch, cases: Any) -> None:
+        """Record the angles of some of the observed cases at one instant."""
+        for number, (x, y, z) in enumerate(self._seen(here, cases)):
+            angles = np.arctan2(np.hypot(x, y), self.sense * z)
             self._take(number, angles, angles, cases)
-            nearer = np.sum(moving * direction, axis=0)
-            if number == self.momentum:  # which turns at the torque across it, over |H|
-                torque = _rotated(quaternion, _torque(here))
-                along = np.sum(torque * momentum, axis=0) * np.sum(axis * momentum, axis=0)
-                nearer = nearer + (np.sum(torque * axis, axis=0) - along) / size
-            nearing.append(np.asarray(nearer))
-        return nearing
 
-    def _towards(self, momentum: Array, cases: Any = ...) -> Iterator[Array]:
-        """Directions (3, n) of some of the observed cases, whose H is along the unit vectors ``momentum`` (3, n)."""
+    def _look(self, here: MotionStretch) -> list[tuple[Array, Array]]:
+        """Cosine of each angle, and the rate, 1/s, at which it rises: the axis comes nearer."""
+        (first, second, _), growth, looks = here.rates, here.bodies.forcing.growth, list[tuple[Array, Array]]()
+        for number, seen in enumerate(self._seen(here, ...)):
+            rate = second * seen[0] - first * seen[1]  # of e3, by ω × e3
+            if growth != 0.0 or number == self.momentum:
+                momentum = here.bodies.momentum(here.rates)
+                size = np.sqrt(np.sum(momentum * momentum, axis=0))
+                along = momentum[2] / size
+            if growth != 0.0:  # the axis leaves H at θ' = κ sin θ cos θ
+                rate = rate + growth * along * (along * seen[2] - np.sum(momentum * seen, axis=0) / size)
+            if number == self.momentum:  # which turns at the torque across it, over |H|
+                torque = _torque(here)
+                rate = rate + (torque[2] - np.sum(torque * seen, axis=0) * along) / size
+            looks.append((self.sense * seen[2], self.sense * rate))
+        return looks
+
+    def _seen(self, here: MotionStretch, cases: Any) -> Iterator[Array]:
+        """Directions (3, n) in body axes, of some of the observed cases."""
+        back = here.quaternion * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
         for number, directions in enumerate(self.directions[:, :, self.rows]):
-            yield momentum if number == self.momentum else directions[:, cases]
+            if number == self.momentum:
+                momentum = here.bodies.momentum(here.rates)
+                yield momentum / np.sqrt(np.sum(momentum * momentum, axis=0))
+            else:
+                yield _rotated(back, directions[:, cases])
+
+    def _towards(self, momentum: Array) -> Iterator[Array]:
+        """Directions (3, n) of the observed cases, whose H is along the unit vectors ``momentum`` (3, n)."""
+        for number, directions in enumerate(self.directions[:, :, self.rows]):
+            yield momentum if number == self.momentum else directions
 
     def _axis(self, quaternion: Array) -> Array:
         w, x, y, z = quaternion
         return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+
+
+def _extreme(rise: Array, before: Array, after: Array) -> Array:
+    """Level point of a cubic from 0 to 1 that gains a ``rise``, with slopes ``before`` and ``after`` of either sign."""
+    square, linear = 3.0 * (before + after - 2.0 * rise), 6.0 * rise - 4.0 * before - 2.0 * after
+    root = np.sqrt(np.maximum(linear * linear - 4.0 * square * before, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        level = 2.0 * before / (np.copysign(root, before) - linear)
+    return np.where((level >= 0.0) & (level <= 1.0), level, before / (before - after))
 
 
 def _torque(here: MotionStretch) -> Array:

@@ -530,13 +530,9 @@ class BlockModel:
 
     def left(self, state: BlockState) -> Left:
         """Residual for `requirements`."""
-        across = np.sin(state.sun_angle)
-        axis = np.stack(
-            np.broadcast_arrays(
-                across * np.cos(state.longitude), across * np.sin(state.longitude), np.cos(state.sun_angle)
-            ),
-            axis=-1,
-        )
-        apart = np.arctan2(np.linalg.norm(np.cross(axis, self.goal), axis=-1), axis @ self.goal)
+        across, (i, j, k) = np.sin(state.sun_angle), self.goal
+        x, y, z = across * np.cos(state.longitude), across * np.sin(state.longitude), np.cos(state.sun_angle)
+        aside = np.sqrt((y * k - z * j) ** 2 + (z * i - x * k) ** 2 + (x * j - y * i) ** 2)
+        apart = np.arctan2(aside, x * i + y * j + z * k)
         nutation = np.arctan2(np.abs(state.phasor), np.abs(self.inertia.axial(state.spin)))
         return Left(nutation, apart, state.spin)

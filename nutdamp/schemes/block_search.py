@@ -13,6 +13,7 @@ import operator
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
+from heapq import nsmallest
 from itertools import islice
 from typing import Any
 
@@ -61,6 +62,9 @@ SHARES = np.linspace(0.0, 1.0, 13)[1:]
 
 CHEAPER = 0.9
 """Multiple of the cost of a sequence below which one that leaves more is looked at, too."""
+
+DEAR = 1.5
+"""Multiple of the least cost of lowering the nutation above which further blocks are looked for though one complies."""
 
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
@@ -118,7 +122,7 @@ class BlockSearch:
         firsts: list[BlockSequence] = []
         for number in range(2, most + 1):
             self.most = self.least_cost(sequences)
-            if work.exhausted() or (self.most < math.inf and not self.small):
+            if work.exhausted() or (self.most < math.inf and not (self.small or self._dear)):
                 break
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
@@ -129,24 +133,24 @@ class BlockSearch:
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
             sequences += firsts
         self.most = math.inf
-        unsure = sorted((each for each in sequences if each.share <= DOUBTFUL), key=lambda each: each.rank[1:])
-        self.doubtful = list(by_blocks(unsure[: ALIKE * DOUBTS]).values())
+        unsure = (each for each in sequences if each.share <= DOUBTFUL)
+        self.doubtful = list(by_blocks(nsmallest(ALIKE * DOUBTS, unsure, key=lambda each: each.rank[1:])).values())
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
         ranked = [next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)]
-        clear = sorted(ranked, key=lambda sequence: sequence.share)[: FLOWN // 2]
+        clear = nsmallest(GENTLE * FLOWN, ranked, key=_share)
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
-        first = by_blocks((*ranked[: FLOWN // 2], *clear, *each))
+        first = by_blocks((*ranked[: FLOWN // 2], *clear[: FLOWN // 2], *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
-        gentle = sorted(sorted(ranked, key=lambda sequence: sequence.share)[: GENTLE * FLOWN], key=self._largest_pulse)
+        gentle = sorted(clear, key=self._largest_pulse)
         more = by_blocks((*_front(ranked)[:FLOWN], *of_each_kind(ranked)[:FLOWN], *gentle))
         others = (sequence for blocks, sequence in more.items() if blocks not in first)
         return [*first.values(), *islice(others, 4 * FLOWN)]
 
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
-        complying = sorted((sequence for sequence in sequences if sequence.rank[0] <= 0.0), key=_rank)
-        cheapest = list(by_blocks(complying[: ALIKE * DOUBTS]).values())
+        complying = (sequence for sequence in sequences if sequence.rank[0] <= 0.0)
+        cheapest = list(by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank)).values())
         for sequence in self.flights.fired(cheapest[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 break
@@ -154,6 +158,22 @@ class BlockSearch:
                 if self.flights.flown(sequence).rank[:2] == (False, 0.0):
                     return sequence.rank[1]
         return math.inf
+
+    @property
+    def _dear(self) -> bool:
+        """True where the nutation alone has to be lowered, and more blocks may cost much less than those that comply.
+
+        The least is what kicks cost that all point against ω, or two pulses.
+        """
+        if self._free == 1:
+            return False
+        kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(self.body.axial)
+        least = math.inf
+        for channel in filter(lambda each: each.transverse, self.channels):
+            shortest = float(acts(channel, commandable_widths(self.commands, channel)).on_time.min())
+            lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
+            least = min(least, channel.cost_rate(by_propellant=True) * lasts)
+        return self.most > DEAR * least
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
@@ -472,7 +492,7 @@ class BlockSearch:
             sequences += self.behind([before], state, trials, off=off)
         other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
         ranked = by_blocks(sorted(other, key=_rank))
-        clear = sorted(ranked.values(), key=lambda sequence: sequence.share)[: FLOWN // 2]
+        clear = nsmallest(FLOWN // 2, ranked.values(), key=_share)
         chosen = (*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values()))
         return [self._in_form(sequence) for sequence in by_blocks(chosen).values()]
 
@@ -498,7 +518,7 @@ class BlockSearch:
         return Trial(wait, delays, width, count, last.every)
 
 
-_rank, _blocks = operator.attrgetter("rank"), operator.attrgetter("blocks")
+_rank, _share, _blocks = map(operator.attrgetter, ("rank", "share", "blocks"))
 
 
 def _following(blocks: Sequence[Block]) -> int:

@@ -21,7 +21,13 @@ from nutdamp.errors import BadRequest
 from nutdamp.estimation import forecast
 from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
+from nutdamp.montecarlo.cases import DispersedCases, number_of
+from nutdamp.montecarlo.closed_form import Ends
+from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import decision
+from nutdamp.schemes import planner
+from nutdamp.spacecraft.model import Requirement
 from nutdamp.views.fit import advice, estimate_table, fit_screen, prospect_table
 
 SPIN, LENGTH = math.pi, 30.0
@@ -121,6 +127,31 @@ def test_longer_coasts_tell_more_and_a_probe_pulse_its_thrust(fitted: Fitted, mo
     assert 0.0 < probe.thrust < 0.01 < probe.on_time
     assert (probe.propellant or 0.0) > 0.0
     assert probe.nutation < ahead.now.nutation  # which comes from the thrust
+
+
+@pytest.mark.parametrize(("scheme", "shift", "level"), [("one-pulse", None, 0.997), ("optimal", 0.12, 0.5)])
+def test_cases_near_a_bound_are_flown_and_the_others_cannot_pass_it(
+    scheme: str, shift: float | None, level: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As all cases flown, of which a part meets the requirement."""
+    required = Requirement(math.radians(0.12), None if shift is None else math.radians(shift))
+    body, flown = replace(nutdamp.example(), requirement=required), list[int]()
+    study = study_of(body, planner.schedule(scheme, body))
+    exact = run(Results(study, forecast.CASES))
+    flies = RealWidths.__call__
+
+    def counted(self: RealWidths, cases: DispersedCases) -> Ends:
+        flown.append(number_of(cases))
+        return flies(self, cases)
+
+    monkeypatch.setattr(RealWidths, "__call__", counted)
+    nutation, met = forecast.left_in_cases(study, level)
+    assert exact.values is not None
+    assert met is not None
+    assert nutation == pytest.approx(float(np.quantile(exact.values[0], level)), rel=1e-9)
+    assert met == exact.met_fraction
+    assert 0.01 < met < 0.99
+    assert sum(flown) < 0.5 * forecast.CASES
 
 
 def test_what_pays_is_said_once_it_does() -> None:

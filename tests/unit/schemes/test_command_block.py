@@ -114,6 +114,15 @@ def test_the_best_blocks_flown_by_the_reference_end_where_the_plan_says(seed: in
     assert nutation == pytest.approx(float(plan.left.nutation), abs=near)
 
 
+@pytest.mark.parametrize("seed", [26, 52])
+def test_two_blocks_damp_where_a_single_one_that_complies_costs_much_more(seed: int) -> None:
+    body = replace(some_body(seed, target=False), requirement=within(0.2))
+    single = planned(body, Options(max_blocks=1))
+    several = planned(body)
+    assert len(several.pulses.blocks) > 1
+    assert several.pulses.cost < 0.5 * single.pulses.cost
+
+
 @pytest.mark.deep
 def test_blocks_behind_cheap_first_ones_are_looked_for_too() -> None:
     """Three blocks of two pulses each meet the requirement; a first block of 73 that leaves a little less is no better.
