@@ -137,7 +137,7 @@ Attempt = Callable[[], Iterable[tuple[str, Plan]]]
 def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
     """Attempts of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    planned, margins, varied = list[Attempt](), list[Attempt](), list[Attempt]()
+    planned, margins, early, varied = list[Attempt](), list[Attempt](), list[Attempt](), list[Attempt]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
@@ -145,8 +145,9 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         varied.append(partial(_alignments, body, base.scheme, options))
         varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            margins += [partial(_early, body, options), partial(chance_plan.plans, body, options)]
-    return [*planned, *margins, *varied]
+            margins.append(partial(chance_plan.plans, body, options))
+            early.append(partial(_early, body, options))
+    return [*planned, *margins, *early, *varied]
 
 
 def compare(

@@ -22,7 +22,6 @@ from nutdamp.montecarlo.closed_form import ClosedForm
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.statistics import ROWS, vectors
 from nutdamp.montecarlo.study import EARLY, Results, run, study_of, threads_here
-from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.screening import Cases, PlanCandidate, cases_of, entered, fly_all
@@ -47,8 +46,8 @@ FEW = 8
 PASSES, NEARLY = 3, 2.0
 """Times that on-times are shortened, and standard deviations of complying cases to spare up to which once will do."""
 
-NEAR, THIN = 0.5, 8
-"""Severity from which all cases are predicted, and for how many cases one of the others stands."""
+WORST, THIN = 20.0, 8
+"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands."""
 
 SMALL = 0.02
 """Share of on-times of difference quotients."""
@@ -104,21 +103,20 @@ def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[
     low, high, best = SHORTEST, 1.0, plan
     for _ in range(halvings):
         middle = 0.5 * (low + high)
-        shorter = _scaled(plan, [middle if index in which else 1.0 for index in range(len(plan.pulses))])
-        if shorter is not None and complies(shorter):
-            best, high = shorter, middle
-        else:
-            low = middle
+        ratios = [middle if index in which else 1.0 for index in range(len(plan.pulses))]
+        shorter = _scaled(plan, ratios, complies)
+        best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
     return best
 
 
-def _scaled(plan: Plan, ratios: Sequence[float]) -> Plan | None:
-    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement."""
-    body = plan.spacecraft
-    with suppress(Infeasible):
-        scaled = planning.judged(body, plan.scheme, _longer(plan, ratios), plan.options)
-        if scaled.feasible and scaled.meets_requirement is not False and keeps_limits(body, scaled.pulses):
-            return scaled
+def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool] = lambda _: True) -> Plan | None:
+    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement, or ``complies`` fails."""
+    body, schedule = plan.spacecraft, _longer(plan, ratios)
+    if keeps_limits(body, schedule) and complies(replace(plan, schedule=schedule)):
+        with suppress(Infeasible):
+            scaled = planning.judged(body, plan.scheme, schedule, plan.options)
+            if scaled.feasible and scaled.meets_requirement is not False:
+                return scaled
     return None
 
 
@@ -172,24 +170,20 @@ class FlownPlan:
     def _slopes(self) -> list[tuple[Vector, Vector, NDArray[np.int_]]]:
         """Ends (10, n) of cases of both draws, their slopes (k, 10, n), and for how many cases each stands, (n,).
 
-        All that are not far from failing, and some of the others. By what share each pulse is on longer, in the closed
+        All that are nearest to failing, and some of the others. By what share each pulse is on longer, in the closed
         form, of which the nutation is exact too.
         """
         slopes = []
         for flown in (self.candidate.results, self.fresh.results):
             assert flown is not None
             ends = flown.early[:, : flown.done]
-            weights = np.where(self._severity(ends) >= NEAR, 1, 0)
+            severity, worst = self._severity(ends), min(math.ceil(WORST * self.may_fail) + 1, flown.done)
+            weights = np.where(severity >= np.sort(severity)[-worst], 1, 0)
             weights[np.flatnonzero(weights == 0)[::THIN]] = THIN
             taken = np.flatnonzero(weights)
             here, slope = self._moved(flown.study.draws_of_all(taken))
             slopes.append((np.vstack([here[:2], ends[2:, taken]]), slope, weights[taken]))
         return slopes
-
-    @cached_property
-    def _nominal(self) -> tuple[Vector, Vector]:
-        """End (10, 1) with nominal values in the closed form, and its slopes (k, 10, 1)."""
-        return self._moved({})
 
     def _moved(self, draws: Draws) -> tuple[Vector, Vector]:
         """Ends (10, n) of cases in the closed form, and their slopes (k, 10, n)."""
@@ -205,13 +199,8 @@ class FlownPlan:
         """
         pairs = zip(plan.pulses, self.plan.pulses, strict=True)
         more = np.array([short.on_time / long.on_time - 1.0 for short, long in pairs])
-        # The closed form errs by what it takes wide pulses for, and slopes by their change: nearly alike in all cases.
-        nominal, slopes = self._nominal
-        moved = _ends(plan.spacecraft, plan.pulses, {}) - nominal
-        moved[2:8, 0] = np.tile(_heading(plan) - _heading(self.plan), 2)
-        moved -= np.tensordot(more, slopes, 1)
         for (ends, slopes, weights), failing in zip(self._slopes, self.failing, strict=True):
-            severity = self._severity(ends + np.tensordot(more, slopes, 1) + moved)
+            severity = self._severity(ends + np.tensordot(more, slopes, 1))
             if weights[severity > 1.0].sum() > max(self.may_fail - fewer, min(failing, self.may_fail)):
                 return False
         return True
@@ -232,12 +221,6 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
     ends = np.empty((ROWS, number_of(cases)))
     vectors(model, ClosedForm(model)(cases), ends)
     return ends
-
-
-def _heading(plan: Plan) -> Vector:
-    """Direction (3,) of H at the end of the nominal flight, in body axes at t = 0."""
-    axis = attitude.rotate(attitude.conjugate(plan.spacecraft.initial.quaternion), plan.flight.last_momentum)
-    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def shortest(chosen: PlanCandidate, fresh: Fresh) -> FlownPlan:
