@@ -37,6 +37,9 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)
 """Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
+EARLIEST = "earliest end"
+"""Label of the plan of `optimal` that ends first."""
+
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
 
@@ -178,7 +181,7 @@ def compare(
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
-                margins = margins or variant.startswith(chance_plan.AGAINST)
+                margins = margins or variant.startswith((chance_plan.AGAINST, EARLIEST))
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
@@ -317,7 +320,7 @@ def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     first = attempt(body, chance_plan.SCHEME, Options(**{**options.chosen, "least": "time"}))
     if not first.feasible:
         return
-    yield "earliest end", first
+    yield EARLIEST, first
     for times in WITHIN:
         horizon = times * first.end
         if horizon < body.horizon:
