@@ -232,7 +232,7 @@ class Exact:
 
 
 class Sketch:
-    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB at most, whatever the number of cases.
+    """Counts of values by sign, power of two and leading bits of the mantissa: 16 MiB for any number of cases.
 
     Quantiles are right to 0.006 % of their value; minimum and maximum are exact.
     """

@@ -58,7 +58,7 @@ class Series:
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
         self.sink = None if forcing.growth == 0.0 else _DampingSeries(moments, forcing, acceleration, rates, step)
         self.wheel = np.stack([-forcing.wheel / first, forcing.wheel / second]) if np.any(forcing.wheel) else None
-        # The spin of a symmetric body changes evenly: its series ends after two terms or one, and sums with it are short.
+        # The spin of a symmetric body changes evenly: its series ends after two terms or one: short sums.
         self.even_spin = not self.coupled and self.sink is None and jerk is None
         self.spins = 2 if acceleration[2].any() else 1
         self.order = 0

@@ -168,11 +168,12 @@ def compare(
     body = comparison.spacecraft
     probability = required_share(body.requirement)
     entries: dict[object, PlanCandidate] = {}
-    ranks: RobustComparison | None = None
+    # No early end costs less than the plan of the whole horizon that leaves as little.
+    least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == chance_plan.SCHEME), default=0.0)
     with work.budget("the robust plans", work.FRONTS):
         for number, trial in enumerate(trials):
             watch(number)
-            margins = False
+            margins = early = False
             for variant, plan in () if work.exhausted() else trial():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
@@ -181,7 +182,7 @@ def compare(
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
-                margins = margins or variant.startswith((chance_plan.AGAINST, EARLIEST))
+                margins, early = margins or variant.startswith(chance_plan.AGAINST), early or variant == EARLIEST
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
@@ -189,9 +190,10 @@ def compare(
                         entries[kind].variant = variant
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
-            if margins:
+            if margins or early:
                 ranks = _flown(comparison, entries, samples, probability)
-                if ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
+                done = early or (ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least)
+                if done and ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
                     return _trimmed(ranks)
     return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
 
