@@ -87,10 +87,10 @@ def fresh_of(chosen: PlanCandidate, samples: int) -> Fresh | None:
 def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
 
-    Plans on ticks, of command blocks, or with pulses of no channel stay as they are.
+    Plans on ticks, of command blocks, of nothing, or with pulses of no channel stay as they are.
     """
     channels = {channel.name: channel for channel in plan.spacecraft.channels}
-    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks)
+    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks) or not len(plan.pulses)
     if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
     everywhere = list(range(len(plan.pulses)))
