@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -468,12 +469,7 @@ class DrawSource:
         self._groups = [group for group in groups if any(name in self._rows for name in group.names)]
         grouped = {name for group in self._groups for name in group.names}
         self._alone = [entry for entry in self._random if entry.name not in grouped]
-        self._keys = {
-            name: np.array([seed, _number(name)], dtype=np.uint64)
-            for name in dict.fromkeys([*self._rows, *sorted(grouped)])
-        }
-        self._bits = np.random.Philox(key=0)
-        self._generator = np.random.Generator(self._bits)
+        self._seed = seed
         self._table = np.empty((len(self._random), BLOCK))
         self._physical = physical
 
@@ -505,38 +501,41 @@ class DrawSource:
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
         """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
+        at = self._seed, block, attempt, table.shape[1]
         for entry in self._alone:
-            row, generator = table[self._rows[entry.name]], self._stream(entry.name, block, attempt)
-            if entry.kind == "normal":
-                generator.standard_normal(out=row)
-                row *= entry.size
-            else:
-                generator.random(out=row)
-                if entry.kind == "triangular":
-                    row += generator.random(len(row))
-                    row -= 1.0
-                else:
-                    row *= 2.0
-                    row -= 1.0
-                row *= entry.size
+            np.multiply(_drawn(entry.name, entry.kind, *at), entry.size, out=table[self._rows[entry.name]])
         for group in self._groups:
-            count = (table.shape[1],)
-            normals = [self._stream(name, block, attempt).standard_normal(count) for name in group.names]
+            normals = [_drawn(name, "normal", *at) for name in group.names]
             for name, normal in zip(group.names, group.mixed(normals), strict=True):
                 if name in self._rows:
                     table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
 
-    def _stream(self, name: str, block: int, attempt: int) -> np.random.Generator:
-        """Generator at the start of the draws of one input."""
-        self._bits.state = {
-            "bit_generator": "Philox",
-            "state": {"counter": np.array([0, 0, attempt, block], dtype=np.uint64), "key": self._keys[name]},
-            "buffer": np.zeros(4, dtype=np.uint64),
-            "buffer_pos": 4,  # empty: begin with the counter
-            "has_uint32": 0,
-            "uinteger": 0,
-        }
-        return self._generator
+
+KEPT = 128
+"""Streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws."""
+
+_DRAWING = threading.Lock()
+
+
+def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """First ``count`` draws of an input, of size one; by the thread that comes first where several want the same."""
+    with _DRAWING:
+        return _stream(name, kind, seed, block, attempt, count)
+
+
+@lru_cache(KEPT)
+def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
+    """Read-only draws of `_drawn`."""
+    key, counter = np.array([seed, _number(name)], np.uint64), np.array([0, 0, attempt, block], np.uint64)
+    generator = np.random.Generator(np.random.Philox(key=key, counter=counter))
+    if kind == "normal":
+        draws = generator.standard_normal(count)
+    elif kind == "uniform":
+        draws = 2.0 * generator.random(count) - 1.0
+    else:
+        draws = generator.random(count) + generator.random(count) - 1.0
+    draws.setflags(write=False)
+    return draws
 
 
 def _bad_rows(good: NDArray[np.bool_] | bool, count: int) -> NDArray[np.intp]:

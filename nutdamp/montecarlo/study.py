@@ -153,6 +153,9 @@ class Round:
 ROUND = 64 * BLOCK
 """Cases between two looks at the results."""
 
+FREED = 32_000_000
+"""Bytes of the largest block that counts for that."""
+
 EARLY = 2 * BLOCK
 """Number of first cases whose outcome is kept whole for `sampled_shares`."""
 
@@ -415,6 +418,8 @@ def run(
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
     the first ones, are kept. ``collect`` is given their outputs in order.
     """
+    # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
+    np.empty(FREED, dtype=np.uint8)
     while results.done < results.requested and not stopped():
         first = results.done
         last = min(results.requested, first - first % ROUND + ROUND)

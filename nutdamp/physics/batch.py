@@ -58,17 +58,19 @@ class Series:
         self.turning = [(size * np.exp(1j * rate * now), 1j * rate * step) for size, rate in forcing.turning]
         self.sink = None if forcing.growth == 0.0 else _DampingSeries(moments, forcing, acceleration, rates, step)
         self.wheel = np.stack([-forcing.wheel / first, forcing.wheel / second]) if np.any(forcing.wheel) else None
-        # The spin of a symmetric body changes evenly: its series ends after two terms, and sums with it are short.
+        # The spin of a symmetric body changes evenly: its series ends after two terms or one: short sums.
         self.even_spin = not self.coupled and self.sink is None and jerk is None
+        self.spins = 2 if acceleration[2].any() else 1
         self.order = 0
 
     def converges(self) -> bool:
         """Add orders until converged; False if `LARGEST_ORDER` is not enough."""
-        scale = REMAINDER * max(1.0, float(np.max(np.abs(self.rates[0] * self.step))))
+        span = float(np.max(np.abs(self.rates[0] * self.step)))
+        scale, early = REMAINDER * max(1.0, span), 3.0 + 4.0 * span  # before which terms are not that small
         small = 0
         while self.order < LARGEST_ORDER and small < 2:
             self._next()
-            small = small + 1 if self.order >= 3 and self._size(self.order) < scale else 0
+            small = small + 1 if self.order >= early and self._size(self.order) < scale else 0
         return small == 2
 
     def end(self) -> tuple[Array, Array]:
@@ -102,7 +104,7 @@ class Series:
         scale = self.step / (k + 1)
         following = rates[k + 1, :3]
         parts = 3 if self.coupled else 2
-        spins = min(k + 1, 2) if self.even_spin else k + 1
+        spins = min(k + 1, self.spins) if self.even_spin else k + 1
         if self.even_spin:
             latest = rates[k - spins + 1 : k + 1, 1::-1]  # ω2 and ω1
             products = np.einsum("kn,kcn->cn", rates[spins - 1 :: -1, 2], latest)

@@ -37,6 +37,9 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)
 """Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
+EARLIEST = "earliest end"
+"""Label of the plan of `optimal` that ends first."""
+
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
 
@@ -137,7 +140,7 @@ Attempt = Callable[[], Iterable[tuple[str, Plan]]]
 def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
     """Attempts of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    planned, margins, varied = list[Attempt](), list[Attempt](), list[Attempt]()
+    planned, margins, early, varied = list[Attempt](), list[Attempt](), list[Attempt](), list[Attempt]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
@@ -145,8 +148,9 @@ def attempts(comparison: Comparison, options: Options | None = None) -> list[Att
         varied.append(partial(_alignments, body, base.scheme, options))
         varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            margins += [partial(_early, body, options), partial(chance_plan.plans, body, options)]
-    return [*planned, *margins, *varied]
+            margins.append(partial(chance_plan.plans, body, options))
+            early.append(partial(_early, body, options))
+    return [*planned, *margins, *early, *varied]
 
 
 def compare(
@@ -164,11 +168,12 @@ def compare(
     body = comparison.spacecraft
     probability = required_share(body.requirement)
     entries: dict[object, PlanCandidate] = {}
-    ranks: RobustComparison | None = None
-    with work.budget("the robust plans", work.FRONTS):
+    # No early end costs less than the plan of the whole horizon that leaves as little.
+    least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == chance_plan.SCHEME), default=0.0)
+    with work.budget("the robust plans", work.FRONTS) as budget:
         for number, trial in enumerate(trials):
             watch(number)
-            margins = False
+            margins = early = False
             for variant, plan in () if work.exhausted() else trial():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
@@ -177,7 +182,7 @@ def compare(
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
-                margins = margins or variant.startswith(chance_plan.AGAINST)
+                margins, early = margins or variant.startswith(chance_plan.AGAINST), early or variant == EARLIEST
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
@@ -185,9 +190,12 @@ def compare(
                         entries[kind].variant = variant
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
-            if margins:
+            # What the margins took, the trial after the plans compared, is not missing from the early ends.
+            budget.most = work.FRONTS + (budget.done if number == len(comparison.plans) else 0.0)
+            if margins or early:
                 ranks = _flown(comparison, entries, samples, probability)
-                if ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
+                done = early or (ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least)
+                if done and ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
                     return _trimmed(ranks)
     return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
 
@@ -316,7 +324,7 @@ def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     first = attempt(body, chance_plan.SCHEME, Options(**{**options.chosen, "least": "time"}))
     if not first.feasible:
         return
-    yield "earliest end", first
+    yield EARLIEST, first
     for times in WITHIN:
         horizon = times * first.end
         if horizon < body.horizon:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.errors import Infeasible
+from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel, number_of
 from nutdamp.montecarlo.closed_form import ClosedForm
 from nutdamp.montecarlo.inputs import Draws
@@ -47,8 +48,8 @@ FEW = 8
 PASSES, NEARLY = 3, 2.0
 """Times that on-times are shortened, and standard deviations of complying cases to spare up to which once will do."""
 
-NEAR, THIN = 0.5, 8
-"""Severity from which all cases are predicted, and for how many cases one of the others stands."""
+WORST, THIN = 20.0, 8
+"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands."""
 
 SMALL = 0.02
 """Share of on-times of difference quotients."""
@@ -86,10 +87,10 @@ def fresh_of(chosen: PlanCandidate, samples: int) -> Fresh | None:
 def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     """Plan with the shortest on-times for which `complies` holds; the same one where nothing is to be gained.
 
-    Plans on ticks, of command blocks, or with pulses of no channel stay as they are.
+    Plans on ticks, of command blocks, of nothing, or with pulses of no channel stay as they are.
     """
     channels = {channel.name: channel for channel in plan.spacecraft.channels}
-    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks)
+    fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks) or not len(plan.pulses)
     if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
     everywhere = list(range(len(plan.pulses)))
@@ -104,21 +105,20 @@ def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[
     low, high, best = SHORTEST, 1.0, plan
     for _ in range(halvings):
         middle = 0.5 * (low + high)
-        shorter = _scaled(plan, [middle if index in which else 1.0 for index in range(len(plan.pulses))])
-        if shorter is not None and complies(shorter):
-            best, high = shorter, middle
-        else:
-            low = middle
+        ratios = [middle if index in which else 1.0 for index in range(len(plan.pulses))]
+        shorter = _scaled(plan, ratios, complies)
+        best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
     return best
 
 
-def _scaled(plan: Plan, ratios: Sequence[float]) -> Plan | None:
-    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement."""
-    body = plan.spacecraft
-    with suppress(Infeasible):
-        scaled = planning.judged(body, plan.scheme, _longer(plan, ratios), plan.options)
-        if scaled.feasible and scaled.meets_requirement is not False and keeps_limits(body, scaled.pulses):
-            return scaled
+def _scaled(plan: Plan, ratios: Sequence[float], complies: Callable[[Plan], bool] = lambda _: True) -> Plan | None:
+    """Plan with on-times times ``ratios``; None where it breaks a limit or its requirement, or ``complies`` fails."""
+    body, schedule = plan.spacecraft, _longer(plan, ratios)
+    if keeps_limits(body, schedule) and complies(replace(plan, schedule=schedule)):
+        with suppress(Infeasible):
+            scaled = planning.judged(body, plan.scheme, schedule, plan.options)
+            if scaled.feasible and scaled.meets_requirement is not False:
+                return scaled
     return None
 
 
@@ -172,17 +172,22 @@ class FlownPlan:
     def _slopes(self) -> list[tuple[Vector, Vector, NDArray[np.int_]]]:
         """Ends (10, n) of cases of both draws, their slopes (k, 10, n), and for how many cases each stands, (n,).
 
-        All that are not far from failing, and some of the others. By what share each pulse is on longer, in the closed
-        form, of which the nutation is exact too.
+        All that are nearest to failing, and some of the others. By what share each pulse, or all of many, is on longer,
+        in the closed form, of which the nutation is exact too; it errs by what it takes wide pulses for, nearly alike
+        in all cases.
         """
+        heads = np.array([_heading(self.plan.spacecraft, schedule) for schedule in self._schedules])
+        wide = np.tile((heads[0] - heads[1:]) / SMALL, 2)[:, :, None] - self._nominal[1][:, 2:8]
         slopes = []
         for flown in (self.candidate.results, self.fresh.results):
             assert flown is not None
             ends = flown.early[:, : flown.done]
-            weights = np.where(self._severity(ends) >= NEAR, 1, 0)
+            severity, worst = self._severity(ends), min(math.ceil(WORST * self.may_fail) + 1, flown.done)
+            weights = np.where(severity >= np.sort(severity)[-worst], 1, 0)
             weights[np.flatnonzero(weights == 0)[::THIN]] = THIN
             taken = np.flatnonzero(weights)
             here, slope = self._moved(flown.study.draws_of_all(taken))
+            slope[:, 2:8] += wide
             slopes.append((np.vstack([here[:2], ends[2:, taken]]), slope, weights[taken]))
         return slopes
 
@@ -191,11 +196,16 @@ class FlownPlan:
         """End (10, 1) with nominal values in the closed form, and its slopes (k, 10, 1)."""
         return self._moved({})
 
+    @cached_property
+    def _schedules(self) -> list[Schedule]:
+        """The schedule, and those with each pulse, or all of many, on a little shorter."""
+        count = len(self.plan.pulses)
+        ratios = 1.0 - SMALL * (np.eye(count) if count <= FEW else np.ones((1, count)))
+        return [self.plan.pulses, *(_longer(self.plan, row.tolist()) for row in ratios)]
+
     def _moved(self, draws: Draws) -> tuple[Vector, Vector]:
         """Ends (10, n) of cases in the closed form, and their slopes (k, 10, n)."""
-        ratios = 1.0 - SMALL * np.eye(len(self.plan.pulses))
-        schedules = [self.plan.pulses, *(_longer(self.plan, row.tolist()) for row in ratios)]
-        there = [_ends(self.plan.spacecraft, schedule, draws) for schedule in schedules]
+        there = [_ends(self.plan.spacecraft, schedule, draws) for schedule in self._schedules]
         return there[0], (there[0] - np.array(there[1:])) / SMALL
 
     def predicted(self, plan: Plan, fewer: float) -> bool:
@@ -203,15 +213,13 @@ class FlownPlan:
 
         ``fewer`` cases than may are predicted to fail, unless as many do now.
         """
-        pairs = zip(plan.pulses, self.plan.pulses, strict=True)
-        more = np.array([short.on_time / long.on_time - 1.0 for short, long in pairs])
-        # The closed form errs by what it takes wide pulses for, and slopes by their change: nearly alike in all cases.
         nominal, slopes = self._nominal
-        moved = _ends(plan.spacecraft, plan.pulses, {}) - nominal
-        moved[2:8, 0] = np.tile(_heading(plan) - _heading(self.plan), 2)
-        moved -= np.tensordot(more, slopes, 1)
+        pairs = list(zip(plan.pulses, self.plan.pulses, strict=True))
+        more = np.array([short.on_time / long.on_time - 1.0 for short, long in pairs[: len(slopes)]])
+        # Slopes err by their change, nearly alike in all cases.
+        bent = _ends(plan.spacecraft, plan.pulses, {}) - nominal - np.tensordot(more, slopes, 1)
         for (ends, slopes, weights), failing in zip(self._slopes, self.failing, strict=True):
-            severity = self._severity(ends + np.tensordot(more, slopes, 1) + moved)
+            severity = self._severity(ends + np.tensordot(more, slopes, 1) + bent)
             if weights[severity > 1.0].sum() > max(self.may_fail - fewer, min(failing, self.may_fail)):
                 return False
         return True
@@ -234,9 +242,9 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
     return ends
 
 
-def _heading(plan: Plan) -> Vector:
+def _heading(body: Spacecraft, schedule: Schedule) -> Vector:
     """Direction (3,) of H at the end of the nominal flight, in body axes at t = 0."""
-    axis = attitude.rotate(attitude.conjugate(plan.spacecraft.initial.quaternion), plan.flight.last_momentum)
+    axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), propagation.flown(body, schedule).last_momentum)
     return np.asarray(axis / np.linalg.norm(axis))
 
 

@@ -81,7 +81,7 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     parts: list[RenderableType] = [_title(results, scheme), Text(), _percentiles(results).screen("full")]
     parts.append(angles_note(body))
     if not results.exact:
-        parts.append(Text("Percentiles are right to 0.05 % of their value; nominal and max are exact.", style="dim"))
+        parts.append(Text("Percentiles are right to 0.006 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
         parts += [Text(), Text("Nominal case", style="bold"), facts(end_rows(nominal, aspects(nominal)))]
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]

@@ -262,6 +262,7 @@ def test_what_cannot_be_shortened_stays() -> None:
         replace(plan, spacecraft=replace(body, limits=replace(body.limits, tick=1e-3))),
         replace(plan, schedule=Schedule(pulses, blocks=(Block("+1", 1, 0.1, 0.1, 1),))),
         replace(plan, schedule=Schedule((ideal, *pulses[1:]))),
+        replace(plan, schedule=Schedule()),
         planning.plan(steered, "two-pulse"),
     ):
         assert fixed.feasible
