@@ -22,7 +22,6 @@ from nutdamp.control_loop.simulation import Case, FlownLoops, expects_alone, fly
 from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple
-from nutdamp.montecarlo.closed_form import carried
 from nutdamp.montecarlo.inputs import (
     BLOCK,
     BY_VALVE,
@@ -36,6 +35,7 @@ from nutdamp.montecarlo.inputs import (
     list_inputs,
     of_sensor,
 )
+from nutdamp.montecarlo.propagated import carried
 from nutdamp.montecarlo.statistics import Exact, Worst, angle, cases_to_show
 from nutdamp.montecarlo.study import KEPT_WORST, Counted, Dispersed
 from nutdamp.physics import attitude

@@ -18,13 +18,12 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.initial_guess import once_a_turn
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import RATIO
+from nutdamp.estimation.parameters import BODY, GYROS, KIND, RATIO, SPACE, SUN_PULSE, Vector
 from nutdamp.estimation.search import NORMAL_MAD, least
-from nutdamp.estimation.signals import BODY, GYROS, KIND, SPACE, SUN_PULSE, Vector
 from nutdamp.physics import body as rigid_body
 
 if TYPE_CHECKING:
-    from nutdamp.estimation.fit import Fit
+    from nutdamp.estimation.search import Fit
 
 STUCK, FEWEST, COARSE = 0.2, 20, 10
 """Part of the samples of a sensor, and number of them, that are alike in a row where it is stuck; a record that has

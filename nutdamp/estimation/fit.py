@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,12 @@ from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import expect_alive, expect_enough, expect_explained
 from nutdamp.estimation.initial_guess import starts
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import Matrix, Record, Vector
 from nutdamp.estimation.search import (
+    Fit,
     covariance_of,
     jacobian,
     least,
-    named_of,
     plain,
     residuals,
     robust,
@@ -33,7 +33,6 @@ from nutdamp.estimation.search import (
     share_left,
     units_of,
 )
-from nutdamp.estimation.signals import Matrix, Record, Vector
 from nutdamp.spacecraft.model import Spacecraft
 
 OUTLIER = 5.0
@@ -63,10 +62,6 @@ PARTS = (0.5, 0.25, 0.1, 0.04)
 SEEN = 4.5
 """Standard deviations of |ω| from which on there is a nutation."""
 
-CURVED = 7.0
-"""By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
-for 2 to 10 parameters, whether s is small or large."""
-
 UNEQUAL = 5.0
 """Standard deviations from which on the transverse moments count as different, or such a body as dissipating."""
 
@@ -75,116 +70,6 @@ GROWS = 3.0
 
 UNEQUAL_BY = ("unequal_1", "unequal_2")
 """The parameters of unequal transverse moments."""
-
-KEPT = 0.9
-"""Share of its prior above which a parameter's sigma is where the data do not tell it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Estimate of a spacecraft from a record.
-
-    ``values`` (p,) of the model's parameters, SI, with their ``covariance`` (p, p); ``noise`` one sigma of each signal
-    (rad of directions, s of Sun pulses); ``used`` (m,) the samples that are no outliers, ``residuals`` (m,) measured
-    less predicted; ``finished`` unless the search ended with its budget of work.
-    """
-
-    model: Model
-    values: Vector
-    covariance: Matrix
-    noise: Vector
-    used: NDArray[np.bool_]
-    residuals: Vector
-    jacobian: Matrix
-    finished: bool = True
-
-    @property
-    def named(self) -> dict[str, float]:
-        """The values by name."""
-        return named_of(self.model, self.values)
-
-    @property
-    def sigmas(self) -> Vector:
-        """Standard deviations of the values, (p,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-    def index(self, name: str) -> int | None:
-        """Position of a parameter; None where it is not estimated."""
-        return next((at for at, parameter in enumerate(self.model.parameters) if parameter.name == name), None)
-
-    @cached_property
-    def region(self) -> Matrix:
-        """The covariance (p, p) whose ellipsoids hold the true values as often as they say, though regions are curved.
-
-        A direction of the covariance, followed for one sigma both ways, leaves residuals that do not cancel: least
-        squares by J turns them into the shift s across it that the curve takes there. ω3 of the file and C/A lie so on
-        the curve of one nutation rate, which is much better known than either. The curve is off by s t² at t sigmas,
-        and of P + `CURVED` Σ s sᵀ the 95 % ellipsoid holds 95 % of a normal t, for any length of s.
-        """
-        scale = self.sigmas
-        sizes, turned = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        noise = self.noise[self.model.signal[self.used]]
-        slopes = self.jacobian[self.used] / noise[:, None]
-        here, shifts = self.model.predicted(self.named), []
-        for direction in (scale[:, None] * turned * np.sqrt(np.maximum(sizes, 0.0))).T:
-            both_ways = (self.values + direction, self.values - direction)
-            try:
-                with np.errstate(all="ignore"):
-                    ends = [self.model.predicted(named_of(self.model, values)) for values in both_ways]
-            except Infeasible:  # of what nothing is known one sigma may be no body at all
-                continue
-            bent = (0.5 * (ends[0] + ends[1]) - here)[self.used] / noise
-            shifts.append(self.covariance @ (slopes.T @ bent))
-        across = np.array([shift for shift in shifts if np.isfinite(shift).all()]).reshape(-1, len(scale))
-        return np.asarray(self.covariance + CURVED * across.T @ across)
-
-    @cached_property
-    def kept(self) -> tuple[str, ...]:
-        """Parameters that the data do not tell: they stay as the file has them."""
-        pairs = zip(self.model.parameters, self.sigmas, strict=True)
-        return tuple(parameter.name for parameter, sigma in pairs if sigma > KEPT * parameter.prior)
-
-    @cached_property
-    def information(self) -> Vector:
-        """Singular values of the data against the priors, falling; below 1 the priors say more.
-
-        They are those of J/s in units of the priors, for the parameters that have one, the others being fitted.
-        """
-        priors = np.array([parameter.prior for parameter in self.model.parameters])
-        with_prior = np.isfinite(priors)
-        scaled = self.jacobian[self.used] / self.noise[self.model.signal[self.used], None]
-        free, held = scaled[:, ~with_prior], scaled[:, with_prior] * priors[with_prior]
-        if free.shape[1]:
-            basis, _ = np.linalg.qr(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300))
-            held = held - basis @ (basis.T @ held)
-        return np.asarray(np.linalg.svd(held, compute_uv=False))
-
-    @cached_property
-    def resolved(self) -> NDArray[np.bool_]:
-        """Of each signal, whether its noise is more than its digits or its steps make anyway."""
-        return np.asarray(self.noise > least(self.model) * (1.0 + 1e-9))
-
-    def whiteness(self, signal: int, lags: int = 40) -> Vector:
-        """Autocorrelations of the residuals of a signal, from lag 1 on; of white ones 95 % are below 1.96/√n."""
-        rows = self.used & (self.model.signal == signal)
-        left = self.residuals[rows] - self.residuals[rows].mean()
-        total = float(left @ left) or 1.0
-        return np.array([float(left[lag:] @ left[:-lag]) / total for lag in range(1, min(lags, len(left) - 1) + 1)])
-
-    def white(self, signal: int) -> bool:
-        """True where the autocorrelations are as small as those of white noise (Ljung-Box, 1 in 1000)."""
-        count = int((self.used & (self.model.signal == signal)).sum())
-        correlations = self.whiteness(signal, 20)
-        lags = np.arange(1, len(correlations) + 1)
-        return chi_square_tail(len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))) > 0.001
-
-
-def chi_square_tail(count: int, value: float) -> float:
-    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value`` above 0."""
-    half = max(0.5 * value, 1e-300)
-    powers = [0.5 * (count % 2) + index for index in range(count // 2)]
-    series = math.fsum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
-    return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)
 
 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:

@@ -18,14 +18,15 @@ import numpy as np
 from nutdamp.common import results
 from nutdamp.common.numerics import finite
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.fit import GROWS, Fit, estimated
+from nutdamp.estimation.fit import GROWS, estimated
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import AXIS, CROSSING, DIRECTION, GYROS, QUATERNION, SEEN, SUN_PULSE, Record, Vector
 from nutdamp.estimation.results import Carried, Estimate, carried, estimates, moving, posterior, replaced
-from nutdamp.estimation.signals import AXIS, CROSSING, DIRECTION, GYROS, QUATERNION, SEEN, SUN_PULSE, Record, Vector
+from nutdamp.estimation.search import Fit
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.cases import DispersedCases
-from nutdamp.montecarlo.closed_form import ClosedForm, Ends
 from nutdamp.montecarlo.inputs import Draws
+from nutdamp.montecarlo.propagated import ClosedForm, Ends
 from nutdamp.montecarlo.statistics import ROWS, VECTORS, Exact, vectors
 from nutdamp.montecarlo.study import Results, Study, run
 from nutdamp.physics import attitude

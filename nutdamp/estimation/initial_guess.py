@@ -19,9 +19,7 @@ import numpy as np
 
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import RATIO
-from nutdamp.estimation.search import scales_of
-from nutdamp.estimation.signals import (
+from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
     BODY,
@@ -29,6 +27,7 @@ from nutdamp.estimation.signals import (
     GYROS,
     KIND,
     QUATERNION,
+    RATIO,
     SEEN,
     SPACE,
     Record,
@@ -36,10 +35,11 @@ from nutdamp.estimation.signals import (
     Vector,
     wrapped,
 )
+from nutdamp.estimation.search import scales_of
 from nutdamp.physics import attitude
 
 if TYPE_CHECKING:
-    from nutdamp.estimation.fit import Fit
+    from nutdamp.estimation.search import Fit
 
 
 FINER = 8

@@ -19,18 +19,21 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.control_loop.sensor import is_blind
 from nutdamp.errors import BadRequest, Infeasible, Unsuitable
-from nutdamp.estimation.parameters import Parameter, in_moments, parameters, prior
-from nutdamp.estimation.signals import (
+from nutdamp.estimation.parameters import (
     ACCELERATION,
     CROSSING,
     DIRECTION,
     KIND,
     SUN_ASPECT,
     Matrix,
+    Parameter,
     Record,
     Sighting,
     Values,
     Vector,
+    in_moments,
+    parameters,
+    prior,
     tilted,
     turned,
 )

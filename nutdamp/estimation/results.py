@@ -14,10 +14,9 @@ import numpy as np
 
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.consistency import step
-from nutdamp.estimation.fit import KEPT, Fit
 from nutdamp.estimation.model import OF_SENSORS, Body
-from nutdamp.estimation.parameters import RATIO, in_moments, prior_of, thrust_prior
-from nutdamp.estimation.signals import Matrix, Values, Vector
+from nutdamp.estimation.parameters import RATIO, Matrix, Values, Vector, in_moments, prior_of, thrust_prior
+from nutdamp.estimation.search import KEPT, Fit
 from nutdamp.physics import attitude
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Spacecraft, SpinState

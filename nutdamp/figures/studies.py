@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.common.numerics import down
-from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.results import Estimate, estimates
+from nutdamp.estimation.search import Fit
 from nutdamp.figures import geometry, labels, style
 from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION, PULSE
 from nutdamp.flight.propagation import model_name

@@ -16,9 +16,9 @@ import numpy as np
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import BadRequest
-from nutdamp.estimation.fit import Fit
+from nutdamp.estimation.parameters import ACCELERATION
 from nutdamp.estimation.results import DIGITS, LATE, LEAST_THRUST, WHEEL, Carried, correlations, replaced
-from nutdamp.estimation.signals import ACCELERATION
+from nutdamp.estimation.search import Fit
 from nutdamp.files.editing import (
     Edits,
     Later,

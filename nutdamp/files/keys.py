@@ -5,7 +5,7 @@ Constraints between several keys are in `rules`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from nutdamp.files.fields import (
     RIGHT_ANGLE,
@@ -46,9 +46,6 @@ from nutdamp.files.fields import (
     Window,
 )
 from nutdamp.files.study_keys import DispersionsSection, LoopSection
-
-if TYPE_CHECKING:
-    pass
 
 
 class OrbitSection(Section):

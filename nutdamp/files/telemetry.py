@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
-from nutdamp.estimation.signals import (
+from nutdamp.estimation.parameters import (
     ACCELERATION,
     AXIS,
     DIRECTION,

@@ -1,20 +1,28 @@
-"""Propagation of cases through real pulse widths, with the true tensor and the disturbances, many at once.
+"""Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-Command blocks fire in each case from the Sun pulses of its own nutating body.
+Flights have the true tensor and the disturbances; command blocks fire in each case from the Sun pulses of its own
+nutating body. The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Between pulses a symmetric
+body is free, and two facts make the arcs cheap. Seen in the frame that turns with the nutation, by the phase aα with
+α = ∫ω3 dt, the angular momentum does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that
+frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector,
+and a coast turns a quaternion; no angle is taken before the end. Energy dissipation draws H away from axis 3 in that
+frame, along an arc that `energy_sink` knows. The closed form takes no absolute value and compares nothing: the same
+code runs on complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Dynamics, make_dynamics
 from nutdamp.montecarlo.cases import (
@@ -22,19 +30,265 @@ from nutdamp.montecarlo.cases import (
     DispersedCases,
     DispersedModel,
     Thrusting,
+    Triple,
     in_body,
     number_of,
+    plus,
     rotated,
+    times,
     triple,
     watch_of,
 )
-from nutdamp.montecarlo.closed_form import Ends, carried
-from nutdamp.physics import batch, sky
-from nutdamp.physics.batch import Bodies, MotionStretch
+from nutdamp.physics import attitude, batch, energy_sink, sky
+from nutdamp.physics.batch import Bodies, MotionStretch, cos_sin
+from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.block_model import fire, pushes
+
+FAR = 8.0
+"""Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
+
+MOST_NODES = 128
+"""Largest number of nodes of that quadrature: enough for pulses of 20 nutation periods."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """End states of cases.
+
+    ``momentum``: H at the end in the frame that turns with the nutation, (AΩ1, AΩ2, Cω3). ``before`` and ``after``:
+    H at t = 0 and at the end in the true body axes of t = 0, which are fixed in space; ``pointed``: the end in the
+    estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
+    None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
+    rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
+    ``drained`` as in `fed.Fed`.
+    """
+
+    momentum: Triple
+    before: Triple
+    after: Triple
+    pointed: Triple
+    spin: Cases
+    spin_change: Cases
+    propellant: Cases | None
+    nutation: Cases | None = None
+    aspects: NDArray[np.float64] | None = None
+    drained: Cases = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """Flies cases of ``model`` by the impulse sum; disturbances and I1 ≠ I2 are left out.
+
+    Dissipation acts as the estimate has it, whatever the moments of a case are.
+    """
+
+    model: DispersedModel
+
+    def __call__(self, cases: DispersedCases) -> Ends:
+        """End states of the ``cases``, whose pulses all come in the order of the first of them."""
+        return _fly(*_in_order(cases, self._nodes), self.model.spacecraft.growth)
+
+    @cached_property
+    def _nodes(self) -> tuple[int, ...]:
+        """Quadrature nodes of each pulse, from the largest phase it may span."""
+        body = self.model.spacecraft
+        A, C, spin = body.inertia.A, body.inertia.C, abs(body.spin)
+        off = {entry.name: FAR * entry.sigma + abs(entry.size) for entry in self.model.inputs.drawn}
+        off_A, off_C = off.get("A", 0.0), off.get("C", 0.0)
+        ratio = max(abs(1.0 - (C + off_C) / max(A - off_A, 0.25 * A)), abs(1.0 - (C - off_C) / (A + off_A)))
+        added = math.fsum(float(np.linalg.norm(pulse.impulse)) for pulse in self.model.schedule) / C
+        rate = ratio * (spin + max(off.get(f"omega0_{axis}", 0.0) for axis in (1, 2, 3)) + added)
+        rate += (abs(body.inertia.wheel) + off.get("wheel momentum", 0.0)) / max(A - off_A, 0.25 * A)
+        return tuple(nodes_for(0.5 * on_time * rate) for on_time in self.model.on_times)
+
+
+def _fly(cases: DispersedCases, nodes: tuple[int, ...], growth: float) -> Ends:
+    """End states of cases whose pulses are in order; ``nodes`` by pulse, ``growth`` κ in 1/s."""
+    # In one piece: any part of the loop would take and return nearly all of the seven numbers that run through it.
+    A, C, wheel = cases.A, cases.C, cases.wheel
+    a, per_A = 1.0 - C / A, 1.0 / A
+    sheds = cases.sheds
+    x, y = cases.moments[0] * cases.omega0[0], cases.moments[1] * cases.omega0[1]  # H is the true one, I1 ≠ I2 or not
+    spin = cases.omega0[2]
+    z = plus(C * spin, wheel)
+    before = (x, y, z)
+    phase: Cases = 0.0
+    now: Cases = 0.0
+    turn: tuple[Cases, ...] | None = None
+    for number, (start, impulse) in enumerate(zip(cases.starts, cases.impulses, strict=True)):
+        on_time = cases.widths[number]
+        centre = start + 0.5 * on_time
+        coast = centre - now
+        turn = _turned_on(turn, (x, y, z), coast * per_A)
+        if growth == 0.0:
+            phase = phase + plus(a * spin, times(-per_A, wheel)) * coast
+        else:
+            effect, turn = _slipped(turn, (x, y, z), growth, coast)
+            phase = phase + (a * z * effect.turned - wheel * coast) / C
+            x, y, z = x * effect.transverse, y * effect.transverse, z * effect.axial
+            spin = (z - wheel) / C
+        if sheds is not None:  # half before the pulse and half after it, the rates as they are
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+        rate = plus(a * spin, times(-per_A, wheel))
+        along, across, gained = _effective(impulse, rate, a / C, on_time, nodes[number], growth)
+        cosine, sine = cos_sin(phase)
+        x = x + along * cosine - across * sine
+        y = y + along * sine + across * cosine
+        if not (isinstance(gained, float) and gained == 0.0):
+            spin = spin + gained / C
+            z = plus(C * spin, wheel)
+        if sheds is not None:
+            x, y, A, C = _lighter(x, y, A, C, sheds[number])
+            a, per_A, z = 1.0 - C / A, 1.0 / A, plus(C * spin, wheel)
+        now = centre
+    after = (x, y, z) if turn is None else carried(turn, (x, y, z))
+    return Ends(
+        momentum=(x, y, z),
+        before=before,
+        after=after,
+        pointed=rotated(after, cases.tilt),
+        spin=spin,
+        spin_change=spin - cases.omega0[2],
+        propellant=cases.propellant,
+        drained=cases.drained,
+    )
+
+
+def _lighter(x: Cases, y: Cases, A: Cases, C: Cases, sheds: tuple[Cases, Cases]) -> tuple[Cases, Cases, Cases, Cases]:
+    """AΩ1, AΩ2, A and C with half of ``sheds`` off A and C, which leaves the rates as they are."""
+    less = A - 0.5 * sheds[0]
+    return x * (less / A), y * (less / A), less, C - 0.5 * sheds[1]
+
+
+def _turned_on(turn: tuple[Cases, ...] | None, momentum: Triple, time: Cases) -> tuple[Cases, ...]:
+    """Quaternion ``turn`` followed by the turn about ``momentum`` (in the turned frame) by |H|·``time``."""
+    x, y, z = momentum
+    size = np.sqrt(x * x + y * y + z * z) + TINY
+    half = np.tan(0.5 * size * time)
+    w = 1.0 / np.sqrt(1.0 + half * half)
+    scale = half * w / size
+    x, y, z = scale * x, scale * y, scale * z
+    return (w, x, y, z) if turn is None else attitude.product(turn, (w, x, y, z))
+
+
+def _slipped(
+    turn: tuple[Cases, ...], momentum: Triple, growth: float, time: Cases
+) -> tuple[energy_sink.SinkEffect, tuple[Cases, ...]]:
+    """Effect of dissipation in ``time`` s, and ``turn`` with the slip against ``momentum``."""
+    x, y, z = momentum
+    across = x * x + y * y
+    size = np.sqrt(across + z * z) + TINY
+    effect = energy_sink.courses(growth, z / size, across / (size * size), time)
+    w, i, j = effect.cosine, effect.sine * y / size, -effect.sine * x / size
+    p, a, b, c = turn
+    return effect, (p * w - a * i - b * j, p * i + a * w - c * j, p * j + b * w + c * i, c * w + a * j - b * i)
+
+
+def carried(turn: tuple[Cases, ...], vector: Triple) -> Triple:
+    """``vector`` turned by the quaternion ``turn``, which rounding has left a little off unit length."""
+    w, a, b, c = turn
+    x, y, z = vector
+    scale = 2.0 / (w * w + a * a + b * b + c * c)
+    i, j, k = b * z - c * y, c * x - a * z, a * y - b * x
+    return (
+        x + scale * (w * i + b * k - c * j),
+        y + scale * (w * j + c * i - a * k),
+        z + scale * (w * k + a * j - b * i),
+    )
+
+
+def _effective(
+    impulse: Triple, rate: Cases, slope: Cases, on_time: Cases, nodes: int, growth: float
+) -> tuple[Cases, Cases, Cases]:
+    """Impulse (J1, J2) with which a pulse acts on ω at its centre, and its axial part J3; see `rates.width_factor`.
+
+    The spin runs through the pulse, and the factor is the mean of exp(i(φx + β(1 + x²)) - γx) over |x| <= 1 with φ =
+    (ν + aJ3/2C)τ/2, β = aJ3τ/8C and γ = κτ/2, by ``nodes`` Gauss-Legendre nodes; sinc(ντ/2) without J3 and κ. ``rate``
+    is ν as it begins, ``slope`` a/C.
+    """
+    along, across, axial = impulse
+    if isinstance(on_time, float) and on_time == 0.0:
+        return impulse
+    half = 0.5 * on_time
+    if isinstance(axial, float) and axial == 0.0:
+        angle = rate * half + TINY
+        if growth == 0.0:
+            tangent = np.tan(0.5 * angle)
+            factor = 2.0 * tangent / ((1.0 + tangent * tangent) * angle)
+            return times(along, factor), times(across, factor), 0.0
+        (cosine, sine), grown = cos_sin(angle), growth * half
+        level, slant = sine * np.cosh(grown), cosine * np.sinh(grown)
+        scale = 1.0 / (angle * angle + grown * grown)
+        return _turned(
+            along, across, (level * angle + slant * grown) * scale, (slant * angle - level * grown) * scale, 0.0
+        )
+    gained = slope * axial
+    swing, bend = (rate + 0.5 * gained) * half, 0.25 * gained * half
+    real: Cases = 0.0
+    imaginary: Cases = 0.0
+    for node, weight in _legendre(nodes):
+        # The two nodes ±x together: cos φx cosh γx - i sin φx sinh γx, turned by the angle of the bend.
+        level, slant = cos_sin(swing * node)
+        grown = np.exp(growth * half * node)
+        level, slant = 0.5 * weight * level * (grown + 1.0 / grown), 0.5 * weight * slant * (grown - 1.0 / grown)
+        cosine, sine = cos_sin(bend * (1.0 + node * node))
+        real = real + level * cosine + slant * sine
+        imaginary = imaginary + level * sine - slant * cosine
+    return _turned(along, across, real, imaginary, axial)
+
+
+def _turned(along: Cases, across: Cases, real: Cases, imaginary: Cases, axial: Cases) -> tuple[Cases, Cases, Cases]:
+    """Complex number ``along``, ``across`` times another, and ``axial``."""
+    return (
+        plus(times(along, real), times(-1.0, times(across, imaginary))),
+        plus(times(along, imaginary), times(across, real)),
+        axial,
+    )
+
+
+def nodes_for(phase: float) -> int:
+    """Fewest Gauss-Legendre nodes (even) that integrate cos(``phase``·x) over |x| <= 1 to rounding.
+
+    By the error of the n-point rule, φ^{2n} 2^{2n+1} (n!)^4 / ((2n+1) ((2n)!)^3).
+    """
+    phase = max(phase, 1e-3)
+    for nodes in range(2, MOST_NODES, 2):
+        error = (
+            2 * nodes * math.log(2.0 * phase)
+            + 4.0 * math.lgamma(nodes + 1)
+            - math.log(2 * nodes + 1)
+            - 3.0 * math.lgamma(2 * nodes + 1)
+        )
+        if error < math.log(1e-17):
+            return nodes
+    return MOST_NODES
+
+
+@cache
+def _legendre(nodes: int) -> tuple[tuple[float, float], ...]:
+    """Positive nodes of an even Gauss-Legendre rule, with weights for the mean of an even function."""
+    places, weights = gauss_legendre(nodes)
+    half = nodes // 2
+    return tuple(zip(places[half:].tolist(), weights[half:].tolist(), strict=True))
+
+
+def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedCases, tuple[int, ...]]:
+    """Cases and ``nodes`` with the pulses in the order of their centres in the first case."""
+    centres = [start + 0.5 * width for start, width in zip(cases.starts, cases.widths, strict=True)]
+    order = np.argsort([float(np.real(np.ravel(centre)[0])) for centre in centres], kind="stable").tolist()
+    if order == sorted(order):
+        return cases, nodes
+    starts, widths, impulses = (
+        tuple(each[number] for number in order) for each in (cases.starts, cases.widths, cases.impulses)
+    )
+    spent = None if cases.spent is None else tuple(cases.spent[number] for number in order)
+    placed = replace(cases, starts=starts, widths=widths, impulses=impulses, spent=spent)
+    return placed, tuple(nodes[number] for number in order)
+
 
 Array = NDArray[np.float64]
 

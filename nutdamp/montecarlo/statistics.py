@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
-from nutdamp.montecarlo.closed_form import ClosedForm, Ends
 from nutdamp.montecarlo.inputs import DispersedInput, mixing
+from nutdamp.montecarlo.propagated import ClosedForm, Ends
 
 STEPS = 200
 """Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly."""

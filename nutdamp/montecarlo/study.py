@@ -25,9 +25,8 @@ from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel, cones_used
-from nutdamp.montecarlo.closed_form import Ends
 from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent
-from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.statistics import (
     EXACT_CASES,
     OUTPUTS,

@@ -19,14 +19,13 @@ import numpy as np
 from nutdamp.common import results, work
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
-from nutdamp.planning import chance_plan, trimming
+from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
-from nutdamp.planning.screening import AS_GOOD, PlanCandidate, entered, equal_from, fly_all
-from nutdamp.planning.trimming import Fresh, fresh_of
+from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
@@ -221,7 +220,7 @@ def _trimmed(ranks: RobustComparison) -> RobustComparison:
     chosen = ranks.chosen
     if chosen is None or chosen.met is None or chosen.met < ranks.probability or ranks.lucky or ranks.fresh is None:
         return ranks
-    best = trimming.shortest(chosen, ranks.fresh)
+    best = screening.shortest(chosen, ranks.fresh)
     if best.candidate is chosen:
         return ranks
     candidates = best.candidate, *ranks.candidates

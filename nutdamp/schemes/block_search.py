@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.schemes.block_flights import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
+from nutdamp.schemes.block_legs import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
 from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, commandable_widths

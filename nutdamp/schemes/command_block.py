@@ -13,8 +13,7 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_flights import FLOWN, FlownSequence
-from nutdamp.schemes.block_legs import spin_and_turn
+from nutdamp.schemes.block_legs import FLOWN, FlownSequence, spin_and_turn
 from nutdamp.schemes.block_model import BlockModel, spin_turn
 from nutdamp.schemes.block_search import BLOCKS, BlockSearch
 from nutdamp.schemes.catalogue import CommandBlockOptions

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.forecast import Outlook, Prospect
-from nutdamp.estimation.parameters import in_moments, untold
+from nutdamp.estimation.parameters import KIND, in_moments, untold
 from nutdamp.estimation.results import UNTOLD, Carried, Estimate, carried, correlated, doubts, estimates
-from nutdamp.estimation.signals import KIND
+from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, percent

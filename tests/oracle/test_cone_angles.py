@@ -20,7 +20,7 @@ from nutdamp import load
 from nutdamp.figures.overview import title
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.closed_form import ClosedForm
+from nutdamp.montecarlo.propagated import ClosedForm
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from nutdamp.estimation.fit import Fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.signals import Record
+from nutdamp.estimation.parameters import Record
+from nutdamp.estimation.search import Fit
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from support import reference
 
 import nutdamp
-from nutdamp.estimation.signals import GYROS, Record
+from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.spacecraft.model import Spacecraft
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from support import reference
 
 import nutdamp
 from nutdamp.common.time import Epoch
-from nutdamp.estimation.signals import GYROS, Record
+from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft

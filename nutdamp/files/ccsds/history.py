@@ -15,7 +15,7 @@ import numpy as np
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile
-from nutdamp.estimation.signals import GYROS, Record, of_quaternions
+from nutdamp.estimation.parameters import GYROS, Record, of_quaternions
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     BEFORE,

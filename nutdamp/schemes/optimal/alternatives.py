@@ -1,23 +1,38 @@
-"""Schedules beside those of the linear program: simple spin changes, other ends, other schemes as starts."""
+"""Schedules beside those of the linear program: simple spin changes, other ends, other schemes as starts.
+
+And firing almost without a pause, one channel after another: the earliest end, and the least cost in a short horizon.
+The program of `linear_program` lets channels fire at once. Here they share each slot of time: what one channel after
+another can supply is the convex hull of what each can, so that within a horizon the program has a solution where, to
+first order, there is a schedule. Its slots become burns without gaps, whose lengths are then found on the true motion.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.end_state import left_by
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
+from nutdamp.schemes.correction import bounded_step
+from nutdamp.schemes.optimal import highs, refinement
+from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Solution
-from nutdamp.schemes.optimal.problem import UNMET, Problem
+from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
+from nutdamp.schemes.optimal.refinement import Influence
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import keeps_limits
+from nutdamp.spacecraft.constraints import Windows, keeps_limits
 from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
@@ -216,3 +231,201 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         except Infeasible:
             continue
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
+
+
+SLOTS, MOST_SLOTS = 40, 320
+"""Slots in the faster of the two turns, at ω3 and at aω3, and in all."""
+
+LINES = 4
+"""Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
+
+NEWTON_STEPS = 25
+"""Newton steps for the lengths of the burns."""
+
+CONVERGED = 1e-12
+"""Largest end error, over |H|."""
+
+SHORTEST = 0.02
+"""Share of a slot below which a burn is left out before the lengths are found."""
+
+HALVINGS = 10
+"""Steps in which the earliest end is found, from what small angles allow."""
+
+LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
+"""Shares added to the earliest end by small angles, tried in turn."""
+
+PROGRAM = 4.0
+"""Units of work of a program."""
+
+
+class Piece(NamedTuple):
+    """A channel that fires, or none, for a ``time`` s."""
+
+    channel: Channel | None
+    time: float
+
+
+def possible(problem: Problem) -> bool:
+    """True where burns may follow each other without a gap, begin at any time and be of any number."""
+    limits = problem.spacecraft.limits
+    return limits.gap == 0.0 and limits.tick is None and limits.max_pulses is None and bool(problem.channels)
+
+
+def earliest(problem: Problem) -> Schedule | None:
+    """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
+    if not possible(problem):
+        return None
+    begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
+    if _pieces(problem, _small_angles(problem), horizon) is None:
+        return None
+    low, high = begin, horizon
+    for _ in range(HALVINGS):
+        if work.exhausted():
+            return None
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _pieces(problem, _small_angles(problem), middle) else (middle, high)
+    for share in LONGER:
+        end = min(high + share * (high - begin), horizon)
+        schedule = within(problem, end)
+        if schedule is not None or end == horizon or work.exhausted():
+            return schedule
+    return None
+
+
+def within(problem: Problem, horizon: float) -> Schedule | None:
+    """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
+    if not possible(problem):
+        return None
+    influence = _small_angles(problem)
+    for _ in range(LINES):
+        pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
+        if pieces is None:
+            return None
+        schedule = _exact(problem, pieces)
+        try:
+            flown = problem.flown(schedule)
+        except Infeasible:
+            return None
+        if (
+            problem.left(flown) <= LEFT
+            and schedule.end <= horizon
+            and keeps_limits(problem.spacecraft, schedule.pulses)
+        ):
+            return schedule
+        first = _burns(problem, pieces, np.array([piece.time for piece in pieces]))
+        influence = refinement.along(problem.flown(first), problem.equations, _slot(problem))
+    return None
+
+
+def _small_angles(problem: Problem) -> Influence:
+    return refinement.small_angles(problem.spacecraft, problem.equations)
+
+
+def _slot(problem: Problem) -> float:
+    """Width of a slot, s, where there is room for as many."""
+    return 2.0 * math.pi / problem.spacecraft.fastest / SLOTS
+
+
+def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:
+    """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
+    body, channels = problem.spacecraft, problem.channels
+    begin = body.limits.earliest
+    count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
+    edges = np.linspace(begin, horizon, count + 1)
+    free = np.flatnonzero(~Windows(body).blocked(edges[:-1], edges[1:]))
+    width = float(edges[1] - edges[0])
+    if not len(free):
+        return None
+    work.spend(PROGRAM)
+    centres = 0.5 * (edges[1:] + edges[:-1])[free]
+    lost = influence.widths(np.array([width]))[0]
+    torques = np.array([channel.torque for channel in channels])
+    # What a whole slot of each channel adds to each equation, over all there is to do; columns channel by channel.
+    size = float(np.linalg.norm(influence.goal)) or 1.0
+    whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
+    columns = whole.reshape(len(influence.goal), -1)
+    equations, slots = len(influence.goal), len(free)
+    program = highs.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
+    dearest = float(problem.costs.max())
+    program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))
+    shared = np.tile(np.eye(slots), len(channels))
+    cost = np.repeat(problem.costs / dearest, slots)
+    program.add(cost, np.vstack([columns, shared]), np.ones(columns.shape[1]))
+    optimum = program.optimum()
+    if optimum is None or float(optimum.x[: 2 * equations].sum()) > UNMET:
+        return None
+    shares = optimum.x[2 * equations :].reshape(len(channels), slots)
+    return _in_order(channels, edges, free, shares * width) or None
+
+
+def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.intp], times: Vector) -> list[Piece]:
+    """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
+    width = float(edges[1] - edges[0])
+    pieces, place = list[Piece](), {int(slot): number for number, slot in enumerate(free)}
+    before: Channel | None = None
+    for slot in range(len(edges) - 1):
+        mine = times[:, place[slot]] if slot in place else np.zeros(len(channels))
+        following = times[:, place[slot + 1]] if slot + 1 in place else np.zeros(len(channels))
+        firing = [number for number in range(len(channels)) if mine[number] > SHORTEST * width]
+        firing.sort(key=lambda number: (channels[number] is not before, following[number] > 0.0))
+        for number in firing:
+            pieces.append(Piece(channels[number], float(mine[number])))
+            before = channels[number]
+        idle = width - float(sum(mine[number] for number in firing))
+        if idle > SHORTEST * width:
+            pieces.append(Piece(None, idle))
+            before = None
+    joined = list[Piece]()
+    for channel, group in itertools.groupby(pieces, key=lambda piece: piece.channel):
+        joined.append(Piece(channel, sum(piece.time for piece in group)))
+    while joined and joined[-1].channel is None:
+        joined.pop()
+    return joined
+
+
+def _burns(problem: Problem, pieces: list[Piece], times: Vector) -> Schedule:
+    """The pieces with other ``times`` (n,) s, one after the other."""
+    starts = problem.spacecraft.limits.earliest + np.concatenate([[0.0], np.cumsum(times)[:-1]])
+    return Schedule(
+        tuple(
+            channel_pulse(piece.channel, float(start + 0.5 * time), float(time))
+            for piece, start, time in zip(pieces, starts, times, strict=True)
+            if piece.channel is not None and time > 0.0
+        )
+    )
+
+
+def _exact(problem: Problem, pieces: list[Piece]) -> Schedule:
+    """The schedule whose flown motion leaves nothing, by Newton's method for the lengths of its pieces."""
+    body, size = problem.spacecraft, float(np.linalg.norm(problem.spacecraft.momentum))
+    times = np.array([piece.time for piece in pieces])
+    scale = np.full(len(times), float(times.max(initial=1e-9)))
+    most = body.horizon - body.limits.earliest
+    task = Task(body, problem.equations, problem.channels, problem.costs) if problem.closed else None
+    firing = np.array([piece.channel is not None for piece in pieces])
+    which = np.array([problem.channels.index(piece.channel) for piece in pieces if piece.channel is not None])
+
+    def left(rows: Vector) -> Vector:
+        """Misses of many times (k, n) s, (k, equations), over |H|."""
+        if task is None:
+            flown = (problem.flown(_burns(problem, pieces, times)) for times in rows)
+            return np.array([refinement.misses(flight, problem.equations) for flight in flown]) / size
+        starts = body.limits.earliest + np.cumsum(rows, axis=1) - rows
+        return task.misses(np.tile(which, (len(rows), 1)), np.hstack([starts[:, firing], rows[:, firing]]), 0)
+
+    value = left(times[None])[0]
+    for _ in range(NEWTON_STEPS):
+        if np.linalg.norm(value) <= CONVERGED or work.exhausted():
+            break
+        slopes = (left(times + 1e-6 * np.diag(scale)) - value).T / 1e-6
+        move = bounded_step(slopes, value, times, scale, np.zeros(len(times)), np.full(len(times), most))
+        for shrink in range(6):
+            trial = np.clip(times + move * 0.5**shrink, 0.0, most)
+            following = left(trial[None])[0]
+            if np.linalg.norm(following) < np.linalg.norm(value):
+                break
+        else:
+            break
+        times, value = trial, following
+    return _burns(problem, pieces, times)

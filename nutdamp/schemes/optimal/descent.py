@@ -138,7 +138,7 @@ class Task:
         """`_in_turn` of a body without external torque, all stretches at once.
 
         In the frame that turns with the nutation pulses add to H whatever it is, and between them the body turns about
-        H and its own axis (see `montecarlo.closed_form`): so the motion at all edges is known first, and then all turns
+        H and its own axis (see `montecarlo.propagated`): so the motion at all edges is known first, and then all turns
         are. A quaternion is a pair of complex numbers, w + iz and x + iy.
         """
         count, n = which.shape

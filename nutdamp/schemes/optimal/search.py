@@ -21,7 +21,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOptions
-from nutdamp.schemes.optimal import continuous, multistart, refinement
+from nutdamp.schemes.optimal import alternatives, multistart, refinement
 from nutdamp.schemes.optimal.alternatives import by_other_schemes, elsewhere, hastened, spin_changes
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
@@ -157,14 +157,14 @@ class _LeastCostSearch(Problem):
 
     def soonest(self) -> Schedule:
         """The schedule that ends first: of one channel after another, or another one that ends before it."""
-        early = continuous.earliest(self)
+        early = alternatives.earliest(self)
         if early is None:
             return self.sooner().schedule()
         begin, body = self.spacecraft.limits.earliest, self.within(early.end)
         if early.end - begin <= (1.0 + SHARP) * (self.least_horizon(begin, early.end) - begin):
             return self.with_bounds(early)
         search = _LeastCostSearch(body, self.options).sooner()
-        other = continuous.within(search, early.end) if search.spacecraft.horizon == early.end else None
+        other = alternatives.within(search, early.end) if search.spacecraft.horizon == early.end else None
         if other is not None:  # no program leads to a schedule that ends before
             return search.with_bounds(self.preferred([early, other]))
         try:
@@ -241,7 +241,7 @@ class _LeastCostSearch(Problem):
         with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
-            best = self.cheaper(best, continuous.within(self, self.spacecraft.horizon))
+            best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
         if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)

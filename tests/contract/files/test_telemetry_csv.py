@@ -14,7 +14,7 @@ from support.golden import check_text
 
 import nutdamp
 from nutdamp.errors import CannotRead
-from nutdamp.estimation.signals import ACCELERATION, AXIS, DIRECTION, GYROS, QUATERNION, SEEN, SUN_ASPECT, Record
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, DIRECTION, GYROS, QUATERNION, SEEN, SUN_ASPECT, Record
 from nutdamp.files import tabular
 from nutdamp.files.telemetry import read_telemetry
 

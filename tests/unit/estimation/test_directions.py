@@ -18,10 +18,11 @@ from support.synthetic import Array
 import nutdamp
 from nutdamp.errors import Unsuitable
 from nutdamp.estimation import forecast
-from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import DIRECTION, GYROS, SEEN, SUN_ASPECT, Record, of_quaternions
 from nutdamp.estimation.results import carried, doubts
-from nutdamp.estimation.signals import DIRECTION, GYROS, SEEN, SUN_ASPECT, Record, of_quaternions
+from nutdamp.estimation.search import Fit
 from nutdamp.planning import decision
 from nutdamp.spacecraft.model import Spacecraft
 

@@ -16,11 +16,10 @@ from support.cases import weekly
 from support.synthetic import gyro_case
 from support.telemetry_kinds import KINDS, telemetry
 
-from nutdamp.estimation.fit import Fit, chi_square_tail, fit
+from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import moments, prior
-from nutdamp.estimation.search import residuals, search, units_of
-from nutdamp.estimation.signals import GYROS, Vector, quantisation
+from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
+from nutdamp.estimation.search import Fit, chi_square_tail, residuals, search, units_of
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 

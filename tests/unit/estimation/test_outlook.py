@@ -22,8 +22,7 @@ from nutdamp.estimation import forecast
 from nutdamp.estimation.forecast import Fitted, Outlook, Prospect
 from nutdamp.estimation.results import Estimate
 from nutdamp.montecarlo.cases import DispersedCases, number_of
-from nutdamp.montecarlo.closed_form import Ends
-from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.planning import decision
 from nutdamp.schemes import planner

@@ -12,8 +12,9 @@ from support.places import case
 from support.telemetry_kinds import KINDS, telemetry
 
 import nutdamp
-from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.fit import fit
 from nutdamp.estimation.results import estimates
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 
 TRUTH = {"A": 245.46318647216307, "C/A": 0.6375167123394947, "omega_1": 0.05008703651230487,

@@ -17,11 +17,12 @@ from support.synthetic import Array, motion
 import nutdamp
 from nutdamp.common import work
 from nutdamp.errors import BadRequest, Infeasible, NutdampError, Unsuitable
-from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.fit import fit
 from nutdamp.estimation.initial_guess import spin_of
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import ACCELERATION, AXIS, GYROS, Record, quantisation
 from nutdamp.estimation.results import Estimate, carried, doubts, estimates
-from nutdamp.estimation.signals import ACCELERATION, AXIS, GYROS, Record, quantisation
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.flight import propagation
 from nutdamp.physics import attitude

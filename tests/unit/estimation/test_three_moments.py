@@ -17,10 +17,11 @@ from support.synthetic import Array, motion
 
 import nutdamp
 from nutdamp.common import work
-from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import GYROS, Record
 from nutdamp.estimation.results import doubts
-from nutdamp.estimation.signals import GYROS, Record
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse

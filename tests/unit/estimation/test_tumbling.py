@@ -11,9 +11,10 @@ from support.cases import spread
 from support.places import case
 
 import nutdamp
-from nutdamp.estimation.fit import Fit, fit
+from nutdamp.estimation.fit import fit
+from nutdamp.estimation.parameters import AXIS, Record
 from nutdamp.estimation.results import estimates
-from nutdamp.estimation.signals import AXIS, Record
+from nutdamp.estimation.search import Fit
 from nutdamp.files.telemetry import read_telemetry
 from nutdamp.physics import attitude
 

@@ -16,8 +16,8 @@ import nutdamp
 from nutdamp.errors import BadRequest
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
+from nutdamp.estimation.parameters import ACCELERATION, GYROS, Record
 from nutdamp.estimation.results import carried
-from nutdamp.estimation.signals import ACCELERATION, GYROS, Record
 from nutdamp.files.carried import fitted_text
 from nutdamp.views.fit import fit_screen
 

@@ -20,8 +20,7 @@ from support.spinners import commanded, flown_by_reference
 
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.closed_form import ClosedForm, nodes_for
-from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.physics.batch import cos_sin

@@ -17,8 +17,8 @@ from support.golden import refused
 from nutdamp.errors import BadRequest
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.cases import DispersedCases, DispersedModel
-from nutdamp.montecarlo.closed_form import ClosedForm, Ends
 from nutdamp.montecarlo.inputs import BLOCK
+from nutdamp.montecarlo.propagated import ClosedForm, Ends
 from nutdamp.montecarlo.statistics import (
     OUTPUTS,
     ROWS,

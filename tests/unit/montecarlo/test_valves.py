@@ -17,9 +17,8 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.flight.propagation import flown
 from nutdamp.flight.propellant import supplied
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.closed_form import ClosedForm, Ends
 from nutdamp.montecarlo.inputs import DrawSource, list_inputs
-from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.propagated import ClosedForm, Ends, RealWidths
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
 from nutdamp.spacecraft.model import Requirement, Spacecraft

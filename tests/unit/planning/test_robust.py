@@ -22,11 +22,11 @@ from nutdamp.common import work
 from nutdamp.errors import BadRequest
 from nutdamp.files.reader import read_spacecraft
 from nutdamp.montecarlo.cases import DispersedCases
-from nutdamp.montecarlo.closed_form import Ends
 from nutdamp.montecarlo.inputs import DispersedInput
+from nutdamp.montecarlo.propagated import Ends
 from nutdamp.montecarlo.study import SEED, Results, run, study_of
 from nutdamp.planning import plan as planning
-from nutdamp.planning import robust, screening, trimming
+from nutdamp.planning import robust, screening
 from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.notes import robust_reasons
@@ -79,7 +79,7 @@ def untightened(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def untrimmed(monkeypatch: pytest.MonkeyPatch) -> None:
     """On-times stay as they are planned: each try flies all cases."""
-    monkeypatch.setattr(trimming, "trimmed", lambda plan, _: plan)
+    monkeypatch.setattr(screening, "trimmed", lambda plan, _: plan)
 
 
 def best(found: robust.RobustComparison) -> PlanCandidate:
@@ -198,7 +198,7 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert chosen is found.candidates[0]
     assert (found.ground, found.usual, found.comparison.recommended) == (Ground.COST, whole, whole.plan)
     ratios = [short.on_time / long.on_time for short, long in zip(chosen.plan.pulses, whole.plan.pulses, strict=True)]
-    assert all(trimming.SHORTEST**2 < ratio <= 1.0 for ratio in ratios)
+    assert all(screening.SHORTEST**2 < ratio <= 1.0 for ratio in ratios)
     assert chosen.plan.pulses.cost < 0.999 * whole.plan.pulses.cost
     assert found.cost is not None
     assert found.cost.impulse == chosen.plan.pulses.total_impulse - whole.plan.pulses.total_impulse < 0.0
@@ -211,10 +211,10 @@ def test_on_times_of_the_robust_plan_are_as_short_as_the_cases_allow_by_which_it
     assert (found.decision.cases, found.decision.met, found.meets_requirement) == (chosen.cases, True, True)
     assert chosen.met == share(body, chosen.plan) >= 0.99
     assert found.fresh is not None
-    assert found.fresh.met == share(body, chosen.plan, trimming.FRESH) >= 0.99
+    assert found.fresh.met == share(body, chosen.plan, screening.FRESH) >= 0.99
     # A little shorter and too few comply.
-    shorter = trimming._scaled(chosen.plan, [0.997, 0.997])
-    assert shorter is None or min(share(body, shorter), share(body, shorter, trimming.FRESH)) < 0.99
+    shorter = screening._scaled(chosen.plan, [0.997, 0.997])
+    assert shorter is None or min(share(body, shorter), share(body, shorter, screening.FRESH)) < 0.99
 
 
 WIDE = Requirement(nutation=math.radians(2.0))
@@ -234,21 +234,21 @@ def asked(least: list[float], plan: Plan, *, first: list[Plan] | None = None) ->
     def ratios(one: Plan) -> list[float]:
         return [short.on_time / long.on_time for short, long in zip(one.pulses, plan.pulses, strict=True)]
 
-    return ratios(trimming.trimmed(plan, complies))
+    return ratios(screening.trimmed(plan, complies))
 
 
 def test_on_times_are_shortened_together_and_then_each_alone() -> None:
     plan = planning.plan(dispersed(requirement=WIDE), "two-pulse")
     for least, together in (([0.9, 0.9], 0.9), ([0.93, 0.6], 0.93), ([0.6, 0.93], 0.93), ([0.5, 0.5], 0.8)):
         left = asked(least, plan)
-        step, finer = 0.2 / 2**trimming.HALVINGS, 0.2 / 2**trimming.FINER
+        step, finer = 0.2 / 2**screening.HALVINGS, 0.2 / 2**screening.FINER
         for ratio, share in zip(left, least, strict=True):
-            alone = max(share, together * trimming.SHORTEST)
+            alone = max(share, together * screening.SHORTEST)
             assert alone <= ratio <= alone + step + (finer if alone < together else 0.0), least
     tried: list[Plan] = []
     assert asked([1.0, 1.0], plan, first=tried) == [1.0, 1.0]
-    assert len(tried) == trimming.HALVINGS + 2 * trimming.FINER
-    assert trimming.trimmed(plan, lambda _: False) is plan
+    assert len(tried) == screening.HALVINGS + 2 * screening.FINER
+    assert screening.trimmed(plan, lambda _: False) is plan
 
 
 def test_what_cannot_be_shortened_stays() -> None:
@@ -266,7 +266,7 @@ def test_what_cannot_be_shortened_stays() -> None:
         planning.plan(steered, "two-pulse"),
     ):
         assert fixed.feasible
-        assert trimming.trimmed(fixed, lambda _: pytest.fail("it is not to be tried")) is fixed
+        assert screening.trimmed(fixed, lambda _: pytest.fail("it is not to be tried")) is fixed
     longest = min(pulse.on_time for pulse in pulses)
     bound = [
         replace(one, thrusters=tuple(replace(each, min_on_time=0.95 * longest) for each in one.thrusters))
@@ -276,12 +276,12 @@ def test_what_cannot_be_shortened_stays() -> None:
     assert 0.95 - 1e-9 <= shortest < 0.96
     many = replace(body, channels=tuple(one.of(thrust=10.0, isp=220.0) for one in cross(8.0, max_on_time=0.2)))
     long = planning.plan(many, "four-pulse")
-    assert len(long.pulses) > trimming.FEW
+    assert len(long.pulses) > screening.FEW
     tried: list[Plan] = []
     left = asked([0.9] * len(long.pulses), long, first=tried)
     assert left == pytest.approx([left[0]] * len(left))
     assert 0.9 <= left[0] < 0.902
-    assert len(tried) == trimming.HALVINGS
+    assert len(tried) == screening.HALVINGS
 
 
 LUCKY = """
@@ -313,7 +313,7 @@ def test_a_plan_with_which_enough_cases_comply_by_luck_alone_gives_way_to_the_ne
     seemed = [one for one in found.candidates if (one.met or 0.0) >= 0.95 and one.plan.pulses.cost < 0.999 * spent]
     assert seemed
     for one in seemed:
-        assert share(body, one.plan, trimming.FRESH, found.samples) < found.probability
+        assert share(body, one.plan, screening.FRESH, found.samples) < found.probability
     # Where there is no other plan, the cases of any schedule decide; the new ones are a note, and nothing is trimmed.
     alone = robust._trimmed(robust._checked(replace(found, chosen=seemed[0], candidates=(seemed[0],)), [seemed[0]]))
     assert (alone.chosen, alone.lucky, alone.meets_requirement) == (seemed[0], True, True)
@@ -392,7 +392,7 @@ def test_the_json_has_the_candidates_what_the_best_costs_and_what_would_have_to_
     bare = ranked(usual, usual, dear)
     of_A = DispersedInput("A", "A", "normal", 0.6, 120.0, "kg m²")
     needed = Tightening(("A",), 0.5, ((of_A, True),), 5_000, 7, 0.998, 0.9971)
-    fresh = trimming.Fresh(Cases(1_000, 1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
+    fresh = screening.Fresh(Cases(1_000, 1_000, 9, 0.91, 0.997, {}), (0.89, 0.93))
     written = robust_json(replace(bare, fresh=fresh, tightening=needed))
     told = (
         written["probability"],

@@ -26,7 +26,7 @@ from nutdamp.physics import attitude
 from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
-from nutdamp.schemes.block_flights import FLOWN, BlockFlights, BlockSequence, FlownSequence
+from nutdamp.schemes.block_legs import FLOWN, BlockFlights, BlockSequence, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
 from nutdamp.schemes.block_search import BlockSearch
 from nutdamp.schemes.catalogue import Options

@@ -20,8 +20,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import by_impulses, flown
 from nutdamp.flight.verification import verify
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.closed_form import ClosedForm
-from nutdamp.montecarlo.propagated import RealWidths
+from nutdamp.montecarlo.propagated import ClosedForm, RealWidths
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import infeasibility
