@@ -204,9 +204,9 @@ def robust(
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
-    from nutdamp.spacecraft.requirements import expect_dispersions
+    from nutdamp.spacecraft.tolerances import expect_dispersions
 
-    expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft)
+    expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions)
     trials = search.attempts(compared, options)
     with work.steps(1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))) as task:  # a third: flights
         return search.compare(compared, trials, task.reach)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from nutdamp.cli.flown import flown_options, plan_or_read
 from nutdamp.cli.job import (
     DEFAULT_FILE,
     FileInput,
@@ -23,6 +22,7 @@ from nutdamp.cli.job import (
 )
 from nutdamp.cli.main import BAD_INPUT, UNREADABLE, leave, tell
 from nutdamp.cli.options import FILE, OUTPUT, goal_options
+from nutdamp.cli.plan import flown_options, plan_or_read
 from nutdamp.cli.screen import console, say, show, units_of_screen
 from nutdamp.errors import nearest, printable
 
@@ -97,7 +97,7 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
         return
 
     from nutdamp.api import verify
-    from nutdamp.views.verification import verification_brief
+    from nutdamp.views.simulation import verification_brief
 
     plan = plan_or_read(job)
     with job.working("verifying"):

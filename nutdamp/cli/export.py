@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 
-from nutdamp.cli.flown import compared_with, flown_options, fronts_of, plan_or_read, robust_of
 from nutdamp.cli.job import FileInput, Job, SessionCommand, deliver, expect_outputs, quiet_option, spacecraft_argument
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import (
@@ -25,6 +24,7 @@ from nutdamp.cli.options import (
     goal_options,
     is_number,
 )
+from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_read, robust_of
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
@@ -116,15 +116,15 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is None and (inertia or at is not None):
         raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
 
-    from nutdamp.files.ccsds.history import is_history, read_history
     from nutdamp.files.ccsds.read import contradictions, imported, read_apm
+    from nutdamp.files.telemetry import is_history, read_history
     from nutdamp.flight.propagation import flown
     from nutdamp.views.pulses import pulse_table
 
     if into is not None:
         if schedule is not None:
             raise click.UsageError("--schedule writes the manoeuvres of a message that makes a spacecraft file")
-        from nutdamp.files.ccsds.history import merged_text, motion_of
+        from nutdamp.files.ccsds.read import merged_text, motion_of
 
         message = read_history(file) if is_history(file) else read_apm(file)
         for entry in message.remarks:
@@ -243,11 +243,11 @@ def report_command(
 
     from nutdamp.page.report import repeated
     from nutdamp.planning.decision import compare_plans
-    from nutdamp.spacecraft.requirements import expect_dispersions
+    from nutdamp.spacecraft.tolerances import expect_dispersions
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
     if disperse is not None or robust:
-        expect_dispersions(body)
+        expect_dispersions(body.dispersions)
         if nominal:
             raise click.UsageError("--disperse and --robust fly dispersed cases, which --nominal leaves out")
     samples = 0 if nominal else disperse

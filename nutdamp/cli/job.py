@@ -359,7 +359,7 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
     """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
-    from nutdamp.views.pulses import infeasible_json
+    from nutdamp.views.decisions import infeasible_json
 
     path, spacecraft = context.meta[UNDER_WAY]
     deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])

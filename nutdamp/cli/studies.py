@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from nutdamp.cli.flown import flown_options, fronts_of, plan_or_read
 from nutdamp.cli.job import (
     Files,
     Job,
@@ -39,6 +38,7 @@ from nutdamp.cli.options import (
     goal_options,
     reading_of,
 )
+from nutdamp.cli.plan import flown_options, fronts_of, plan_or_read
 from nutdamp.cli.screen import say
 from nutdamp.schemes.catalogue import LEAST, OPTIMAL
 from nutdamp.units import LARGEST_SEED, shifts, thresholds, tilt
@@ -302,13 +302,14 @@ def disperse_command(
     body = job.begin()
 
     from nutdamp import api
-    from nutdamp.spacecraft.requirements import expect_dispersions, expect_loop
+    from nutdamp.spacecraft.requirements import expect_loop
+    from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.dispersion import dispersion_brief
 
     if looped:
         expect_loop(body)
         job.figure = None
-    expect_dispersions(body)
+    expect_dispersions(body.dispersions)
     plan = None if looped else plan_or_read(job)
     if case is not None:
         deliver_case(job, plan, case - 1, seed=seed, until=until)

@@ -22,7 +22,7 @@ from nutdamp.control_loop.controller import SAMPLED, Watch
 from nutdamp.control_loop.law import Actuator, ComplexArray, Law
 from nutdamp.control_loop.stability import FARTHEST, Band, Odds, dead_band, expect_damping, transfer
 from nutdamp.errors import Infeasible
-from nutdamp.flight.propellant import Supply
+from nutdamp.flight.dynamics import Supply
 from nutdamp.physics.thruster import Ramp, shape_factor
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import commandable

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from nutdamp.control_loop.law import Actuator, ComplexArray, Diagnosis, Ending, Firing, Glimpse, Law
 from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.errors import Infeasible, Unsuitable
-from nutdamp.flight.dynamics import Dynamics, Path, shed
-from nutdamp.flight.propellant import Supply, weakened
+from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.equipment import Loop

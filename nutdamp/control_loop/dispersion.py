@@ -44,7 +44,7 @@ from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor, Thruste
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft.tolerances import Tolerance
+from nutdamp.spacecraft.tolerances import Tolerance, expect_dispersions
 
 OF_FIRINGS = ("thrust_per_pulse", "timing")
 """Tolerances that each firing draws anew."""
@@ -444,7 +444,7 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
     Raises Infeasible as `plan.loop_of` does.
     """
     loop = requirements.expect_loop(spacecraft)
-    requirements.expect_dispersions(spacecraft)
+    expect_dispersions(spacecraft.dispersions)
     late = feeding(spacecraft, loop)
     if late is not None:
         raise Infeasible(too_late(late))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import response
-from nutdamp.schemes.four_pulse import DEFAULT_SHARE
+from nutdamp.schemes.catalogue import DEFAULT_SHARE
 from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop

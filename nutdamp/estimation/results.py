@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.estimation import initial_guess
-from nutdamp.estimation.consistency import step
+from nutdamp.estimation.fit import step
 from nutdamp.estimation.model import OF_SENSORS, Body
 from nutdamp.estimation.parameters import RATIO, Matrix, Values, Vector, in_moments, prior_of, thrust_prior
 from nutdamp.estimation.search import KEPT, Fit

@@ -19,7 +19,7 @@ import numpy as np
 from nutdamp.common.time import Epoch
 from nutdamp.errors import nearest, printable
 from nutdamp.files.tabular import Cells, Table
-from nutdamp.flight.propellant import Supply
+from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.decision import broken_limits
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import fired, spin_turn

@@ -18,9 +18,8 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import basilisk, propagation
-from nutdamp.flight.dynamics import shed
+from nutdamp.flight.dynamics import lacking, shed, supplied
 from nutdamp.flight.propagation import Flight, Residual
-from nutdamp.flight.propellant import lacking, supplied
 from nutdamp.physics import attitude, response
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.constraints import commandable

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.flight.dynamics import shed
-from nutdamp.flight.propellant import Supply
+from nutdamp.flight.dynamics import Supply, shed
 from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, Inputs, groups_of, list_inputs
 from nutdamp.physics import attitude
 from nutdamp.physics.batch import cos_sin

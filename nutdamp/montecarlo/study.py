@@ -47,6 +47,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Left, Part
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import expect_dispersions
 
 Array = NDArray[np.float64]
 
@@ -479,5 +480,5 @@ SEED = 1
 
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
     """Study of ``schedule`` with the dispersions of ``spacecraft``; raises BadRequest where it has none."""
-    requirements.expect_dispersions(spacecraft)
+    expect_dispersions(spacecraft.dispersions)
     return Study(DispersedModel(spacecraft, schedule), seed)

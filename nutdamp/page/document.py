@@ -21,7 +21,6 @@ from nutdamp.views.tables import DataTable, Heading, Shared
 from nutdamp.views.text import sentence
 
 if TYPE_CHECKING:
-    from nutdamp.page.moving import Panel, Strip, Workbench
     from nutdamp.spacecraft.model import Vector
     from nutdamp.views.glance import RequirementRow
 
@@ -158,6 +157,66 @@ class NamedDirection(NamedTuple):
     kind: str
     circles: tuple[Circle, ...] = ()
     watched: bool = False
+
+
+EDGES = (350, 150, 1960, 1760)
+"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
+
+
+Mark = tuple[float, str]
+"""A place on a scale, and the number there."""
+
+
+class Scale(NamedTuple):
+    """A scale with its name and marks."""
+
+    name: str
+    marks: tuple[Mark, ...]
+
+
+class Panel(NamedTuple):
+    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
+
+    part: str
+    title: str
+    described: str
+    x: Scale
+    y: Scale
+    zero: tuple[float, float]
+    frame: tuple[int, int, int, int] = EDGES
+
+
+class Strip(NamedTuple):
+    """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
+
+    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left and width of each
+    firing; ``closed``: left and width of times without firing.
+    """
+
+    times: Scale
+    angles: Scale
+    zero: float
+    required: float | None
+    outside: str
+    channels: tuple[str, ...]
+    bars: tuple[tuple[int, float, float], ...]
+    closed: tuple[tuple[float, float], ...]
+
+
+RATIO, THRUST = 1.0, 5.0
+"""Largest change of C/A and of the thrust by the sliders, per cent."""
+
+
+class Workbench(NamedTuple):
+    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
+
+    ``rows``: name of each quantity for the script and for people, and its bound in words.
+    """
+
+    rows: tuple[tuple[str, str, str], ...]
+    pulses: tuple[str, ...]
+    ratio: float = RATIO
+    thrust: float = THRUST
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
-from nutdamp.page.document import Circle, Moving, NamedDirection
+from nutdamp.page.document import EDGES, Circle, Moving, NamedDirection, Panel, Scale, Strip, Workbench
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
@@ -263,9 +263,6 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
 
 
-EDGES = (350, 150, 1960, 1760)
-"""Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
-
 STRIP = (2000, 1000)
 """Width and height of the angles over time in units of their SVG."""
 
@@ -277,45 +274,6 @@ LEAD = 0.012
 
 PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
 """Prefixes of units with their factors, and the largest number of a scale that needs another one."""
-
-Mark = tuple[float, str]
-"""A place on a scale, and the number there."""
-
-
-class Scale(NamedTuple):
-    """A scale with its name and marks."""
-
-    name: str
-    marks: tuple[Mark, ...]
-
-
-class Panel(NamedTuple):
-    """A square panel: ``part`` names it for the script, ``zero`` is where the axes cross, if within the frame."""
-
-    part: str
-    title: str
-    described: str
-    x: Scale
-    y: Scale
-    zero: tuple[float, float]
-    frame: tuple[int, int, int, int] = EDGES
-
-
-class Strip(NamedTuple):
-    """Parts drawn over time; marks in per cent, ``required`` and ``zero`` in units of the SVG.
-
-    ``outside``: a required nutation that lies beyond the scale. ``bars``: row of the channel, left and width of each
-    firing; ``closed``: left and width of times without firing.
-    """
-
-    times: Scale
-    angles: Scale
-    zero: float
-    required: float | None
-    outside: str
-    channels: tuple[str, ...]
-    bars: tuple[tuple[int, float, float], ...]
-    closed: tuple[tuple[float, float], ...]
 
 
 def placed(points: Vector, middle: Vector, half: float) -> list[list[int]]:
@@ -393,23 +351,8 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     return strip, [low, high]
 
 
-RATIO, THRUST = 1.0, 5.0
-"""Largest change of C/A and of the thrust by the sliders, per cent."""
-
 Room = tuple[Vector, float]
 """Middle (2,) and half the side of a square panel."""
-
-
-class Workbench(NamedTuple):
-    """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
-
-    ``rows``: name of each quantity for the script and for people, and its bound in words.
-    """
-
-    rows: tuple[tuple[str, str, str], ...]
-    pulses: tuple[str, ...]
-    ratio: float = RATIO
-    thrust: float = THRUST
 
 
 def absence(body: Spacecraft, schedule: Schedule) -> str:

@@ -64,10 +64,10 @@ from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Formula, Topic
 from nutdamp.views.pulses import pulse_table
+from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 from nutdamp.views.spacecraft import beyond_floors, turn_floor
 from nutdamp.views.text import WARNING, joined, mass, quantity, sentence, severity, text
 from nutdamp.views.trade import apart, beats, front_parts
-from nutdamp.views.verification import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
 
 if TYPE_CHECKING:
     from jinja2 import Environment

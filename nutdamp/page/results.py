@@ -16,8 +16,9 @@ from nutdamp.planning.decision import Comparison, Simulation
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
 from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views.decisions import decided_json
 from nutdamp.views.glance import scheme_table
-from nutdamp.views.pulses import decided_json, pulse_table
+from nutdamp.views.pulses import pulse_table
 from nutdamp.views.text import degrees, joined, sentences
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ VIEWS = {
     "Fitted.text": "files.carried:fitted_file core",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
-    "Verified.data": "views.verification:verification_json plan.flight plan.scheme core",
-    "Verified.screen": "views.verification:verification_screen plan core",
+    "Verified.data": "views.simulation:verification_json plan.flight plan.scheme core",
+    "Verified.screen": "views.simulation:verification_screen plan core",
     "Budget.data": "views.loop:budget_json",
     "Budget.csv": "views.loop:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",

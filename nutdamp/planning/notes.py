@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from nutdamp.common.numerics import RPM, down
-from nutdamp.common.results import Note, Value, note
+from nutdamp.common.results import Note, note
 from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
@@ -22,9 +21,6 @@ from nutdamp.schemes.catalogue import OPTIMAL
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
-
-if TYPE_CHECKING:
-    from nutdamp.planning.robust import RobustComparison
 
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
@@ -411,47 +407,3 @@ def model_warnings(impulses: Flight, flown: Flight) -> Iterator[Note]:
             continue
         difference, most = math.degrees(apart.error), math.degrees(apart.most)
         yield note("models-differ", difference_deg=difference, part=apart.part.label, limit_deg=most)
-
-
-def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
-    """Reason for the robust plan, or for none."""
-    chosen, count, required = robust.chosen, len(robust.candidates), 100.0 * robust.probability
-    if chosen is None:
-        yield note("none-feasible")
-    elif count == 1:
-        yield note("as-requested" if len(robust.comparison.plans) == 1 else "only-plan")
-    else:
-        if chosen.met is None:
-            yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
-        elif chosen.met >= robust.probability:
-            yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
-        else:
-            yield note("robust-most-cases", count=count, equals=robust.equals)
-        if robust.ground is not None and robust.ground is not Ground.ONLY:
-            yield note("equal-least-propellant" if robust.by_propellant else "equal-least-impulse")
-        if robust.ground in TIES:
-            yield note(TIES[robust.ground])
-
-
-def robust_cost(robust: RobustComparison) -> Iterator[Note]:
-    """The robust plan against the one that is recommended without ``--robust``."""
-    chosen, usual, cost = robust.chosen, robust.usual, robust.cost
-    if chosen is None or usual is None or cost is None:
-        return
-    if chosen is usual:
-        yield note("robust-is-usual")
-        return
-    unit, scale, shown = ("N m s", 1.0, "N m s") if cost.propellant is None else ("kg", 1e3, "g")
-    figures: dict[str, Value] = {
-        "scheme": usual.plan.scheme,
-        "cost": scale * chosen.plan.pulses.cost_in(unit),
-        "than_cost": scale * usual.plan.pulses.cost_in(unit),
-        "unit": shown,
-        "end_s": chosen.plan.end,
-        "than_end_s": usual.plan.end,
-    }
-    if chosen.met is not None and usual.met is not None:
-        yield note("robust-cost", share=f"{100.0 * chosen.met:.4g}", than_share=f"{100.0 * usual.met:.4g}", **figures)
-    else:
-        left, than = math.degrees(chosen.left), math.degrees(usual.left)
-        yield note("robust-cost-left", left_deg=left, than_left_deg=than, **figures)

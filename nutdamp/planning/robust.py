@@ -7,6 +7,7 @@ and, where `optimal` is among the schemes, its earliest ends, for errors of the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
@@ -17,12 +18,14 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import results, work
+from nutdamp.common.results import Note, Value, note
 from nutdamp.errors import Infeasible
 from nutdamp.montecarlo.study import SAMPLES, SEED, study_of
 from nutdamp.planning import chance_plan, screening
 from nutdamp.planning import plan as planning
 from nutdamp.planning.chance_plan import Tightening, tightening
 from nutdamp.planning.decision import Comparison, Decision, attempt
+from nutdamp.planning.notes import TIES
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
@@ -348,3 +351,47 @@ def _equals(candidates: Sequence[PlanCandidate], samples: int, probability: floa
         return [candidate for candidate in candidates if candidate.rank <= AS_GOOD * best.rank]
     low = equal_from(best.met, samples)
     return [candidate for candidate in candidates if candidate.met is not None and candidate.met >= low]
+
+
+def robust_reasons(robust: RobustComparison) -> Iterator[Note]:
+    """Reason for the robust plan, or for none."""
+    chosen, count, required = robust.chosen, len(robust.candidates), 100.0 * robust.probability
+    if chosen is None:
+        yield note("none-feasible")
+    elif count == 1:
+        yield note("as-requested" if len(robust.comparison.plans) == 1 else "only-plan")
+    else:
+        if chosen.met is None:
+            yield note("robust-least-left", count=count, equals=robust.equals, required_share=required)
+        elif chosen.met >= robust.probability:
+            yield note("robust-complies", count=count, equals=robust.equals, required_share=required)
+        else:
+            yield note("robust-most-cases", count=count, equals=robust.equals)
+        if robust.ground is not None and robust.ground is not Ground.ONLY:
+            yield note("equal-least-propellant" if robust.by_propellant else "equal-least-impulse")
+        if robust.ground in TIES:
+            yield note(TIES[robust.ground])
+
+
+def robust_cost(robust: RobustComparison) -> Iterator[Note]:
+    """The robust plan against the one that is recommended without ``--robust``."""
+    chosen, usual, cost = robust.chosen, robust.usual, robust.cost
+    if chosen is None or usual is None or cost is None:
+        return
+    if chosen is usual:
+        yield note("robust-is-usual")
+        return
+    unit, scale, shown = ("N m s", 1.0, "N m s") if cost.propellant is None else ("kg", 1e3, "g")
+    figures: dict[str, Value] = {
+        "scheme": usual.plan.scheme,
+        "cost": scale * chosen.plan.pulses.cost_in(unit),
+        "than_cost": scale * usual.plan.pulses.cost_in(unit),
+        "unit": shown,
+        "end_s": chosen.plan.end,
+        "than_end_s": usual.plan.end,
+    }
+    if chosen.met is not None and usual.met is not None:
+        yield note("robust-cost", share=f"{100.0 * chosen.met:.4g}", than_share=f"{100.0 * usual.met:.4g}", **figures)
+    else:
+        left, than = math.degrees(chosen.left), math.degrees(usual.left)
+        yield note("robust-cost-left", left_deg=left, than_left_deg=than, **figures)

@@ -21,8 +21,8 @@ from nutdamp.common import work
 from nutdamp.common.results import Note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
+from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.end_state import left_by
-from nutdamp.flight.propellant import Supply
 from nutdamp.schemes.block_model import acts, fire_all, fired, spin_turn, sun_pulses
 from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.spacecraft import requirements

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
-from nutdamp.flight.dynamics import make_dynamics, shed
+from nutdamp.flight.dynamics import Supply, make_dynamics, shed
 from nutdamp.flight.propagation import Flight
-from nutdamp.flight.propellant import Supply
 from nutdamp.physics import attitude, precession
 from nutdamp.physics.batch import Bodies, MotionStretch
 from nutdamp.physics.sky import SunPulseClock, TorqueRamp

@@ -103,6 +103,10 @@ class TwoPulseOptions(SchemeOptions):
         return self.literal
 
 
+DEFAULT_SHARE = 0.125
+"""Default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FourPulseOptions(SchemeOptions):
     """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""

@@ -18,8 +18,7 @@ from nutdamp.common import work
 from nutdamp.common.results import Note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight import propagation
-from nutdamp.flight.dynamics import make_dynamics
-from nutdamp.flight.propellant import supplied
+from nutdamp.flight.dynamics import make_dynamics, supplied
 from nutdamp.physics import attitude
 from nutdamp.schemes.catalogue import Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega

@@ -6,15 +6,12 @@ import itertools
 import math
 
 from nutdamp.errors import Infeasible, span
-from nutdamp.schemes.catalogue import FourPulseOptions
+from nutdamp.schemes.catalogue import DEFAULT_SHARE, FourPulseOptions
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
-
-DEFAULT_SHARE = 0.125
-"""Default on-time as a share of T_ω: 2.6 % of the impulse is lost to the width."""
 
 
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:

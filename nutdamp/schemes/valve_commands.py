@@ -16,8 +16,7 @@ import numpy as np
 from nutdamp.common import work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
-from nutdamp.flight.dynamics import lightened, shed
-from nutdamp.flight.propellant import Supply, supplied
+from nutdamp.flight.dynamics import Supply, lightened, shed, supplied
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.correction import TAIL, Correction, misses
 from nutdamp.spacecraft.constraints import (

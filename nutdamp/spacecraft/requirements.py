@@ -240,16 +240,6 @@ def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:
     return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))
 
 
-DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
-
-dispersions:
-  A: {normal: 2 %}
-  C: {normal: 2 %}
-  omega0: {normal: 0.1 deg/s}
-  thrust: {normal: 3 %}
-  timing: {uniform: 5 ms}"""
-"""Message for a file that should have dispersions."""
-
 LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:
 
 loop:
@@ -258,12 +248,6 @@ loop:
   start: 0.5 deg
   stop: 0.05 deg"""
 """Message for a file that should have a loop."""
-
-
-def expect_dispersions(spacecraft: Spacecraft) -> None:
-    """Raise BadRequest, with an example to write, for a spacecraft without dispersions."""
-    if spacecraft.dispersions is None:
-        raise BadRequest(DISPERSIONS)
 
 
 def expect_loop(spacecraft: Spacecraft) -> Loop:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from nutdamp.errors import BadRequest
+
 KINDS = ("normal", "uniform", "triangular", "bias")
 """Distribution, by the meaning of the size: one sigma, half width, half width, a fixed offset."""
 
@@ -73,3 +75,20 @@ class Dispersions:
     tank_exponent: Tolerance | None = None
     inertia_per_kg: Tolerance | None = None
     correlation: tuple[tuple[str, str, float], ...] = ()
+
+
+DISPERSIONS = """the spacecraft file has no dispersions: it does not say how far its values may be off. For example:
+
+dispersions:
+  A: {normal: 2 %}
+  C: {normal: 2 %}
+  omega0: {normal: 0.1 deg/s}
+  thrust: {normal: 3 %}
+  timing: {uniform: 5 ms}"""
+"""Message for a file that should have dispersions."""
+
+
+def expect_dispersions(dispersions: Dispersions | None) -> None:
+    """Raise BadRequest, with an example to write, for a spacecraft without."""
+    if dispersions is None:
+        raise BadRequest(DISPERSIONS)

@@ -24,9 +24,9 @@ from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, Consequence
 from nutdamp.spacecraft.equipment import SunSensor
 from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.pulses import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.robust import in_words, size_text
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of

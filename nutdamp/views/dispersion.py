@@ -24,8 +24,7 @@ from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
-from nutdamp.views.decisions import end_rows
-from nutdamp.views.pulses import final_json, heading, target_json
+from nutdamp.views.decisions import end_rows, final_json, heading, target_json
 from nutdamp.views.robust import (
     budgeted_outputs,
     in_words,

@@ -55,7 +55,7 @@ class Format(NamedTuple):
 def _json(request: Request) -> str:
     from nutdamp.files.tabular import json_text
     from nutdamp.planning.decision import compare_plans
-    from nutdamp.views.pulses import comparison_json
+    from nutdamp.views.decisions import comparison_json
 
     return json_text(comparison_json(compare_plans((request.plan,))))
 

@@ -24,8 +24,19 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import VERDICT, cost, end_rows, margin_lines, statement
-from nutdamp.views.pulses import final_json, heading, pulse_table, requirement_json, residual_json, seconds, target_json
+from nutdamp.views.decisions import (
+    VERDICT,
+    cost,
+    end_rows,
+    final_json,
+    heading,
+    margin_lines,
+    requirement_json,
+    residual_json,
+    statement,
+    target_json,
+)
+from nutdamp.views.pulses import pulse_table, seconds
 from nutdamp.views.summary import Remark, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts
 from nutdamp.views.text import degrees, duration, lasting, moment, most, quantity, small_angle

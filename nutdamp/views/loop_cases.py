@@ -23,6 +23,7 @@ from nutdamp.montecarlo.statistics import Array, Exact
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
+from nutdamp.views.decisions import heading
 from nutdamp.views.dispersion import (
     PERCENTILES,
     angle_rows,
@@ -39,7 +40,6 @@ from nutdamp.views.dispersion import (
     shown,
 )
 from nutdamp.views.loop import described
-from nutdamp.views.pulses import heading
 from nutdamp.views.robust import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import MISSING, degrees, duration

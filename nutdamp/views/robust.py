@@ -23,15 +23,14 @@ from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
 from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study
 from nutdamp.planning.decision import infeasibility
-from nutdamp.planning.notes import robust_cost, robust_reasons
-from nutdamp.planning.robust import RobustComparison
+from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
-from nutdamp.views.decisions import KEPT, figures, requirement
-from nutdamp.views.pulses import final_json, plan_json, pulse_table, target_json
+from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, requirement, target_json
+from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts
 from nutdamp.views.text import in_degrees, joined, note_json, quantity, screen_line

@@ -22,8 +22,8 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import decisions
-from nutdamp.views.decisions import FARTHER
-from nutdamp.views.pulses import heading, plan_json, pulse_table
+from nutdamp.views.decisions import FARTHER, heading, plan_json
+from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table, requested
 from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of

@@ -24,7 +24,7 @@ from nutdamp.montecarlo.propagated import ClosedForm
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.views.pulses import residual_json, spacecraft_json
+from nutdamp.views.decisions import residual_json, spacecraft_json
 
 ROWS = 4001
 """Moments of the reference motion; between them the angle stays below its largest by 1e-6 of its swing."""

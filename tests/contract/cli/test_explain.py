@@ -294,7 +294,6 @@ def keys_written() -> Iterator[str]:
         "robust",
         "simulation",
         "trade",
-        "verification",
     )
     functions = (node for node in nodes(VIEWS / f"{name}.py" for name in names) if isinstance(node, ast.FunctionDef))
     for node in itertools.chain.from_iterable(map(ast.walk, functions)):

@@ -175,7 +175,7 @@ run(group)
         ("plan spacecraft.yaml --json x.json", "files.reader", "read_spacecraft"),
         ("plan --json x.json --csv x.csv", "files.tabular", "json_text"),
         ("simulate --scheme two-pulse --csv x.csv --json x.json", "files.tabular", "json_text"),
-        ("verify --json x.json", "views.verification", "verification_json"),
+        ("verify --json x.json", "views.simulation", "verification_json"),
         ("report -o x.html", "files.reader", "read_spacecraft"),
         ("export --format json -o x.json", "files.tabular", "json_text"),
     ],

@@ -18,7 +18,7 @@ from support.golden import check_text
 from support.process import Run
 from support.spinners import FILE
 
-from nutdamp.cli.flown import JITTER_SEED
+from nutdamp.cli.plan import JITTER_SEED
 from nutdamp.files import tabular
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.files.schedules import BLOCKS_HEADER, read_blocks, read_pulses

@@ -21,7 +21,7 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.files.rules import Facts
 from nutdamp.files.schedules import EFFECTIVE, read_pulses
 from nutdamp.files.thruster_rules import thrusts
-from nutdamp.flight.propellant import supplied
+from nutdamp.flight.dynamics import supplied
 from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid
 from nutdamp.planning import plan as planning

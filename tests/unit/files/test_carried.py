@@ -12,7 +12,7 @@ import nutdamp
 from nutdamp.errors import BadRequest
 from nutdamp.files.carried import later
 from nutdamp.files.reader import Source
-from nutdamp.flight.propellant import supplied
+from nutdamp.flight.dynamics import supplied
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft

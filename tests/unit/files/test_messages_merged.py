@@ -10,7 +10,7 @@ from support.process import Run
 
 import nutdamp
 from nutdamp.errors import BadRequest, FaultyFile
-from nutdamp.files.ccsds.history import read_history
+from nutdamp.files.telemetry import read_history
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft
 

@@ -14,8 +14,8 @@ from support.builders import cross, spinner
 from support.cases import deep, spread
 from support.dispersed import normal
 
+from nutdamp.flight.dynamics import Supply, supplied
 from nutdamp.flight.propagation import flown
-from nutdamp.flight.propellant import Supply, supplied
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import plan as planning

@@ -19,9 +19,8 @@ from support.spinners import FILE as SPINNER
 from nutdamp.control_loop.simulation import fly
 from nutdamp.errors import FaultyFile, Unsuitable
 from nutdamp.files.reader import read_spacecraft
-from nutdamp.flight.dynamics import lightened
+from nutdamp.flight.dynamics import lightened, supplied
 from nutdamp.flight.propagation import by_impulses, flown
-from nutdamp.flight.propellant import supplied
 from nutdamp.flight.verification import verify
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import RealWidths

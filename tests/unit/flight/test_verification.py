@@ -39,7 +39,7 @@ from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Disturbance, Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.views.verification import conservation, verdict
+from nutdamp.views.simulation import conservation, verdict
 
 EXAMPLE = read_spacecraft(example_text(), "example.yaml")
 HEAVIER = replace(EXAMPLE, inertia=Inertia((120.00012, 120.00012, 80.0)))  # by 1 ppm

@@ -14,8 +14,8 @@ from support.single_case import flown_outputs
 
 from nutdamp.errors import FaultyFile
 from nutdamp.files.reader import read_spacecraft
+from nutdamp.flight.dynamics import supplied
 from nutdamp.flight.propagation import flown
-from nutdamp.flight.propellant import supplied
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import DrawSource, list_inputs
 from nutdamp.montecarlo.propagated import ClosedForm, Ends, RealWidths

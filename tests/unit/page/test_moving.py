@@ -26,8 +26,8 @@ from support.shown import WIDE, compared_text, tree
 from nutdamp.files.reader import example_text, read_spacecraft
 from nutdamp.flight import propagation
 from nutdamp.page import moving
-from nutdamp.page.document import Circle, Moving, NamedDirection, PageSection
-from nutdamp.page.moving import EDGES, LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
+from nutdamp.page.document import EDGES, Circle, Moving, NamedDirection, PageSection
+from nutdamp.page.moving import LEAD, MOST_ROWS, NONE, SPHERE, absence, moving_of, strip_of
 from nutdamp.page.report import page_html
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan

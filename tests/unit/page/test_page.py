@@ -30,7 +30,7 @@ from nutdamp.page.report import CONDITIONS, Repeat, assumptions, block_html, pag
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.views import guide
-from nutdamp.views.pulses import comparison_json
+from nutdamp.views.decisions import comparison_json
 from nutdamp.views.tables import Heading
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

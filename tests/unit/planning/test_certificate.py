@@ -24,7 +24,7 @@ from nutdamp.planning.tradeoff import certificate
 from nutdamp.schemes.catalogue import OptimalOptions
 from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Goal, Limits, Spacecraft
-from nutdamp.views.pulses import certificate_json
+from nutdamp.views.decisions import certificate_json
 
 WEAK, STRONG = cross(8.0), cross(4_000.0)
 PLAIN, IMPULSE = OptimalOptions(), OptimalOptions(least="impulse")

@@ -29,9 +29,9 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning import robust, screening
 from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.notes import robust_reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground
+from nutdamp.planning.robust import robust_reasons
 from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options

@@ -7,8 +7,8 @@ import pytest
 
 import nutdamp
 from nutdamp.files.carried import later
+from nutdamp.flight.dynamics import Supply
 from nutdamp.flight.propagation import flown
-from nutdamp.flight.propellant import Supply
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
