@@ -1,9 +1,10 @@
-"""Numerics: Gauss-Legendre quadrature, rounding of bounds, and removal of rounding noise from shown numbers."""
+"""Numerics: quadrature, zeros, tails of χ², rounding of bounds, and removal of rounding noise from shown numbers."""
 
 from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -62,3 +63,28 @@ def down(value: float) -> float:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return math.floor(value / step * (1.0 + 1e-12)) * step
+
+
+def rising_zero(excess: Callable[[float], float], low: float, high: float) -> float:
+    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale end."""
+    below, above = excess(low), excess(high)
+    for _ in range(100):
+        if above == 0.0 or high - low <= 2e-16 * high:
+            break
+        middle = high - above * (high - low) / (above - below)
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+        value = excess(middle)
+        if value < 0.0:
+            low, below, above = middle, value, 0.5 * above
+        else:
+            high, above, below = middle, value, 0.5 * below
+    return high
+
+
+def chi_square_tail(count: int, value: float) -> float:
+    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value`` above 0."""
+    half = max(0.5 * value, 1e-300)
+    powers = [0.5 * (count % 2) + index for index in range(count // 2)]
+    series = math.fsum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
+    return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
+from nutdamp.common.numerics import chi_square_tail
 from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quantisation
@@ -368,11 +369,3 @@ class Fit:
         correlations = self.whiteness(signal, 20)
         lags = np.arange(1, len(correlations) + 1)
         return chi_square_tail(len(lags), float(count * (count + 2) * np.sum(correlations**2 / (count - lags)))) > 0.001
-
-
-def chi_square_tail(count: int, value: float) -> float:
-    """Probability that the sum of ``count`` squares of standard normal numbers exceeds a ``value`` above 0."""
-    half = max(0.5 * value, 1e-300)
-    powers = [0.5 * (count % 2) + index for index in range(count // 2)]
-    series = math.fsum(math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers)
-    return series + (math.erfc(math.sqrt(half)) if count % 2 else 0.0)

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import gauss_legendre
+from nutdamp.common.numerics import gauss_legendre, rising_zero
 from nutdamp.physics import energy_sink
 
 Array = NDArray[np.float64]
@@ -143,28 +142,11 @@ def on_time_for(impulse: float, torque: float, rate: float, slope: float, longes
     low, high = 0.0, min(plain, longest)
     for _ in range(OUTWARDS):
         if excess(high) >= 0.0:
-            return _crossing(excess, low, high)
+            return rising_zero(excess, low, high)
         if high >= longest or (abs(rate) + 0.5 * abs(slope) * high) * high > 2.0 * math.pi:
             return None
         low, high = high, min(1.1 * high, longest)
     return None
-
-
-def _crossing(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Rising zero of ``excess`` between ``low`` and ``high``: false position that halves a stale end."""
-    below, above = excess(low), excess(high)
-    for _ in range(100):
-        if above == 0.0 or high - low <= 2e-16 * high:
-            break
-        middle = high - above * (high - low) / (above - below)
-        if not low < middle < high:
-            middle = 0.5 * (low + high)
-        value = excess(middle)
-        if value < 0.0:
-            low, below, above = middle, value, 0.5 * above
-        else:
-            high, above, below = middle, value, 0.5 * below
-    return high
 
 
 PANEL = 2.0

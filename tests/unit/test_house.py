@@ -13,8 +13,14 @@ from support import places
 
 PACKAGE = places.ROOT / "nutdamp"
 LOOSE = {"__init__", "__main__", "api", "errors", "units"}
-LONGEST = 600
-"""Lines of a module."""
+LONGEST, SHORTEST = 600, 80
+"""Lines of a module, but of a scheme."""
+
+FLOORS = 22
+"""Longest chain of imports, those within functions and for types alone too."""
+
+MOST_MODULES = 112
+"""Modules without views, figures, the page and the markers of packages."""
 
 RIDDLES = re.compile(r"(What|Whether|How|Which|That|Why|Where|When)\b")
 """First words of a docstring that does not say what the thing is."""
@@ -45,6 +51,35 @@ def test_packages_are_folders_and_nothing_more() -> None:
 def test_a_module_can_be_read_in_a_sitting() -> None:
     lines = {path: len((PACKAGE / path).read_text(encoding="utf-8").splitlines()) for path in trees()}
     assert {path: count for path, count in lines.items() if count > LONGEST} == {}
+    short = {path for path, count in lines.items() if count < SHORTEST and not path.endswith("__.py")}
+    assert {path for path in short if not path.startswith("schemes/")} == set()
+
+
+def test_the_house_can_be_held_in_the_head() -> None:
+    outside = [path for path in trees() if not path.startswith(("views/", "figures/", "page/"))]
+    assert len([path for path in outside if not path.endswith("__init__.py")]) <= MOST_MODULES
+
+
+@cache
+def imported(module: str) -> frozenset[str]:
+    """Modules of the package that a module imports, anywhere in it, by their names below the package."""
+    names = set()
+    for node in ast.walk(trees()[f"{module.replace('.', '/')}.py"]):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("nutdamp"):
+            base = (node.module or "").removeprefix("nutdamp").removeprefix(".")
+            names |= {f"{base}.{alias.name}".removeprefix(".") for alias in node.names} | {base}
+    return frozenset(name for name in names if name != module and f"{name.replace('.', '/')}.py" in trees())
+
+
+@cache
+def chain(module: str) -> tuple[str, ...]:
+    """The longest chain of imports down from a module; fails with RecursionError where they run in a circle."""
+    return (module, *max(map(chain, imported(module)), key=len, default=()))
+
+
+def test_imports_run_down_few_floors_and_never_in_a_circle() -> None:
+    modules = [path.removesuffix(".py").replace("/", ".") for path in trees() if not path.endswith("__init__.py")]
+    assert len(max(map(chain, modules), key=len)) <= FLOORS
 
 
 HEADED = {"Column": 1, "Heading": 0}

@@ -16,10 +16,11 @@ from support.cases import weekly
 from support.synthetic import gyro_case
 from support.telemetry_kinds import KINDS, telemetry
 
+from nutdamp.common.numerics import chi_square_tail
 from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
-from nutdamp.estimation.search import Fit, chi_square_tail, residuals, search, units_of
+from nutdamp.estimation.search import Fit, residuals, search, units_of
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
