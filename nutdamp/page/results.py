@@ -36,13 +36,13 @@ _TABLED = ("csv", "table", "figure", "line", "html")
 VIEWS = {
     "object.save": "page.results:save",
     "object.write": "page.results:write",
-    "Spacecraft.data": "views.pulses:spacecraft_json",
+    "Spacecraft.data": "views.decisions:spacecraft_json",
     **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
-    "Plan.data": "views.pulses:plan_json",
+    "Plan.data": "views.decisions:plan_json",
     "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
     **{f"Plan.{what}": f"page.results:plan_{what}" for what in _TABLED},
-    "Comparison.data": "views.pulses:comparison_json",
+    "Comparison.data": "views.decisions:comparison_json",
     "Comparison.sentences": "page.results:comparison_sentences",
     "Comparison.reason": "page.results:comparison_reason",
     **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in _TABLED},
@@ -73,10 +73,10 @@ VIEWS = {
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.simulation:verification_json plan.flight plan.scheme core",
     "Verified.screen": "views.simulation:verification_screen plan core",
-    "Budget.data": "views.loop:budget_json",
-    "Budget.csv": "views.loop:budget_csv",
+    "Budget.data": "views.budget:budget_json",
+    "Budget.csv": "views.budget:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
-    "Budget.screen": "views.loop:budget_screen",
+    "Budget.screen": "views.budget:budget_screen",
 }
 """Functions of results, see `nutdamp.common.results.view`."""
 

@@ -27,11 +27,11 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.dispersion import correlation_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.robust import in_words, size_text
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
+from nutdamp.views.tolerances import in_words, size_text
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:

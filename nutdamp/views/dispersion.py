@@ -25,7 +25,11 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views.decisions import end_rows, final_json, heading, target_json
-from nutdamp.views.robust import (
+from nutdamp.views.spacecraft import bounds_text, requested
+from nutdamp.views.summary import summary
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
+from nutdamp.views.text import degrees, digits
+from nutdamp.views.tolerances import (
     budgeted_outputs,
     in_words,
     inputs_table,
@@ -33,10 +37,6 @@ from nutdamp.views.robust import (
     tolerance_budget,
     unused_table,
 )
-from nutdamp.views.spacecraft import bounds_text, requested
-from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
-from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopResults

@@ -40,9 +40,9 @@ from nutdamp.views.dispersion import (
     shown,
 )
 from nutdamp.views.loop import described
-from nutdamp.views.robust import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import MISSING, degrees, duration
+from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
 
 
 class LoopOutput(NamedTuple):

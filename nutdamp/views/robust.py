@@ -1,39 +1,29 @@
-"""Results of ``plan --robust``, and the tolerance budget.
-
-Candidates by the share of cases that comply, the plan to fly and its cost; the effect of each input alone, and its
-share of the variance.
-"""
+"""Results of ``plan --robust``: candidates by the share of cases that comply, the plan to fly and its cost."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
-from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
-from nutdamp.montecarlo.statistics import FirstOrder
-from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study
+from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.planning.decision import infeasibility
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.requirements import Part
-from nutdamp.units import screen_unit
 from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, requirement, target_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts
-from nutdamp.views.text import in_degrees, joined, note_json, quantity, screen_line
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
+from nutdamp.views.text import in_degrees, joined, note_json, screen_line
+from nutdamp.views.tolerances import in_words, stated_text
 
 MOST_ROWS = 12
 """Largest number of candidates in the table."""
@@ -219,218 +209,3 @@ def _fresh(robust: RobustComparison) -> Iterator[str]:
 def _fewer(robust: RobustComparison) -> list[int]:
     """Numbers of cases after which plans were given up."""
     return sorted({candidate.cases.samples for candidate in robust.candidates} - {robust.samples})
-
-
-SHOWN = {
-    "rad": ("deg", 180.0 / math.pi),
-    "rad/s": ("deg/s", 180.0 / math.pi),
-    "m": ("mm", 1e3),
-    "s": ("ms", 1e3),
-    "Pa": ("bar", 1e-5),
-}
-"""Units for people of those of inputs, and the factor."""
-
-MOST_INPUTS = 12
-"""Largest number of inputs that the budget names; the rest is summed up."""
-
-TINY = 1e-300
-
-ROUNDING = 1e-12
-"""rad; a smaller variation is rounding."""
-
-
-class BudgetRow(NamedTuple):
-    """A line of the tolerance budget: one input, or those that are left together.
-
-    ``size``: one sigma or the bias as text; ``effects``: those of it alone on the two `budgeted_outputs`, rad, or the
-    root mean square of those of correlated inputs together; ``inputs``: rows of the drawn inputs; ``bias``: nothing of
-    it varies.
-    """
-
-    name: str
-    size: str
-    effects: tuple[float, float]
-    inputs: list[int]
-    bias: bool
-
-
-def _budget_rows(study: Study) -> list[BudgetRow]:
-    """The inputs that count most, the largest first, and the others together; none where nothing varies."""
-    inputs, first = study.model.inputs.drawn, study.first_order
-    if not any(entry.sigma for entry in inputs):
-        return []
-    outputs = [output for output, _ in budgeted_outputs(study)]
-    units = together(inputs, study.model.groups)
-    effects = np.array([[_effect(first, output, rows) for rows in units] for output in outputs])
-    scales = np.array([[max(first.sigma(output), TINY)] for output in outputs])
-    order = np.argsort(-(effects / scales).max(axis=0), kind="stable").tolist()
-    named = order if len(order) <= MOST_INPUTS + 1 else order[:MOST_INPUTS]
-    groups = [(*_named([inputs[row] for row in units[at]]), [at]) for at in named]
-    if named != order:
-        others = order[len(named) :]
-        groups.append((f"{sum(len(units[at]) for at in others)} others", "", others))
-    rows = []
-    for name, size, members in groups:
-        nutation, aim = np.sqrt((effects[:, members] ** 2).sum(axis=1)).tolist()
-        of = [row for at in members for row in units[at]]
-        rows.append(BudgetRow(name, size, (nutation, aim), of, not any(inputs[row].sigma for row in of)))
-    return rows
-
-
-def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
-    """Effect of an input alone, or of correlated ones together (root mean square)."""
-    if len(rows) == 1:
-        return float(first.effects(output)[rows[0]])
-    return float(np.linalg.norm(first.independent(output)[:, rows]))
-
-
-def _named(entries: list[DispersedInput]) -> tuple[str, str]:
-    """Name and size of an input, or of correlated ones."""
-    name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
-    return (f"{name} (correlated)" if len(entries) > 1 else name), size
-
-
-def tolerance_budget(results: Results) -> list[RenderableType]:
-    """Shares of the variance by input, by first order and by the cases, and the tolerances that count most."""
-    study, rows = results.study, _budget_rows(results.study)
-    if not rows:
-        return [Text("Nothing varies from case to case, so there is no tolerance budget.")]
-    inputs, first, sampled = study.model.inputs.drawn, study.first_order, results.shares
-    outputs = dict(budgeted_outputs(study))
-    rest = (1.0 - math.fsum(fractions[output] for fractions in sampled.values()) for output in outputs)
-    shares = [max(share, 0.0) * (first.sigma(output) > ROUNDING) for share, output in zip(rest, outputs, strict=True)]
-
-    def linear(output: str, row: BudgetRow) -> str:
-        return "bias" if row.bias else _percent(float(first.shares(output)[row.inputs].sum())) if row.inputs else ""
-
-    def seen(at: int, output: str, row: BudgetRow) -> str:
-        if not row.inputs:
-            return _percent(shares[at])
-        cases = math.fsum(sampled.get(inputs[index].name, {}).get(output, 0.0) for index in row.inputs)
-        return "" if row.bias else _percent(cases)
-
-    def effect(at: int, row: BudgetRow) -> str:
-        return f"{math.degrees(row.effects[at]):.3g}" if row.inputs else ""
-
-    columns = [
-        Column("", Shared.INPUT, "", lambda row: row.name.replace(", ", ",\n"), where="screen", kind=TEXT),
-        Column("", "one sigma\nor bias", "", lambda row: row.size.replace(", ", ",\n"), where="screen"),
-    ]
-    for at, (output, label) in enumerate(outputs.items()):
-        columns.append(Column("", label, "deg", partial(effect, at), where="screen"))
-        columns.append(Column("", Shared.LINEAR, "%", partial(linear, output), where="screen"))
-        columns.append(Column("", Shared.CASES, "%", partial(seen, at, output), where="screen"))
-    table = DataTable("Tolerance budget", columns, [*rows, BudgetRow("interactions", "", (0.0, 0.0), [], False)])
-    note = (
-        "Effect: of the input alone. Shares of the variance of the residual vector: linear by derivatives of the "
-        f"flight; cases by the first {min(results.done, EARLY):,} cases (first-order Sobol index), an estimate that "
-        "may not total 100 %."
-    )
-    if study.model.groups:
-        note += " Correlated inputs vary together: their effect is the root mean square of the group."
-    return [Text(table.title, "bold"), table.screen("screen"), Text(note, "dim"), *map(Text, main_causes(results))]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f}" if share >= 5e-4 else "0"
-
-
-def main_causes(results: Results) -> Iterator[str]:
-    """The tolerances of the file with the largest shares of each residual."""
-    first = results.study.first_order
-    for output, name in budgeted_outputs(results.study):
-        sums: dict[str, float] = {}
-        shares = first.shares(output)
-        for rows in together(first.inputs, results.study.model.groups):
-            entries = [first.inputs[row] for row in rows]
-            key = _named(entries)[0] if len(rows) > 1 else in_words(entries[0].tolerance)
-            sums[key] = sums.get(key, 0.0) + float(shares[rows].sum())
-        ranked = sorted(sums.items(), key=lambda item: -item[1])
-        leading = [f"{key} ({100 * share:.1f} %)" for key, share in ranked if share >= 0.1]
-        if any(sums.values()):
-            yield f"Main causes of {name}: {', '.join(leading or [ranked[0][0]])}."
-
-
-def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
-    """The outputs of the tolerance budget, and their names for people."""
-    first, second = Part.NUTATION, requirements.aim(study.model.spacecraft)
-    return (first.value, first.label), (second.value, second.label)
-
-
-class DrawnInput(NamedTuple):
-    """An input of one case, and its deviation from the nominal value."""
-
-    entry: DispersedInput
-    draw: float
-
-    def scaled(self, value: float, form: str = ".6g") -> str:
-        """A value in the unit for people."""
-        return f"{unit_of_people(self.entry)[1] * value:{form}}"
-
-    @property
-    def off(self) -> str:
-        """The deviation with its unit."""
-        if self.entry.unit == "":
-            return of_nominal(self.entry, self.draw, "+.4g")
-        return f"{self.scaled(self.draw, '+.4g')} {unit_of_people(self.entry)[0]}"
-
-
-INPUTS = (
-    Column("", Shared.INPUT, "", lambda row: in_words(row.entry.name), where="screen", kind=TEXT),
-    Column("", Shared.NOMINAL, "", lambda row: row.scaled(row.entry.nominal), where="screen"),
-    Column("", Shared.THIS_CASE, "", lambda row: row.scaled(row.entry.nominal + row.draw), where="screen"),
-    Column("", "off by", "", lambda row: row.off, where="screen"),
-    Column("", "in sigmas", "", lambda row: f"{row.draw / row.entry.sigma:+.2f}" if row.entry.sigma else "bias",
-           where="screen"),
-)  # fmt: skip
-
-
-def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
-    """Every input of one case: nominal, drawn, and the deviation."""
-    rows = [DrawnInput(entry, draws[entry.name]) for entry in drawn]
-    return DataTable("Inputs", INPUTS, rows).screen("screen")
-
-
-def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
-    """The unit of an input for people, and the factor to it."""
-    return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
-
-
-def unused_table(unused: Iterable[Unused]) -> Table:
-    """Inputs without effect; names that share a reason are listed together."""
-    reasons: dict[str, list[str]] = {}
-    for name, reason in unused:
-        reasons.setdefault(reason, []).append(in_words(name))
-    return facts((", ".join(names), reason) for reason, names in reasons.items())
-
-
-def in_words(name: str) -> str:
-    """A tolerance, or an input, in words: ``thrust_direction`` and ``omega0_1`` are keys of the file."""
-    key, blank, whose = name.replace("tank ", "tank_", 1).partition(" ")
-    if key.startswith("omega0"):
-        return f"initial ω{key.removeprefix('omega0').removeprefix('_')}"
-    return ("jitter of the Sun sensor" if key == "sun_sensor.jitter" else key.replace("_", " ")) + blank + whose
-
-
-def size_text(entry: DispersedInput) -> str:
-    """One sigma, or the bias, in the form of the file."""
-    if entry.unit == "":
-        return of_nominal(entry, entry.sigma or entry.size, ".3g")
-    unit, scale = unit_of_people(entry)
-    return quantity(scale * (entry.sigma or entry.size), unit, 3)
-
-
-def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) -> str:
-    """The size as the file gives it, in % where it is ``relative``; to three digits, ``down``: never rounded up."""
-    share = entry.nominal != 0.0 and (relative or entry.unit == "")
-    unit, scale = ("%", 100.0 / abs(entry.nominal)) if share else unit_of_people(entry)
-    value = scale * entry.size
-    if down and value > 0.0:
-        step = 10.0 ** (math.floor(math.log10(value)) - 2)
-        value = step * math.floor(value / step * (1.0 + 1e-12))
-    return quantity(value, unit, 3).strip()
-
-
-def of_nominal(entry: DispersedInput, value: float, form: str) -> str:
-    """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
-    return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"

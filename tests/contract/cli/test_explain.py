@@ -285,6 +285,7 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 def keys_written() -> Iterator[str]:
     """Names that the code gives to numbers in JSON."""
     names = (
+        "budget",
         "check",
         "dispersion",
         "fit",

@@ -24,7 +24,7 @@ from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
-from nutdamp.views.robust import in_words, size_text
+from nutdamp.views.tolerances import in_words, size_text
 
 SLOW = Trapezoid(0.008, 0.012, 0.005, 0.010)
 TABLE = Measured(((0.01, 0.008, 0.011), (0.05, 0.047, 0.036), (0.2, 0.198, 0.11)))

@@ -30,7 +30,8 @@ from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views import text
-from nutdamp.views.robust import robust_notes, stated_text
+from nutdamp.views.robust import robust_notes
+from nutdamp.views.tolerances import stated_text
 
 EARLY = ("earliest end", "by ")
 """How variants begin that end as early as they can, or little later."""
