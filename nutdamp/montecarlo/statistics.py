@@ -214,7 +214,7 @@ class Exact:
         places = np.asarray(probabilities) * (len(self.values) - 1)
         ranks = places.astype(int)
         share, above = places - ranks, np.ceil(places).astype(int)
-        ordered = np.partition(self.values, np.unique([ranks, above]))
+        ordered = np.partition(self.values, sorted({*ranks.tolist(), *above.tolist()}))  # np.unique loads numpy.ma
         low, high = ordered[ranks], ordered[above]
         quantiles: Array = np.where(share < 0.5, low + (high - low) * share, high - (high - low) * (1.0 - share))
         return quantiles
