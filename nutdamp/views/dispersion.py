@@ -31,6 +31,7 @@ from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
 from nutdamp.views.text import degrees, digits
 from nutdamp.views.tolerances import (
     budgeted_outputs,
+    correlation_json,
     in_words,
     inputs_table,
     main_causes,
@@ -419,9 +420,3 @@ def _shares(results: Results) -> Iterator[dict[str, Any]]:
         both = {name: {"analytic": linear[name][at], "sampled": sampled.get(name, 0.0)} for name in OUTPUTS}
         about = {"tolerance": entry.tolerance, "sigma": entry.sigma, "effect_deg": effects[at]}
         yield {"input": entry.name, **both.pop("nutation"), **about, **both}
-
-
-def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
-    """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
-    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
-    return {"correlation": [list(pair) for pair in pairs]} if pairs else {}

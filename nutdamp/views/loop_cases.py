@@ -32,7 +32,6 @@ from nutdamp.views.dispersion import (
     beside,
     cone_lines,
     cones_json,
-    correlation_json,
     percentile_row,
     percentiles_json,
     requirement_lines,
@@ -42,7 +41,7 @@ from nutdamp.views.dispersion import (
 from nutdamp.views.loop import described
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
 from nutdamp.views.text import MISSING, degrees, duration
-from nutdamp.views.tolerances import MOST_ROWS, in_words, inputs_table, size_text, unused_table
+from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
 
 
 class LoopOutput(NamedTuple):

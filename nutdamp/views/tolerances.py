@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import RenderableType
@@ -16,6 +16,7 @@ from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
 from nutdamp.montecarlo.statistics import FirstOrder
 from nutdamp.montecarlo.study import EARLY, Results, Study
 from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
@@ -237,3 +238,9 @@ def stated_text(entry: DispersedInput, relative: bool, *, down: bool = False) ->
 def of_nominal(entry: DispersedInput, value: float, form: str) -> str:
     """A deviation of a bare number in % of the nominal one; as it is where that is zero."""
     return f"{100 * value / abs(entry.nominal):{form}} %" if entry.nominal else f"{value:{form}}"
+
+
+def correlation_json(spacecraft: Spacecraft) -> dict[str, Any]:
+    """Pairs of inputs that are correlated, as the file gives them; nothing without any."""
+    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    return {"correlation": [list(pair) for pair in pairs]} if pairs else {}
