@@ -510,7 +510,7 @@ class Budget(results.Data, results.Written):
 
     @property
     def until_largest(self) -> float | None:
-        """Time, s, after which damping must have begun; see `compliance.reached`."""
+        """Time, s, after which damping must have begun; see `requirements.reached`."""
         return None if self.largest is None else requirements.reached(self.spacecraft, self.largest)
 
     @property

@@ -67,7 +67,7 @@ VIEWS = {
     "LoopVerification.data": "views.loop:verified_json",
     "LoopVerification.screen": "views.loop:verification_screen",
     "Fitted.data": "views.fit:fit_json core",
-    "Fitted.figure": "figures.studies:fit_figure core",
+    "Fitted.figure": "figures.fit:fit_figure core",
     "Fitted.text": "files.carried:fitted_file core",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",

@@ -174,7 +174,8 @@ class AxisWatch:
 
     def _look(self, here: MotionStretch) -> list[tuple[Array, Array]]:
         """Cosine of each angle, and the rate, 1/s, at which it rises: the axis comes nearer."""
-        (first, second, _), growth, looks = here.rates, here.bodies.forcing.growth, list[tuple[Array, Array]]()
+        (first, second, _), growth = here.rates, here.bodies.forcing.growth
+        looks: list[tuple[Array, Array]] = []
         for number, seen in enumerate(self._seen(here, ...)):
             rate = second * seen[0] - first * seen[1]  # of e3, by ω × e3
             if growth != 0.0 or number == self.momentum:

@@ -189,9 +189,6 @@ sigma of margin."""
 ROUNDING = 1e-9
 """Of a number of cases."""
 
-AGAINST = "against dispersions"
-"""Label of plans with a margin."""
-
 REPAIRS = 24
 """Times that a burn which breaks a limit is moved elsewhere."""
 
@@ -398,7 +395,7 @@ class _MarginSearch:
         plan = planning.judged(self.spacecraft, SCHEME, schedule, self.options)
         if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
             results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
-            yield f"{AGAINST}, {margin:.3g} σ", plan, results
+            yield f"against dispersions, {margin:.3g} σ", plan, results
 
     def _few(self, solution: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""

@@ -332,7 +332,7 @@ class Plan(results.Data, results.Tabled):
 
     @property
     def severity(self) -> float:
-        """See `compliance.severity`; infinite for an infeasible plan."""
+        """See `requirements.severity`; infinite for an infeasible plan."""
         return math.inf if self.left is None else float(requirements.severity(self.spacecraft, self.left))
 
     @property

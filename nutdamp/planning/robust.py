@@ -12,7 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import partial
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -38,9 +40,6 @@ LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 
 WITHIN = (1.5, 2.0)
 """Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
-
-EARLIEST = "earliest end"
-"""Label of the plan of `optimal` that ends first."""
 
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
@@ -135,29 +134,38 @@ class RobustComparison(results.Data):
         return None if self.chosen is None else self.chosen.met
 
 
-Attempt = Callable[[], Iterable[tuple[str, Plan]]]
-"""Lazy generator of plans, each with the label of its variant."""
+class TrialKind(IntEnum):
+    """Sort of plans that a trial makes, in the order in which they are tried."""
+
+    PLANNED, MARGINS, EARLY, VARIED = range(4)
 
 
-def attempts(comparison: Comparison, options: Options | None = None) -> list[Attempt]:
-    """Attempts of `compare`: the plans compared, and variants of each."""
+class Trial(NamedTuple):
+    """Lazy generator of plans, each with the label of its variant, and their ``kind``."""
+
+    plans: Callable[[], Iterable[tuple[str, Plan]]]
+    kind: TrialKind = TrialKind.VARIED
+
+
+def trials_of(comparison: Comparison, options: Options | None = None) -> list[Trial]:
+    """Trials of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    planned, margins, early, varied = list[Attempt](), list[Attempt](), list[Attempt](), list[Attempt]()
+    tried = list[Trial]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
-        planned.append(partial(list, [("as planned", base)]))
-        varied.append(partial(_alignments, body, base.scheme, options))
-        varied += [partial(_planned, *other, base.scheme, options) for other in _others(body, base)]
+        tried.append(Trial(partial(list, [("as planned", base)]), TrialKind.PLANNED))
+        tried.append(Trial(partial(_alignments, body, base.scheme, options)))
+        tried += [Trial(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            margins.append(partial(chance_plan.plans, body, options))
-            early.append(partial(_early, body, options))
-    return [*planned, *margins, *early, *varied]
+            tried.append(Trial(partial(chance_plan.plans, body, options), TrialKind.MARGINS))
+            tried.append(Trial(partial(_early, body, options), TrialKind.EARLY))
+    return sorted(tried, key=attrgetter("kind"))
 
 
 def compare(
     comparison: Comparison,
-    trials: Sequence[Attempt],
+    trials: Sequence[Trial],
     watch: Callable[[int], None] = lambda _: None,
     *,
     samples: int = SAMPLES,
@@ -175,8 +183,10 @@ def compare(
     with work.budget("the robust plans", work.FRONTS) as budget:
         for number, trial in enumerate(trials):
             watch(number)
-            margins = early = False
-            for variant, plan in () if work.exhausted() else trial():
+            planned = False
+            # The earliest ends have a budget of their own, whatever the margins took.
+            budget.most = work.FRONTS + (budget.done if trial.kind is TrialKind.EARLY else 0.0)
+            for variant, plan in () if work.exhausted() else trial.plans():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
                 if not plan.feasible or kind in entries or not keeps_limits(body, plan.pulses):
@@ -184,7 +194,7 @@ def compare(
                 own = plan if plan.spacecraft is body else replace(plan, spacecraft=body)
                 if comparison.only_commanded and not own.commandable:
                     continue
-                margins, early = margins or variant.startswith(chance_plan.AGAINST), early or variant == EARLIEST
+                planned = True
                 known = None if comparison.flown is None else comparison.flown.get(plan)
                 with suppress(Infeasible):  # cases that cannot be flown, such as those that take too long
                     if known is not None and known.cases.requested == samples:
@@ -192,11 +202,10 @@ def compare(
                         entries[kind].variant = variant
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
-            # What the margins took, the trial after the plans compared, is not missing from the early ends.
-            budget.most = work.FRONTS + (budget.done if number == len(comparison.plans) else 0.0)
-            if margins or early:
+            if planned and trial.kind in (TrialKind.MARGINS, TrialKind.EARLY):
                 ranks = _flown(comparison, entries, samples, probability)
-                done = early or (ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least)
+                cheap = ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least
+                done = trial.kind is TrialKind.EARLY or cheap
                 if done and ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
                     return _trimmed(ranks)
     return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
@@ -326,7 +335,7 @@ def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     first = attempt(body, chance_plan.SCHEME, Options(**{**options.chosen, "least": "time"}))
     if not first.feasible:
         return
-    yield EARLIEST, first
+    yield "earliest end", first
     for times in WITHIN:
         horizon = times * first.end
         if horizon < body.horizon:
