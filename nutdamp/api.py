@@ -207,7 +207,7 @@ def robust(
     from nutdamp.spacecraft.tolerances import expect_dispersions
 
     expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions)
-    trials = search.trials_of(compared, options)
+    trials = search.variations_of(compared, options)
     with work.steps(1.5 * len(trials), hook=lambda done, _: progress(done, len(trials))) as task:  # a third: flights
         return search.compare(compared, trials, task.reach)
 

@@ -134,46 +134,46 @@ class RobustComparison(results.Data):
         return None if self.chosen is None else self.chosen.met
 
 
-class TrialKind(IntEnum):
-    """Sort of plans that a trial makes, in the order in which they are tried."""
+class VariationKind(IntEnum):
+    """Kind of the plans that a variation makes, in the order in which they are tried."""
 
     PLANNED, MARGINS, EARLY, VARIED = range(4)
 
 
-class Trial(NamedTuple):
+class Variation(NamedTuple):
     """Lazy generator of plans, each with the label of its variant, and their ``kind``."""
 
     plans: Callable[[], Iterable[tuple[str, Plan]]]
-    kind: TrialKind = TrialKind.VARIED
+    kind: VariationKind = VariationKind.VARIED
 
 
-def trials_of(comparison: Comparison, options: Options | None = None) -> list[Trial]:
-    """Trials of `compare`: the plans compared, and variants of each."""
+def variations_of(comparison: Comparison, options: Options | None = None) -> list[Variation]:
+    """Variations of `compare`: the plans compared, and variants of each."""
     body, options = comparison.spacecraft, options or Options()
-    tried = list[Trial]()
+    tried = list[Variation]()
     for base in comparison.plans:
         if base.failure is not None:
             continue
-        tried.append(Trial(partial(list, [("as planned", base)]), TrialKind.PLANNED))
-        tried.append(Trial(partial(_alignments, body, base.scheme, options)))
-        tried += [Trial(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
+        tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
+        tried.append(Variation(partial(_alignments, body, base.scheme, options)))
+        tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
         if base.scheme == chance_plan.SCHEME:
-            tried.append(Trial(partial(chance_plan.plans, body, options), TrialKind.MARGINS))
-            tried.append(Trial(partial(_early, body, options), TrialKind.EARLY))
+            tried.append(Variation(partial(chance_plan.plans, body, options), VariationKind.MARGINS))
+            tried.append(Variation(partial(_early, body, options), VariationKind.EARLY))
     return sorted(tried, key=attrgetter("kind"))
 
 
 def compare(
     comparison: Comparison,
-    trials: Sequence[Trial],
+    variations: Sequence[Variation],
     watch: Callable[[int], None] = lambda _: None,
     *,
     samples: int = SAMPLES,
 ) -> RobustComparison:
-    """Make the plans of the ``trials``, let dispersed cases fly each, and recommend one; no schedule comes twice.
+    """Make the plans of the ``variations``, let dispersed cases fly each, and recommend one; no schedule comes twice.
 
-    ``samples`` cases of those that may be chosen, see `screening`; ``watch`` is called with how many trials are done,
-    and then beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
+    ``samples`` cases of those that may be chosen, see `screening`; ``watch`` is called with how many are done, and then
+    beyond that now and then. Raises BadRequest for a spacecraft without dispersions.
     """
     body = comparison.spacecraft
     probability = required_share(body.requirement)
@@ -181,12 +181,12 @@ def compare(
     # No early end costs less than the plan of the whole horizon that leaves as little.
     least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == chance_plan.SCHEME), default=0.0)
     with work.budget("the robust plans", work.FRONTS) as budget:
-        for number, trial in enumerate(trials):
+        for number, variation in enumerate(variations):
             watch(number)
             planned = False
             # The earliest ends have a budget of their own, whatever the margins took.
-            budget.most = work.FRONTS + (budget.done if trial.kind is TrialKind.EARLY else 0.0)
-            for variant, plan in () if work.exhausted() else trial.plans():
+            budget.most = work.FRONTS + (budget.done if variation.kind is VariationKind.EARLY else 0.0)
+            for variant, plan in () if work.exhausted() else variation.plans():
                 kind = _kind(plan)
                 # Planned for other limits or channels, perhaps, but always flown by this spacecraft.
                 if not plan.feasible or kind in entries or not keeps_limits(body, plan.pulses):
@@ -202,13 +202,13 @@ def compare(
                         entries[kind].variant = variant
                     else:
                         entries[kind] = entered(own, variant, study_of(body, own.pulses), samples)
-            if planned and trial.kind in (TrialKind.MARGINS, TrialKind.EARLY):
+            if planned and variation.kind in (VariationKind.MARGINS, VariationKind.EARLY):
                 ranks = _flown(comparison, entries, samples, probability)
                 cheap = ranks.chosen is not None and ranks.chosen.plan.pulses.cost <= least
-                done = trial.kind is TrialKind.EARLY or cheap
+                done = variation.kind is VariationKind.EARLY or cheap
                 if done and ranks.meets_requirement and not ranks.lucky:  # other variants seldom cost less
                     return _trimmed(ranks)
-    return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(trials))))
+    return _trimmed(_flown(comparison, entries, samples, probability, partial(watch, len(variations))))
 
 
 def _flown(

@@ -183,7 +183,7 @@ def test_a_robust_plan_keeps_the_cone_in_most_cases(tmp_path: Path) -> None:
     names = "rhumb-line", "half-cone"
     compared, counted = (decision.compare(body, names, samples=samples) for samples in (0, 1000))
     assert [one.recommended and one.recommended.scheme for one in (compared, counted)] == list(names)
-    trials = robust.trials_of(compared)
+    trials = robust.variations_of(compared)
     judged = robust.compare(compared, trials[:1] + trials[-2:], samples=1000)
     shares = {one.plan.scheme: one.met for one in judged.candidates}
     assert planning.plan(body, "rhumb-line").meets_requirement

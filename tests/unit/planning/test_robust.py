@@ -64,10 +64,10 @@ def planned(
     body: Spacecraft, *names: str, samples: int = SAMPLES, trials: int | None = None
 ) -> robust.RobustComparison:
     compared = compare(body, names or CLASSIC, samples=0 if body.requirement is None else samples)
-    attempts = robust.trials_of(compared)
+    attempts = robust.variations_of(compared)
     if trials is not None:
         as_planned = [("as planned", plan) for plan in compared]
-        attempts = [robust.Trial(partial(list, as_planned)), *attempts[:trials]]
+        attempts = [robust.Variation(partial(list, as_planned)), *attempts[:trials]]
     return robust.compare(compared, attempts, samples=samples)
 
 
@@ -337,7 +337,7 @@ def test_the_spin_is_part_of_the_requirement_in_every_case() -> None:
 def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(monkeypatch: pytest.MonkeyPatch) -> None:
     """Long pulses: four-pulse shifts H by 0.57°, by impulse sums by 0.83°."""
     compared = compare(dispersed(requirement=Requirement(None, math.radians(0.7))), ("four-pulse",), samples=500)
-    trials, reported = robust.trials_of(compared)[:3], list[int]()
+    trials, reported = robust.variations_of(compared)[:3], list[int]()
     found = robust.compare(compared, trials, reported.append, samples=500)
     planned_as_it_is = next(one for one in found.candidates if one.variant == "as planned")
     assert planned_as_it_is.met == 1.0
@@ -347,13 +347,13 @@ def test_the_share_is_that_of_the_real_widths_and_how_far_it_is_can_be_watched(m
     assert (nowhere.chosen, nowhere.cost, nowhere.decision, nowhere.meets_requirement) == (None, None, None, None)
     sure = compare(dispersed(None), ("four-pulse",))
     with refused(BadRequest, "plan.not-dispersed"):
-        robust.compare(sure, robust.trials_of(sure), samples=SAMPLES)
+        robust.compare(sure, robust.variations_of(sure), samples=SAMPLES)
 
     def broken(*_: object) -> object:
         raise ZeroDivisionError
 
     monkeypatch.setattr(four_pulse, "schedule", broken)  # a scheme with a bug is left out
-    assert robust.trials_of(compare(dispersed(), ("four-pulse",))) == []
+    assert robust.variations_of(compare(dispersed(), ("four-pulse",))) == []
 
 
 def candidate(impulse: float, left: float = 0.0, met: float | None = None, end: float = 1.0) -> PlanCandidate:
@@ -516,7 +516,7 @@ def test_the_robust_plan_of_a_spacecraft_with_commands_can_be_commanded_unless_p
     compared = compare(body, ("command-block", "two-pulse"), samples=200)
     alone = compare(body, ("two-pulse",), samples=200)
     for one, commanded in ((compared, True), (replace(compared, timed=True), False), (alone, False)):
-        trials = [robust.Trial(partial(list, [("as planned", plan)])) for plan in one]
+        trials = [robust.Variation(partial(list, [("as planned", plan)])) for plan in one]
         found = robust.compare(one, trials, samples=200)
         assert {each.plan.scheme for each in found.candidates} == (
             {"command-block"} if commanded else {plan.scheme for plan in one}

@@ -64,7 +64,7 @@ def columns_of(pulses: list[tuple[int, float, float]]) -> ProgramColumns:
 
 def robustly(body: Spacecraft, *schemes: str, most: int | None = None) -> robust.RobustComparison:
     compared = compare(body, schemes)
-    return robust.compare(compared, robust.trials_of(compared)[:most], samples=SAMPLES)
+    return robust.compare(compared, robust.variations_of(compared)[:most], samples=SAMPLES)
 
 
 CORRELATED = (("A", "C", 0.9), ("thrust T1", "thrust T2", -0.5))
