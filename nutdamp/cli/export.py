@@ -124,12 +124,12 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is not None:
         if schedule is not None:
             raise click.UsageError("--schedule writes the manoeuvres of a message that makes a spacecraft file")
-        from nutdamp.files.ccsds.read import merged_text, motion_of
+        from nutdamp.files.ccsds.read import merged_text
 
         message = read_history(file) if is_history(file) else read_apm(file)
         for entry in message.remarks:
             job.remark(f"{file}: {entry}")
-        merged = merged_text(FileInput(into).source(job.remark), motion_of(message, at or 0.0), inertia=inertia)
+        merged = merged_text(FileInput(into).source(job.remark), message, at or 0.0, inertia=inertia)
         deliver([(output, lambda: merged)])
         return
     if is_history(file):

@@ -30,6 +30,7 @@ from nutdamp.files.editing import (
     number,
     overlay,
 )
+from nutdamp.files.fields import KeyPath
 from nutdamp.files.reader import Source
 from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
@@ -37,7 +38,6 @@ from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import touching
-from nutdamp.spacecraft.tolerances import Tolerance
 from nutdamp.units import parse
 
 
@@ -120,14 +120,9 @@ def carried_notes(spacecraft: Spacecraft, time: float, source: Source) -> Iterat
         yield note("limits-count-anew", at_s=time)
     if spacecraft.orbit is not None:
         yield note("orbit-as-before", at_s=time)
-    if spacecraft.sun is not None and _sun_key(source) != "epoch":
+    sun = overlay(read_tree(source.text, source.name)[0], source.settings)[0].get("sun")
+    if sun is not None and sun.value != "epoch":
         yield note("sun-as-before", at_s=time)
-
-
-def _sun_key(source: Source) -> object:
-    """Value of the key ``sun``."""
-    node = overlay(read_tree(source.text, source.name)[0], source.settings)[0].get("sun")
-    return None if node is None else node.plain()
 
 
 def _edits(tree: Node, moved_on: Later) -> Edits:
@@ -196,23 +191,25 @@ def notes(fit: Fit, carried: Carried) -> Iterator[str]:
         if abs(value) > SEEN * sigma and not (carried.body.wheel or _grows_so(carried, value)):
             way = "grows" if value > 0.0 else "decays"
             yield f"the nutation {way} at {abs(value):.3g} 1/s, which dissipation within a rigid body would not let it"
-    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("delay ")):
-        at = fit.index(name)
-        assert at is not None
-        if abs(fit.values[at]) > SEEN * fit.sigmas[at]:
-            channel = name.removeprefix("delay ")
-            if channel not in dict(_delays(fit)):
-                yield f"the delay of {channel}, {1e3 * fit.values[at]:.4g} ms, is not written: see the key valve"
-    yield from _off(fit)
-    for name in (parameter.name for parameter in fit.model.parameters if parameter.name.startswith("thrust ")):
-        if fit.named[name] <= LEAST_THRUST:
-            channel = name.removeprefix("thrust ")
-            factor = fit.named[name]
-            share = f"{channel} gave {100.0 * factor:.3g} % of its thrust"
-            doubt = (
-                "did it fire?" if factor > -LEAST_THRUST else "it pushes the other way: another channel, or reversed?"
-            )
-            yield f"{share}: {doubt} Its force stays as it was"
+    fitted = list(zip((parameter.name for parameter in fit.model.parameters), fit.values, fit.sigmas, strict=True))
+    for name, value, sigma in fitted:
+        kind, _, channel = name.partition(" ")
+        if kind == "delay" and abs(value) > SEEN * sigma and channel not in dict(_delays(fit)):
+            yield f"the delay of {channel}, {1e3 * value:.4g} ms, is not written: see the key valve"
+    seen = []
+    for name, value, sigma in fitted:
+        kind, _, which = name.partition("_")
+        if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
+            what, unit = UNWRITTEN[kind]
+            seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
+    if seen:
+        yield f"not written, as the file has no key for it: {', '.join(seen)}"
+    for name, factor, _ in fitted:
+        kind, _, channel = name.partition(" ")
+        if kind == "thrust" and factor <= LEAST_THRUST:
+            reversed_ = "it pushes the other way: another channel, or reversed?"
+            doubt = "did it fire?" if factor > -LEAST_THRUST else reversed_
+            yield f"{channel} gave {100.0 * factor:.3g} % of its thrust: {doubt} Its force stays as it was"
     limits = body.limits
     if carried.time != 0.0 and (limits.blackout or limits.earliest > 0.0 or limits.horizon is not None):
         yield f"limits (horizon, earliest, blackout) count from the new t = 0, {carried.time:g} s after the old one"
@@ -255,24 +252,20 @@ def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
 
 
 def _thrusts(tree: Node, carried: Carried) -> Edits:
-    """Force or torque of the thrusters times their factors."""
     factors = carried.factors
-    entries = tree.get("thrusters")
-    for index, _ in entries.children() if entries is not None else ():
-        name = tree.get("thrusters", index, "name")
-        if name is None or name.value not in factors:
-            continue
-        factor = factors[str(name.value)][0]
-        force = tree.get("thrusters", index, "force")
-        if force is not None:
-            value = parse(force.value, "force") * factor
-            yield ("thrusters", index, "force"), as_before(force, value, "force", "N")
-            continue
-        for axis in range(3):
-            part = tree.get("thrusters", index, "torque", axis)
+    for name, path in _thrusters(tree).items():
+        parts = [((*path, "force"), "force", "N")]
+        parts += [((*path, "torque", axis), "torque", "N m") for axis in range(3)]
+        for place, kind, unit in parts if name in factors else ():
+            part = tree.get(*place)
             if part is not None:
-                value = parse(part.value, "torque") * factor
-                yield ("thrusters", index, "torque", axis), as_before(part, value, "torque", "N m")
+                yield place, as_before(part, parse(part.value, kind) * factors[name][0], kind, unit)
+
+
+def _thrusters(tree: Node) -> dict[str, KeyPath]:
+    entries = tree.get("thrusters")
+    nodes = {} if entries is None else {index: entry.get("name") for index, entry in entries.children()}
+    return {str(name.value): ("thrusters", index) for index, name in nodes.items() if name is not None}
 
 
 def _dispersions(fit: Fit, carried: Carried) -> Edits:
@@ -288,11 +281,10 @@ def _dispersions(fit: Fit, carried: Carried) -> Edits:
     factors, given = carried.factors, fit.model.spacecraft.dispersions
     if factors:
         before = {} if given is None else given.thrust
-        parts = [f"{_quoted(name)}: {_tolerance(size)}" for name, size in before.items() if name not in factors]
-        parts += [
-            f"{_quoted(name)}: {{normal: {100.0 * sigma / factor:.6g} %}}" for name, (factor, sigma) in factors.items()
-        ]
-        yield ("dispersions", "thrust"), "{" + ", ".join(parts) + "}"
+        parts = [(name, size.kind, size.size) for name, size in before.items() if name not in factors]
+        parts += [(name, "normal", sigma / factor) for name, (factor, sigma) in factors.items()]
+        sizes = (f"{_quoted(name)}: {{{kind}: {100.0 * size:.6g} %}}" for name, kind, size in parts)
+        yield ("dispersions", "thrust"), "{" + ", ".join(sizes) + "}"
     if carried.tilt is not None:
         yield ("dispersions", "attitude"), f"{{normal: {math.degrees(carried.tilt):.6g} deg}}"
     pairs = correlations(carried, given)
@@ -315,50 +307,25 @@ def _delays(fit: Fit) -> Iterator[tuple[str, float]]:
 
 def _valve(tree: Node, name: str, late: float) -> Edits:
     """The delays of the valve of a thruster, ``late`` s longer; one with the valve of the whole file gets its own."""
-    entries = tree.get("thrusters")
-    for index, entry in entries.children() if entries is not None else ():
-        named = entry.get("name")
-        if named is None or named.value != name:
-            continue
-        own = entry.get("valve")
-        known = own or tree.get("valve")
-        values = {} if known is None else {str(key): str(node.value) for key, node in known.children()}
-        for key in ("open_delay", "close_delay"):
-            before = None if known is None else known.get(key)
-            values[key] = as_before(
-                before, (0.0 if before is None else parse(before.value, "time")) + late, "time", "s"
-            )
-        if own is None:
-            yield (
-                ("thrusters", index, "valve"),
-                "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}",
-            )
-        else:
-            yield from ((("thrusters", index, "valve", key), values[key]) for key in ("open_delay", "close_delay"))
+    path = (*_thrusters(tree)[name], "valve")
+    own = tree.get(*path)
+    known = own or tree.get("valve")
+    values = {} if known is None else {str(key): str(node.value) for key, node in known.children()}
+    for key in ("open_delay", "close_delay"):
+        before = None if known is None else known.get(key)
+        time = late if before is None else parse(before.value, "time") + late
+        values[key] = as_before(before, time, "time", "s")
+        if own is not None:
+            yield (*path, key), values[key]
+    if own is None:
+        yield path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
 
 
 def _sensor(tree: Node, fit: Fit) -> Edits:
-    """The bias of the accelerometer of the loop."""
     at = fit.index("bias_acceleration")
     if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
         given = tree.get("loop", "sensor", "bias")
         yield ("loop", "sensor", "bias"), as_before(given, float(fit.values[at]), "acceleration", "m/s^2")
-
-
-def _off(fit: Fit) -> Iterator[str]:
-    """Sentence on sensor errors that no key of the file holds."""
-    seen = []
-    for parameter, value, sigma in zip(fit.model.parameters, fit.values, fit.sigmas, strict=True):
-        kind, _, which = parameter.name.partition("_")
-        if kind in UNWRITTEN and which != ACCELERATION and abs(value) > SEEN * sigma:
-            what, unit = UNWRITTEN[kind]
-            seen.append(f"{what.format(which)} {math.degrees(value):.3g} {unit}")
-    if seen:
-        yield f"not written, as the file has no key for it: {', '.join(seen)}"
-
-
-def _tolerance(tolerance: Tolerance) -> str:
-    return f"{{{tolerance.kind}: {100.0 * tolerance.size:.6g} %}}"
 
 
 def _quoted(name: str) -> str:

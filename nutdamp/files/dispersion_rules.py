@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from nutdamp.errors import nearest
 from nutdamp.files.fields import RIGHT_ANGLE, KeyPath
-from nutdamp.files.rules import Facts, Finding, inertia_of
+from nutdamp.files.rules import Facts, Finding, inertia_of, principal_of
 from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, READING, VALVE_TIMES, by_name, size_of
-from nutdamp.files.thruster_rules import instead, moments_of, thrusts
+from nutdamp.files.thruster_rules import instead, thrusts
 from nutdamp.files.yaml import Node
 from nutdamp.montecarlo.inputs import Pair, grouped, positive_definite
 from nutdamp.spacecraft.equipment import ACCELEROMETER
@@ -29,16 +29,10 @@ EACH_PULSE = ("thrust_per_pulse", "timing")
 """Tolerances that each pulse draws anew."""
 
 
-def correlation_findings(
-    facts: Facts, entries: Iterable[ToleranceEntry], thrusters: Iterable[str]
-) -> Iterator[Finding]:
-    """Pairs of inputs not drawn, or of one input, pairs given twice, and numbers that cannot be correlations.
-
-    ``entries`` are the tolerances of the file, ``thrusters`` the names that may have some of their own.
-    """
+def _correlations(facts: Facts) -> Iterator[Finding]:
     path = ("dispersions", "correlation")
     pairs: dict[frozenset[str], Pair] = {}
-    drawn, sound = _drawn(facts, entries, list(thrusters)), True
+    drawn, sound = _drawn(facts), True
     for index, node in facts.children(*path):
         names = [facts.text(*path, index, place) for place in (0, 1)]
         size = facts.number("ratio", *path, index, 2)
@@ -77,20 +71,18 @@ def _unknown(name: str, drawn: dict[str, bool]) -> str:
     return f"the dispersions have no input called {shown(name)}; {known}"
 
 
-def _drawn(facts: Facts, entries: Iterable[ToleranceEntry], thrusters: list[str]) -> dict[str, bool]:
+def _drawn(facts: Facts) -> dict[str, bool]:
     """Names of all inputs that any schedule could draw once, as `montecarlo.inputs` has them, and whether they vary."""
     varying = {}
-    for entry in entries:
-        key, *rest = entry.path[1:]
-        node = facts.root.get(*entry.path)
-        varies = node is not None and isinstance(node.value, dict) and "bias" not in node.value
-        for name in _names(facts, str(key), rest, thrusters):
-            varying[name] = varies
+    for entry in _entries(facts):
+        varies = facts.is_mapping(*entry.path) and not facts.has(*entry.path, "bias")
+        varying.update(dict.fromkeys(_names(facts, entry), varies))
     return varying
 
 
-def _names(facts: Facts, key: str, chosen: list[str | int], thrusters: list[str]) -> list[str]:
-    """Names of the inputs of a tolerance, which may be that of the ``chosen`` thruster or axis alone."""
+def _names(facts: Facts, entry: ToleranceEntry) -> list[str]:
+    """Names of the inputs of a tolerance, which may be that of a thruster or an axis alone."""
+    key, chosen = str(entry.path[1]), entry.path[2:]
     if key in EACH_PULSE:
         return []
     if key == "omega0":
@@ -99,7 +91,7 @@ def _names(facts: Facts, key: str, chosen: list[str | int], thrusters: list[str]
     if key in BY_THRUSTER:
         return [
             f"{word} {name} {letter}".rstrip()
-            for name in chosen or thrusters
+            for name in chosen or thrusts(facts)
             for letter in (letters if name != STEERABLE else "") or " "
         ]
     if key in ("sensor_bias", "sensor_scale") and facts.text("loop", "sensor", "kind") != ACCELEROMETER:
@@ -130,39 +122,32 @@ class ToleranceEntry(NamedTuple):
 
 def dispersion_findings(root: Node) -> Iterator[Finding]:
     """All faults between the keys of the dispersions and with the rest of the file."""
-    facts = Facts(root)
-    yield from _probability(facts)
-    if not facts.has("dispersions"):
-        return
-    yield from _thruster_names(facts)
-    for entry in _entries(facts):
-        yield from _kinds(facts, entry)
-    yield from _shifted_moments(facts)
-    yield from _of_sensor(facts)
-    yield from _below_zero(facts)
-    yield from correlation_findings(facts, _entries(facts), thrusts(facts))
+    facts, asked = Facts(root), ("nutation", "momentum_shift")
+    if facts.has("requirement", "probability") and not any(facts.has("requirement", key) for key in asked):
+        problem = "given alone; name what must be met with it: nutation, momentum_shift or both"
+        yield Finding(("requirement", "probability"), problem, True)
+    if facts.has("dispersions"):
+        for rule in (_thruster_names, _kinds, _shifted_moments, _of_sensor, _below_zero, _correlations):
+            yield from rule(facts)
 
 
 def _below_zero(facts: Facts) -> Iterator[Finding]:
-    """Times of valves and numbers of the tank that draws would turn negative."""
     for key in VALVE_TIMES:
         for path in _each(facts, key):
+            size = _size_of(facts, path, "time")
             for name, nominal in _valve_times(facts, key, path[2:]).items():
-                size = _size_of(facts, path, "time")
                 if size is not None and size[1] > (1.0 + 1e-12) * nominal:
                     yield _negative(path, size, f"the {key} of {name}, {nominal:g} s")
                     break
     low = facts.number("pressure", "tank", "final_pressure")
     for key in ("tank_propellant", "tank_pressure", "tank_final_pressure"):
-        nominal_, path_ = facts.number(QUANTITIES[key], "tank", key.removeprefix("tank_")), ("dispersions", key)
-        size = _size_of(facts, path_, QUANTITIES[key], nominal_) if nominal_ is not None else None
-        if size is None or nominal_ is None:
-            continue
+        level = facts.number(QUANTITIES[key], "tank", key.removeprefix("tank_"))
+        size = None if level is None else _size_of(facts, ("dispersions", key), QUANTITIES[key], level)
         floor = low if key == "tank_pressure" and low is not None else 0.0
-        if size[1] > (1.0 + 1e-12) * (nominal_ - floor):
-            value, least = (f"{level:g} kg" if key == "tank_propellant" else bar(level) for level in (nominal_, floor))
-            below = f"less than final_pressure, {least}" if floor else "negative"
-            yield _negative(path_, size, f"{key.replace('_', '.', 1)}, {value}", below)
+        if level is not None and size is not None and size[1] > (1.0 + 1e-12) * (level - floor):
+            value = f"{level:g} kg" if key == "tank_propellant" else bar(level)
+            below = f"less than final_pressure, {bar(floor)}" if floor else "negative"
+            yield _negative(("dispersions", key), size, f"{key.replace('_', '.', 1)}, {value}", below)
 
 
 def _negative(path: KeyPath, size: tuple[str, float], of: str, below: str = "negative") -> Finding:
@@ -174,10 +159,10 @@ def _negative(path: KeyPath, size: tuple[str, float], of: str, below: str = "neg
 def _each(facts: Facts, key: str) -> list[KeyPath]:
     """Paths to the tolerances of ``key``: one, or one a thruster."""
     path: KeyPath = ("dispersions", key)
-    node = facts.root.get(*path)
-    if node is None or not isinstance(node.value, dict):
+    if not facts.is_mapping(*path):
         return []
-    return [(*path, name) for name, _ in node.children()] if by_name(node.value) else [path]
+    named = dict(facts.children(*path))
+    return [(*path, name) for name in named] if by_name(named) else [path]
 
 
 def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
@@ -203,117 +188,92 @@ def _valve_times(facts: Facts, key: str, named: KeyPath) -> dict[str, float]:
         path: KeyPath = ("thrusters", index)
         name = facts.text(*path, "name")
         valve: KeyPath = (*path, "valve") if facts.has(*path, "valve") else ("valve",)
-        if name is None or facts.has(*path, "impulse_bit") or not facts.has(*valve) or (named and named[0] != name):
-            continue
         time = facts.number("time", *valve, key) if facts.has(*valve, key) else 0.0
-        if time is not None:
+        opens = facts.has(*valve) and not facts.has(*path, "impulse_bit")
+        if name is not None and time is not None and opens and named in ((), (name,)):
             times[name] = time
     return times
 
 
-def _probability(facts: Facts) -> Iterator[Finding]:
-    if facts.has("requirement", "probability") and not (
-        facts.has("requirement", "nutation") or facts.has("requirement", "momentum_shift")
-    ):
-        problem = "given alone; name what must be met with it: nutation, momentum_shift or both"
-        yield Finding(("requirement", "probability"), problem, True)
-
-
 def _entries(facts: Facts) -> Iterator[ToleranceEntry]:
-    """All tolerances in the file."""
-    forces = thrusts(facts)
     for key, kind in QUANTITIES.items():
         path: KeyPath = ("dispersions", key)
         node = facts.root.get(*path)
-        if node is None:
-            continue
-        if key == "omega0" and isinstance(node.value, list):
-            for index, _ in node.children():
-                yield ToleranceEntry((*path, index), kind, *(_spin(facts) if index == 2 else (None, "")))
-        elif key in BY_THRUSTER and isinstance(node.value, dict) and by_name(node.value):
-            for name, _ in node.children():
-                nominal = forces.get(str(name)) if kind == "force" else _nominal(facts, key)[0]
-                yield ToleranceEntry((*path, name), kind, nominal, f"the thrust of {name}" if kind == "force" else "")
-        elif key == "thrust":
-            known = [(thrust, name) for name, thrust in forces.items() if thrust is not None]
-            least = min(known, default=(None, ""))
-            yield ToleranceEntry(path, kind, least[0], f"the thrust of {least[1]}")
-        else:
-            yield ToleranceEntry(path, kind, *_nominal(facts, key))
+        paths = [] if node is None else [path]
+        if key in BY_THRUSTER and facts.is_mapping(*path):
+            paths = _each(facts, key)
+        elif key == "omega0" and node is not None and isinstance(node.value, list):
+            paths = [(*path, index) for index, _ in node.children()]
+        for each in paths:
+            yield ToleranceEntry(each, kind, *_nominal(facts, each))
 
 
-def _nominal(facts: Facts, key: str) -> tuple[float | None, str]:
+def _nominal(facts: Facts, path: KeyPath) -> tuple[float | None, str]:
     """The value that a tolerance is compared with, and its name; None where it cannot be read, or nothing bounds it."""
+    key, named = str(path[1]), path[2:]
+    if key == "thrust":
+        forces = thrusts(facts).items()
+        least, name = min(
+            ((thrust, name) for name, thrust in forces if thrust is not None and named in ((), (name,))),
+            default=(None, ""),
+        )
+        return least, f"the thrust of {name}"
     if key in ("A", "C"):
-        moments = moments_of(facts)
-        return (None, "") if moments is None else (0.5 * sum(moments[:2]) if key == "A" else moments[2], key)
+        principal = principal_of(facts)
+        if principal is None:
+            return None, ""
+        return (0.5 * sum(principal[0][:2]) if key == "A" else principal[0][2]), key
     if key == "omega0":
-        return _spin(facts)
-    if QUANTITIES[key] == "ratio":
-        return 1.0, ""
-    return (RIGHT_ANGLE, "a right angle") if QUANTITIES[key] == "angle" else (None, "")
-
-
-def _spin(facts: Facts) -> tuple[float | None, str]:
-    """|ω3| about the third axis of the file, |H3|/C with a wheel; None where it is zero or cannot be read."""
-    spin = facts.number("rate", "omega0", 2) if facts.has("omega0") else facts.number("rate", "state", "spin")
-    inertia = inertia_of(facts)
-    if spin is not None and inertia is not None and inertia.wheel:
-        return abs(inertia.equivalent(spin)) or None, "H3/C"
-    return abs(spin) if spin else None, "the spin"
+        spin = facts.number("rate", "omega0", 2) if facts.has("omega0") else facts.number("rate", "state", "spin")
+        inertia = inertia_of(facts)
+        if spin is None or named not in ((), (2,)):
+            return None, ""
+        if inertia is not None and inertia.wheel:
+            return abs(inertia.equivalent(spin)) or None, "H3/C"
+        return abs(spin) or None, "the spin"
+    if QUANTITIES[key] == "angle":
+        return RIGHT_ANGLE, "" if named else "a right angle"
+    return (1.0 if QUANTITIES[key] == "ratio" else None), ""
 
 
 def _thruster_names(facts: Facts) -> Iterator[Finding]:
-    """Tolerances of thrusters that the file does not have."""
     known = list(thrusts(facts))
     for key in BY_THRUSTER:
         path: KeyPath = ("dispersions", key)
-        node = facts.root.get(*path)
-        if node is None or not isinstance(node.value, dict):
-            continue
-        if not node.value:
+        if facts.is_mapping(*path) and not facts.children(*path):
             yield Finding(path, f"empty; give {_example(QUANTITIES[key])}, or one such entry by thruster")
-        elif by_name(node.value):
-            for name in node.value:
-                if name == STEERABLE and name not in known:
-                    yield Finding((*path, name), f"the file has no {STEERABLE} torquer; leave this out", True)
-                elif name not in known:
-                    yield Finding((*path, name), f"no thruster is called {shown(name)}; {instead(name, known)}", True)
+        for *_, name in (entry for entry in _each(facts, key) if entry != path):
+            if name == STEERABLE and name not in known:
+                yield Finding((*path, name), f"the file has no {STEERABLE} torquer; leave this out", True)
+            elif name not in known:
+                problem = f"no thruster is called {shown(name)}; {instead(str(name), known)}"
+                yield Finding((*path, name), problem, True)
 
 
-def _kinds(facts: Facts, entry: ToleranceEntry) -> Iterator[Finding]:
-    """Faults of the kinds and the size of one tolerance."""
-    node = facts.root.get(*entry.path)
-    if node is None or not isinstance(node.value, dict):
-        return
-    given = [key for key in node.value if key in KINDS]
-    reported = not node.value and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
-    if not given and not reported:
-        yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
-    for key in given[1:]:
-        yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
-    for key in given:
-        problem = _size_fault(facts, entry, key, node.value[key].plain())
-        if problem is not None:
-            yield Finding((*entry.path, key), problem)
+def _kinds(facts: Facts) -> Iterator[Finding]:
+    for entry in _entries(facts):
+        if not facts.is_mapping(*entry.path):
+            continue
+        nodes = dict(facts.children(*entry.path))
+        given = [str(key) for key in nodes if key in KINDS]
+        reported = not nodes and entry.path[1:] in [(key,) for key in BY_THRUSTER]  # by `_thruster_names`
+        if not given and not reported:
+            yield Finding(entry.path, f"names no distribution; give {_example(entry.kind)}")
+        for key in given[1:]:
+            yield Finding((*entry.path, key), f"given together with {given[0]}; keep one of the two", True)
+        for key in given:
+            problem = _size_fault(facts, entry, key, nodes[key].plain())
+            if problem is not None:
+                yield Finding((*entry.path, key), problem)
 
 
 def _example(kind: str) -> str:
-    sizes = {
-        "inertia": "2 %",
-        "mass": "1 %",
-        "pressure": "2 %",
-        "rate": "0.1 deg/s",
-        "force": "3 %",
-        "ratio": "1 %",
-        "angle": "0.5 deg",
-        READING: "0.01 deg/s",
-    }
-    return f"{{normal: {sizes.get(kind, '5 mm' if kind == 'length' else '5 ms')}}}, or uniform, triangular, bias"
+    sizes = {"inertia": "2 %", "mass": "1 %", "pressure": "2 %", "rate": "0.1 deg/s", "force": "3 %"}
+    sizes |= {"ratio": "1 %", "angle": "0.5 deg", "length": "5 mm", READING: "0.01 deg/s"}
+    return f"{{normal: {sizes.get(kind, '5 ms')}}}, or uniform, triangular, bias"
 
 
 def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) -> str | None:
-    """The fault that makes the size of a tolerance impossible."""
     if value is None:
         return None  # reported already
     try:
@@ -323,9 +283,9 @@ def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) ->
     if key != "bias" and size < 0.0:
         what = "one sigma" if key == "normal" else "half a width"
         return f"{shown(value)} is negative; expected {what} of at least 0, or bias for a fixed offset"
-    if entry.kind == "force" and not relative:
-        unknown = _without_thrust(facts, entry)
-        if unknown is not None:
+    for name, thrust in thrusts(facts).items() if entry.kind == "force" and not relative else ():
+        if thrust is None and entry.path[2:] in ((), (name,)):
+            unknown = f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
             return f"{shown(value)} needs the thrust of {unknown}, which is not known; give its lever_arm, or a %"
     nominal = 1.0 if relative else entry.nominal
     if nominal is None:
@@ -339,20 +299,12 @@ def _size_fault(facts: Facts, entry: ToleranceEntry, key: str, value: object) ->
     return f"{shown(value)} {amounts}; expected {what} {most}"
 
 
-def _without_thrust(facts: Facts, entry: ToleranceEntry) -> str | None:
-    """A thruster that an absolute tolerance concerns and whose thrust is not known."""
-    named = entry.path[2:]
-    for name, thrust in thrusts(facts).items():
-        if thrust is None and (not named or name == named[0]):
-            return f"the {STEERABLE} torquer" if name == STEERABLE else shown(name)
-    return None
-
-
 def _shifted_moments(facts: Facts) -> Iterator[Finding]:
     """Fixed offsets of A and C that make a body no body: every draw would be refused."""
-    moments = moments_of(facts)
-    if moments is None:
+    principal = principal_of(facts)
+    if principal is None:
         return
+    moments = principal[0]
     wider = _offset(facts, "A", 0.5 * (moments[0] + moments[1]))
     longer = _offset(facts, "C", moments[2])
     if wider is None or longer is None or (wider == longer == 0.0):
@@ -365,25 +317,21 @@ def _shifted_moments(facts: Facts) -> Iterator[Finding]:
 
 
 def _of_sensor(facts: Facts) -> Iterator[Finding]:
-    """Tolerances of a sensor that the file does not have, or of the other kind, and a delay below zero."""
     kind = facts.text("loop", "sensor", "kind")
     wrong, right = ("rate", "m/s^2") if kind == "accelerometer" else ("acceleration", "rad/s, deg/s or rpm")
-    for key in QUANTITIES:
+    for key in ("sensor_bias", "sensor_scale", "sensor_noise", "sensor_delay"):
         path: KeyPath = ("dispersions", key)
-        if not key.startswith("sensor_") or not facts.has(*path):
-            continue
-        if not facts.has("loop"):
+        if facts.has(*path) and not facts.has("loop"):
             yield Finding(path, "is of the sensor of a loop, and the file has no loop; leave this out", True)
         for distribution in KINDS if key == "sensor_bias" and kind is not None else ():
             text = facts.text(*path, distribution)
             if text is not None and facts.number(wrong, *path, distribution) is not None:
                 yield Finding((*path, distribution), f"{shown(text)} is not in the unit of the sensor: {right}")
-    delay, offset = (
-        facts.number("time", *path) for path in (("loop", "sensor", "delay"), ("dispersions", "sensor_delay", "bias"))
-    )
-    if offset is not None and (delay or 0.0) + offset < 0.0 and facts.has("loop"):
-        problem = f"with this offset the delay is {(delay or 0.0) + offset:g} s; expected a delay of at least 0"
-        yield Finding(("dispersions", "sensor_delay", "bias"), problem)
+    path = ("dispersions", "sensor_delay", "bias")
+    offset, delay = facts.number("time", *path), facts.number("time", "loop", "sensor", "delay") or 0.0
+    if offset is not None and delay + offset < 0.0 and facts.has("loop"):
+        problem = f"with this offset the delay is {delay + offset:g} s; expected a delay of at least 0"
+        yield Finding(path, problem)
 
 
 def _offset(facts: Facts, key: str, nominal: float) -> float | None:

@@ -31,7 +31,6 @@ from nutdamp.units import parse, shown
 
 _QUOTED = r"""'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*\""""
 _STEP = re.compile(rf"\.?(?P<word>[^.\[\]='\"]+|{_QUOTED})|\[(?P<entry>[0-9]{{1,6}}|[^.\[\]='\"]+|{_QUOTED})\]")
-_EXAMPLE = "limits.horizon=300s or thrusters.T1.force=12N"
 
 
 class Setting(NamedTuple):
@@ -52,14 +51,14 @@ class Setting(NamedTuple):
         if not self.value.strip():
             return Node(None, place), []
         node, faults = read_value(self.value, self.label)
-        return _moved(node, place), faults
+        return _of_python(node.plain(), place), faults
 
 
 def parse_setting(text: str) -> Setting:
     """The setting in ``KEY=VALUE``, as command lines give it; raises ValueError with the form expected."""
     path, end = _parse_path(text)
     if not path or text[end : end + 1] != "=":
-        raise ValueError(f"{shown(text)} is not KEY=VALUE, such as {_EXAMPLE}")
+        raise ValueError(f"{shown(text)} is not KEY=VALUE, such as limits.horizon=300s or thrusters.T1.force=12N")
     value = text[end + 1 :]
     return Setting(path, value, f"--set {dotted(path)}={_brief(value)}")
 
@@ -75,12 +74,21 @@ def settings_of(values: Mapping[str, object]) -> tuple[Setting, ...]:
     return tuple(settings)
 
 
-def settings_within(values: Mapping[str, object]) -> tuple[Setting, ...]:
-    """The settings in nested mappings, such as ``{"limits": {"horizon": "300 s"}}``; raises BadRequest.
+def settings_within(values: Mapping[str, object], behind: KeyPath = ()) -> Iterator[Setting]:
+    """The settings in nested mappings, such as ``{"limits": {"horizon": "300 s"}}``, which are at ``behind``.
 
-    A mapping is replaced key by key, so that those beside them in the file keep their values.
+    A mapping is replaced key by key, so that those beside them in the file keep their values. Raises BadRequest.
     """
-    return tuple(_within(values, ()))
+    if len(behind) >= MAX_DEPTH:
+        raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
+    for key, value in values.items():
+        if not isinstance(key, str):
+            raise BadRequest(f"with_ {dotted(behind)}: expected the name of a key, got {shown(key)}")
+        path = (*behind, key)
+        if isinstance(value, Mapping):
+            yield from settings_within(value, path)
+        else:
+            yield _labelled("with_", path, value)
 
 
 def text_of(values: Mapping[str, object], name: str) -> str:
@@ -90,19 +98,6 @@ def text_of(values: Mapping[str, object], name: str) -> str:
     """
     plain = _of_python(values, Place(setting=name)).plain()
     return json.dumps(plain, indent=2, ensure_ascii=False) + "\n"
-
-
-def _within(values: Mapping[str, object], behind: KeyPath) -> Iterator[Setting]:
-    if len(behind) >= MAX_DEPTH:
-        raise BadRequest(f"with_: nested more than {MAX_DEPTH} levels deep")
-    for key, value in values.items():
-        if not isinstance(key, str):
-            raise BadRequest(f"with_ {dotted(behind)}: expected the name of a key, got {shown(key)}")
-        path = (*behind, key)
-        if isinstance(value, Mapping):
-            yield from _within(value, path)
-        else:
-            yield _labelled("with_", path, value)
 
 
 def _labelled(call: str, path: KeyPath, value: object) -> Setting:
@@ -153,7 +148,6 @@ def _parse_path(text: str) -> tuple[KeyPath, int]:
 
 
 def _brief(text: str) -> str:
-    """A value as a message shows it: one short line of printable characters."""
     return text if len(text) <= 40 and text.isprintable() else shown(text)
 
 
@@ -202,16 +196,6 @@ def _at(path: KeyPath) -> str:
     return f"at {dotted(path)}" if path else "at the root"
 
 
-def _moved(node: Node, place: Place) -> Node:
-    """``node`` and all below it at ``place``."""
-    if isinstance(node.value, dict):
-        below = {key: _moved(child, place) for key, child in node.value.items()}
-        return Node(below, place, dict.fromkeys(below, place))
-    if isinstance(node.value, list):
-        return Node([_moved(child, place) for child in node.value], place)
-    return Node(node.value, place)
-
-
 def _of_python(value: object, place: Place, depth: int = 0) -> Node:
     """A Python value as part of a tree; raises BadRequest for a value that a file cannot hold."""
     if depth > MAX_DEPTH:
@@ -230,14 +214,6 @@ def _of_python(value: object, place: Place, depth: int = 0) -> Node:
     raise BadRequest(f"{place}: expected a number, a text, a list or a mapping, got {type(value).__name__}")
 
 
-class TextChange(NamedTuple):
-    """Text to be written over ``start`` to ``end`` of another."""
-
-    start: int
-    end: int
-    text: str
-
-
 def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] | None = None) -> str:
     """The text with ``values``, each a flow value by its path, and keys of the first level ``renamed``.
 
@@ -249,7 +225,7 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
     for old, new in (renamed or {}).items():
         key, _ = _find(_root(text), (old,))
         if key is not None:
-            text = _applied(text, [TextChange(key.start_mark.index, key.end_mark.index, new)])
+            text = text[: key.start_mark.index] + new + text[key.end_mark.index :]
     return text
 
 
@@ -261,16 +237,14 @@ def _with(text: str, path: KeyPath, value: str) -> str:
             raise BadRequest(f"{dotted(path[:length])} is an alias: write its value out, for it to be changed")
         anchor = None if node is None or not length else re.match(r"&(\S+)", text[node.start_mark.index :])
         if anchor and f"*{anchor[1]}" in text:
-            raise BadRequest(
-                f"{dotted(path[:length])} has the alias *{anchor[1]}: write that out, for it to be changed"
-            )
+            problem = f"has the alias *{anchor[1]}: write that out, for it to be changed"
+            raise BadRequest(f"{dotted(path[:length])} {problem}")
     for length in range(len(path), 0, -1):
         _, node = _find(root, path[:length])
-        if node is None:
-            continue
-        if length == len(path):
-            return _applied(text, [TextChange(node.start_mark.index, _end(node), value)])
-        return _added(text, node, path[length:], value)
+        if node is not None and length == len(path):
+            return text[: node.start_mark.index] + value + text[_end(node) :]
+        if node is not None:
+            return _added(text, node, path[length:], value)
     return _added(text, root, path, value)
 
 
@@ -285,12 +259,11 @@ def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:
         last = _end(parent) - 1
         comma = "" if not parent.value or text[:last].rstrip().endswith(",") else ", "
         at = len(text[:last].rstrip()) if comma else last
-        return _applied(text, [TextChange(at, at, comma + entry)])
-    end = _end(parent)
-    line_end = text.find("\n", end)
+        return text[:at] + comma + entry + text[at:]
+    line_end = text.find("\n", _end(parent))
     at = len(text) if line_end < 0 else line_end
     indent = " " * parent.value[0][0].start_mark.column
-    return _applied(text, [TextChange(at, at, f"\n{indent}{entry}")])
+    return f"{text[:at]}\n{indent}{entry}{text[at:]}"
 
 
 def _root(text: str) -> yaml.MappingNode:
@@ -326,12 +299,6 @@ def _end(node: yaml.Node) -> int:
 def _key(step: str | int) -> str:
     word = str(step)
     return word if re.fullmatch(r"[A-Za-z_][\w+-]*|[+-][A-Za-z]\w*", word) else "'" + word.replace("'", "''") + "'"
-
-
-def _applied(text: str, changes: Iterable[TextChange]) -> str:
-    for change in sorted(changes, reverse=True):
-        text = text[: change.start] + change.text + text[change.end :]
-    return text
 
 
 NOISE = 1e-13
@@ -449,29 +416,18 @@ def carry_text(text: str, name: str, settings: Sequence[Setting], edits: Callabl
     text = text.removeprefix("\ufeff")
     for setting in settings:
         tree = read_tree(text, name)[0]
-        value = setting.value if isinstance(setting.value, str) else _flow(setting.node()[0].plain())
-        text = edited(text, {_positions(tree, setting.path): value or "null"})
+        value = setting.value
+        if not isinstance(value, str):
+            value = json.dumps(setting.node()[0].plain(), ensure_ascii=False)
+        positions: KeyPath = ()  # of entries of lists, which may be named instead
+        for step in setting.path:
+            node = tree.get(*positions)
+            held = None if node is None else node.value
+            positions += (_entry(held, step, positions) if isinstance(held, list) else step,)
+        text = edited(text, {positions: value or "null"})
     values = dict(edits(read_tree(text, name)[0]))
     rename = {"state": "omega0"} if ("state",) in values else {}
     return edited(text, values, rename)
-
-
-def _positions(tree: Node, path: KeyPath) -> KeyPath:
-    """A path with the entries of lists by their positions instead of their names."""
-    positions: list[str | int] = []
-    for step in path:
-        node = tree.get(*positions)
-        if node is not None and isinstance(node.value, list) and isinstance(step, str):
-            names = [entry.get("name") for entry in node.value]
-            step = next(index for index, name in enumerate(names) if name is not None and name.value == step)
-        positions.append(step)
-    return tuple(positions)
-
-
-def _flow(value: object) -> str:
-    import json
-
-    return json.dumps(value, ensure_ascii=False)
 
 
 def as_before(node: Node | None, value: float, kind: str, unit: str) -> str:

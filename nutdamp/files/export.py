@@ -51,9 +51,9 @@ def basilisk_script(plan: Plan) -> str:
     return _SCRIPT.format(
         title=title,
         version=__version__,
-        tensor=_rows(body.inertia.tensor),
+        tensor=f"[{', '.join(map(_vector, body.inertia.tensor))}]",
         moments=_vector(body.inertia.moments),
-        axes=_rows(body.inertia.axes),
+        axes=f"[{', '.join(map(_vector, body.inertia.axes))}]",
         rates=_vector(rates),
         quaternion=_vector(quaternion),
         turn=LONGEST_STEP,
@@ -78,10 +78,6 @@ def _steps(plan: Plan, body: Spacecraft) -> Iterable[str]:
 
 def _vector(vector: Iterable[float] | Vector) -> str:
     return "[" + ", ".join(repr(float(part) + 0.0) for part in vector) + "]"
-
-
-def _rows(matrix: Vector) -> str:
-    return "[" + ", ".join(_vector(row) for row in np.asarray(matrix)) + "]"
 
 
 _SCRIPT = '''\
@@ -209,6 +205,9 @@ if __name__ == "__main__":
 FRAMES = ("EME2000", "J2000", "GCRF")
 """Inertial frames that the formats have a name for."""
 
+AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
+"""Their names in the format of the Systems Tool Kit."""
+
 EXAMPLE = {
     "epoch": "2026-03-01T12:00:00Z           # of t = 0, UTC",
     "frame": "EME2000                        # or J2000, GCRF",
@@ -288,7 +287,10 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         if len(t) < LEAST_RECORDS:
             continue
         rates, quaternion = map(cleaned, flown.spacecraft.inertia.in_file_axes(*leg.path.motion(t)))
-        quaternion = _steady(quaternion, previous)
+        # Of q and -q always the one nearer to the record before.
+        before = np.vstack([quaternion[0] if previous is None else previous, quaternion[:-1]])
+        steps = np.sum(quaternion * before, axis=1)
+        quaternion = np.asarray(quaternion * np.cumprod(np.where(steps < 0.0, -1.0, 1.0))[:, None])
         previous = quaternion[-1]
         yield AttitudeSegment(t, rates, quaternion, leg.completed)
 
@@ -299,17 +301,6 @@ def _records(leg: Leg, until: float) -> int:
     rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
     turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
     return max(math.ceil(turn / TURN) + 1, LEAST_RECORDS)
-
-
-def _steady(quaternion: Vector, previous: Vector | None) -> Vector:
-    """The same attitudes, of q and -q always the one nearer to the record before."""
-    before = quaternion[0] if previous is None else previous
-    steps = np.sum(quaternion * np.vstack([before, quaternion[:-1]]), axis=1)
-    return np.asarray(quaternion * np.cumprod(np.where(steps < 0.0, -1.0, 1.0))[:, None])
-
-
-AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
-"""Names of the frames in the format."""
 
 
 def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
@@ -328,12 +319,15 @@ def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
                 t = last[0] + 1.0 / NANOSECONDS
             rows.append(" ".join([f"{t:.9f}", *(f"{part:.16e}" for part in (*vector, scalar, *rate))]))
             last = t, rate
+    date, _, clock = reference.epoch.text.partition("T")
+    day = datetime.date.fromisoformat(date)
+    months = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
     lines = [
         "stk.v.11.0",
-        f"# nutdamp {__version__}: {_plain(flown.spacecraft.name)}",
+        f"# nutdamp {__version__}: {' '.join(flown.spacecraft.name.split())}",
         "BEGIN Attitude",
         f"NumberOfAttitudePoints {len(rows)}",
-        f"ScenarioEpoch {_calendar(reference)}",
+        f"ScenarioEpoch {day.day} {months[day.month - 1]} {day.year} {clock}",
         "CentralBody Earth",
         f"CoordinateAxes {AXES[reference.frame]}",
         "InterpolationOrder 1",
@@ -342,18 +336,6 @@ def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:
         "END Attitude",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _calendar(reference: Reference) -> str:
-    """``1 Mar 2026 12:00:00.000000000``."""
-    date, _, clock = reference.epoch.text.partition("T")
-    day = datetime.date.fromisoformat(date)
-    months = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-    return f"{day.day} {months[day.month - 1]} {day.year} {clock}"
-
-
-def _plain(text: str) -> str:
-    return " ".join(text.split())
 
 
 SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "": "factor"}
@@ -399,7 +381,8 @@ class SamplesWriter:
             columns = [list(map(str, range(low + 1, high + 1)))]
             for entry in self._inputs:
                 draw = np.broadcast_to(draws[entry.name], BLOCK)[low - block * BLOCK : high - block * BLOCK]
-                columns.append(_texts(_shown(entry, draw)))
+                truth = entry.nominal + draw
+                columns.append(_texts(np.degrees(truth) if entry.unit == "rad" else truth))
             outputs = values[:, low - first : high - first]
             for name, row in zip(self._outputs, outputs, strict=True):
                 columns.append(_texts(np.degrees(row) if name.endswith("_deg") else row))
@@ -407,16 +390,9 @@ class SamplesWriter:
             self._stream.write(("\r\n".join(lines) + "\r\n").encode())
 
 
-def _shown(entry: DispersedInput, draw: Array) -> Array:
-    truth = entry.nominal + draw
-    return np.degrees(truth) if entry.unit == "rad" else truth
-
-
 def _texts(values: Array) -> list[str]:
     """Numbers that read back as they were; NaN is empty."""
-    if math.isnan(values[0]):
-        return [""] * len(values)
-    return list(map(repr, values.tolist()))
+    return [""] * len(values) if math.isnan(values[0]) else list(map(repr, values.tolist()))
 
 
 def check_room(path: str, study: Study, samples: int) -> None:

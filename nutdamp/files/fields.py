@@ -17,7 +17,7 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, ClassVar, Literal, Self, Union, get_args, get_origin, get_type_hints
 
-from nutdamp.errors import listed
+from nutdamp.errors import listed, nearest
 from nutdamp.units import KINDS, parse, pattern, shown
 
 KeyPath = tuple[str | int, ...]
@@ -223,8 +223,6 @@ def _either(parts: tuple[Any, ...]) -> str:
 
 
 def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
-    from nutdamp.errors import nearest
-
     if value in choices:
         return value
     meant = nearest(value, choices) if isinstance(value, str) else None
@@ -321,10 +319,6 @@ class ListOf(Rule):
             raise ValueError(f"expected a list of {self.written}, such as [[{text}]], got [{text}]")
         return inner(value)
 
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Schema of the list."""
-        return inner()
-
 
 class OrWord(Rule):
     """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
@@ -346,8 +340,6 @@ class OrWord(Rule):
 
 
 class _DateAndTime(Rule):
-    """Annotation of a text that is a date and a time."""
-
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """The text as it is; raises ValueError unless it is a date and a time."""
         text = inner(value)

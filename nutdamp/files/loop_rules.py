@@ -45,6 +45,7 @@ SCALES = (0.1, 10.0)
 """Sizes of scales between which a sensor still measures."""
 
 SENSOR: KeyPath = ("loop", "sensor")
+UNITS_OF = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelerometer: m/s^2"}
 
 
 def loop_findings(root: Node) -> Iterator[Finding]:
@@ -52,18 +53,20 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     facts = Facts(root)
     if not facts.has("loop"):
         return
-    inertia, spin = inertia_of(facts), spin_of(facts)
-    yield from _thresholds(facts)
+    start, stop = (facts.number("angle", "loop", key) for key in ("start", "stop"))
+    if start is not None and stop is not None and stop >= start > 0.0:
+        problem = f"{math.degrees(stop):g} deg is not below start; expected less than {math.degrees(start):g} deg"
+        yield Finding(("loop", "stop"), problem)
     yield from _sensor(facts)
     yield from _channels(facts)
+    inertia, spin = inertia_of(facts), spin_of(facts)
     if inertia is None or spin is None:
         return
     if inertia.nutation_rate(spin) == 0.0:
         problem = "in a sphere ω does not rotate in the body, so that a loop has no phase to fire by; leave loop out"
         yield Finding(("loop",), problem, True)
         return
-    yield from _sampling(facts, abs(inertia.nutation_rate(spin)))
-    yield from _lags(facts, 2.0 * math.pi / abs(inertia.nutation_rate(spin)))
+    yield from _timing(facts, abs(inertia.nutation_rate(spin)) / (2.0 * math.pi))
     yield from _accelerometer(facts, inertia)
     yield from _seen(facts, inertia, spin)
 
@@ -86,11 +89,10 @@ def channel_facts(facts: Facts) -> list[ChannelFacts]:
     thrusters = {
         facts.text("thrusters", index, "name"): ("thrusters", index) for index, _ in facts.children("thrusters")
     }
-    named = [
-        (str(name), [entry.value for _, entry in node.children()]) for name, node in facts.children("channels")
-    ] or [(name, [name]) for name in thrusters if name is not None]
+    named = {str(name): [entry.value for _, entry in node.children()] for name, node in facts.children("channels")}
+    named = named or {name: [name] for name in thrusters if name is not None}
     axis, channels = spin_axis(facts), []
-    for name, members in named:
+    for name, members in named.items():
         paths: list[KeyPath] = [thrusters[member] for member in members if member in thrusters]
         torques = [torque_of(facts, path) for path in paths]
         total = None if None in torques else np.sum([torque[0] for torque in torques if torque is not None], axis=0)
@@ -102,14 +104,6 @@ def channel_facts(facts: Facts) -> list[ChannelFacts]:
     return channels
 
 
-def _thresholds(facts: Facts) -> Iterator[Finding]:
-    start = facts.number("angle", "loop", "start")
-    stop = facts.number("angle", "loop", "stop")
-    if start is not None and stop is not None and stop >= start > 0.0:
-        problem = f"{math.degrees(stop):g} deg is not below start; expected less than {math.degrees(start):g} deg"
-        yield Finding(("loop", "stop"), problem)
-
-
 def _sensor(facts: Facts) -> Iterator[Finding]:
     kind = facts.text(*SENSOR, "kind")
     scale = facts.number("ratio", *SENSOR, "scale")
@@ -118,42 +112,31 @@ def _sensor(facts: Facts) -> Iterator[Finding]:
     elif scale is not None and not SCALES[0] <= abs(scale) <= SCALES[1]:
         allowed = f"{100.0 * SCALES[0]:g} % to {100.0 * SCALES[1]:g} %, or the same below zero"
         yield Finding((*SENSOR, "scale"), f"{100.0 * scale:g} % is no scale of a sensor; expected {allowed}")
-    if not facts.has(*SENSOR, "rate"):
-        for key in ("noise", "quantisation", "low_pass"):
-            if facts.has(*SENSOR, key):
-                yield Finding((*SENSOR, key), "applies to samples: it needs rate, such as rate: 100 Hz", True)
-    if kind == "accelerometer":
-        for key in ("rate", "position"):
-            if not facts.has(*SENSOR, key):
-                what = "samples, of which a sine is made" if key == "rate" else "where it is, from the centre of mass"
-                yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
-    elif kind == "gyro":
-        for key in ("position", "axis"):
-            if facts.has(*SENSOR, key):
-                yield Finding((*SENSOR, key), "is for kind: accelerometer; a gyro measures the same everywhere", True)
+    for key in ("noise", "quantisation", "low_pass"):
+        if facts.has(*SENSOR, key) and not facts.has(*SENSOR, "rate"):
+            yield Finding((*SENSOR, key), "applies to samples: it needs rate, such as rate: 100 Hz", True)
+    needed = {"rate": "samples, of which a sine is made", "position": "where it is, from the centre of mass"}
+    for key, what in needed.items():
+        if kind == "accelerometer" and not facts.has(*SENSOR, key):
+            yield Finding((*SENSOR, key), f"missing; an accelerometer needs {key}: {what}")
+    for key in ("position", "axis"):
+        if kind == "gyro" and facts.has(*SENSOR, key):
+            yield Finding((*SENSOR, key), "is for kind: accelerometer; a gyro measures the same everywhere", True)
     axis = facts.vector("number", 3, *SENSOR, "axis")
     if axis is not None and not axis.any():
         yield Finding((*SENSOR, "axis"), "zero; expected a direction, such as [0, 0, 1]")
-    yield from _units(facts, kind)
-
-
-def _units(facts: Facts, kind: str | None) -> Iterator[Finding]:
-    """Quantities in the unit of the other sensor."""
-    wrong = {"gyro": "acceleration", "accelerometer": "rate"}.get(kind or "")
-    right = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelerometer: m/s^2"}.get(kind or "")
-    for key in ("noise", "bias", "quantisation"):
+    other, right = "acceleration" if kind == "gyro" else "rate", UNITS_OF.get(kind or "")
+    for key in ("noise", "bias", "quantisation") if right else ():
         text = facts.text(*SENSOR, key)
-        if wrong is not None and text is not None and facts.number(wrong, *SENSOR, key) is not None:
+        if text is not None and facts.number(other, *SENSOR, key) is not None:
             yield Finding((*SENSOR, key), f"{shown(text)} is not in a unit of {right}")
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
-    """Faults of the channels of a loop: none to fire, none for as long as the law demands, or names of none."""
     known = channel_facts(facts)
     law, on_time = facts.text("loop", "law"), facts.number("time", "loop", "on_time")
     if not known:
-        problem = "needs channels to fire: thrusters with a torque across axis 3"
-        yield Finding(("loop",), problem, True)
+        yield Finding(("loop",), "needs channels to fire: thrusters with a torque across axis 3", True)
     elif all(channel.torque is not None for channel in known) and not any(channel.damps for channel in known):
         problem = "no channel has a torque more transverse than axial, so none can damp a nutation"
         yield Finding(("loop",), problem, True)
@@ -177,22 +160,17 @@ def _channels(facts: Facts) -> Iterator[Finding]:
             yield Finding(path, f"no channel is called {shown(node.value)}; {instead(node.value, names)}")
 
 
-def _sampling(facts: Facts, rate: float) -> Iterator[Finding]:
-    """Too few samples for a nutation ``rate`` (rad/s) in the body."""
-    given, alias = facts.number("frequency", *SENSOR, "rate"), facts.root.get("loop", "alias")
-    least = SAMPLES * rate / (2.0 * math.pi)
+def _timing(facts: Facts, frequency: float) -> Iterator[Finding]:
+    """Samples too seldom, and delays too long, for a nutation of this ``frequency``, Hz, in the body."""
+    given, alias, period = facts.number("frequency", *SENSOR, "rate"), facts.root.get("loop", "alias"), 1.0 / frequency
+    least, most = SAMPLES * frequency, MOST_SAMPLES * frequency
     if given is not None and 0.0 < given < least and (alias is None or alias.value is not True):
         problem = f"{given:g} Hz is below four times the nutation frequency; expected at least {least:.4g} Hz"
         yield Finding((*SENSOR, "rate"), f"{problem}, or alias: true beside start")
-    most = MOST_SAMPLES * rate / (2.0 * math.pi)
     if given is not None and given > most:
-        problem = f"{given:g} Hz is more than a million samples a nutation period of {2.0 * math.pi / rate:.4g} s"
-        problem += f"; expected at most {most:.4g} Hz"
-        yield Finding((*SENSOR, "rate"), f"{problem}, or no rate for a continuous signal")
-
-
-def _lags(facts: Facts, period: float) -> Iterator[Finding]:
-    """Delays after which the signal of the sensor is of no use; ``period`` s is that of the nutation in the body."""
+        problem = f"{given:g} Hz is more than a million samples a nutation period of {period:.4g} s"
+        cure = f"expected at most {most:.4g} Hz, or no rate for a continuous signal"
+        yield Finding((*SENSOR, "rate"), f"{problem}; {cure}")
     lags = ((*SENSOR, "delay"), (*SENSOR, "low_pass"), ("loop", "settle"))
     for path, most in (*((path, LATE) for path in lags), (("loop", "min_interval"), LONGEST_WAIT)):
         value = facts.number("time", *path)
@@ -202,15 +180,13 @@ def _lags(facts: Facts, period: float) -> Iterator[Finding]:
 
 
 def _accelerometer(facts: Facts, inertia: Inertia) -> Iterator[Finding]:
-    """An accelerometer that shows nothing of the nutation."""
     from nutdamp.control_loop.sensor import is_blind
 
     position, axis = _mounting(facts, inertia)
     if facts.text(*SENSOR, "kind") != "accelerometer" or position is None or axis is None:
         return
     if inertia.wheel != 0.0:
-        problem = "accelerometer: with a wheel only gyros are modelled; expected gyro"
-        yield Finding((*SENSOR, "kind"), problem)
+        yield Finding((*SENSOR, "kind"), "accelerometer: with a wheel only gyros are modelled; expected gyro")
         return
     if math.hypot(*position) > FARTHEST:
         problem = f"{math.hypot(*position):.4g} m from the centre of mass; expected at most {FARTHEST:g} m"
@@ -257,16 +233,13 @@ def _seen(facts: Facts, inertia: Inertia, spin: float) -> Iterator[Finding]:
         value = facts.number(quantity, *path)
         if value is None or abs(value) <= share * size or (value < 0.0 and path in shares):
             continue
-        unit, scale = _unit_of(facts.text(*path)) if kind == "gyro" else ("m/s^2", 1.0)
+        unit, scale = ("rad/s" if kind == "gyro" else "m/s^2"), 1.0
+        written = (facts.text(*path) or "").rpartition(" ")[2]
+        if kind == "gyro" and written in UNITS["rate"].factors:
+            unit, scale = written, UNITS["rate"].factors[written]
         most = f"{share * size / scale:.4g} {unit}"
         if kind == "gyro" or path in shares:
             problem = f"{value / scale:.4g} {unit} hides start, which shows as {size / scale:.4g} {unit}"
         else:
             problem = f"{value:.4g} {unit} is no bias of an accelerometer"
         yield Finding(path, f"{problem}; expected at most {most}")
-
-
-def _unit_of(text: str | None) -> tuple[str, float]:
-    """The unit of an angular rate as it is written, and its size in rad/s."""
-    written = (text or "").rpartition(" ")[2]
-    return (written, UNITS["rate"].factors[written]) if written in UNITS["rate"].factors else ("rad/s", 1.0)

@@ -7,6 +7,7 @@ the same sections. Files to start from ship with the package: the built-in examp
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
@@ -16,7 +17,6 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nutdamp import units
 from nutdamp.common.time import Epoch
@@ -29,11 +29,9 @@ from nutdamp.files.keys import (
     CommandsSection,
     DisturbanceSection,
     GoalSection,
-    InertiaSection,
-    KeepSection,
-    LimitsSection,
     OrbitSection,
     RequirementSection,
+    ShedSection,
     SpacecraftFile,
     SunSensorSection,
     ThrusterSection,
@@ -47,7 +45,18 @@ from nutdamp.physics import attitude, sky
 from nutdamp.physics.body import principal_axes
 from nutdamp.physics.thruster import Cold, Tank
 from nutdamp.spacecraft.equipment import Channel, Commands, Loop, Sensor, Steerable, SunSensor, Thruster
-from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Inertia, Keep, Limits, Orbit, Requirement, Spacecraft
+from nutdamp.spacecraft.model import (
+    Attitude,
+    Disturbance,
+    Goal,
+    Inertia,
+    Keep,
+    Limits,
+    Orbit,
+    Requirement,
+    Spacecraft,
+    Vector,
+)
 from nutdamp.units import shown
 
 if TYPE_CHECKING:
@@ -55,18 +64,22 @@ if TYPE_CHECKING:
     from nutdamp.physics.thruster import Valve
 
 
+Part = TypeVar("Part")
+
+Warn = Callable[[Fault], None]
+"""Receiver of each number that is hardly meant."""
+
 BUILT_IN = "example"
 """Name of the built-in example, which commands plan where no file is named, and which `init` writes by default."""
-
-_PACKAGE = Path(__file__).parents[1]
 
 
 @cache
 def _places() -> dict[str, Path]:
     """Paths of the shipped files by name: an installed package holds ``configs``, a checkout has it beside."""
-    folders = (_PACKAGE / "data" / "configs", _PACKAGE.parent / "configs")
+    package = Path(__file__).parents[1]
+    folders = (package / "data" / "configs", package.parent / "configs")
     shipped = next((sorted(folder.glob("*.yaml")) for folder in folders if folder.is_dir()), [])
-    return {path.stem: path for path in (_PACKAGE / "data" / f"{BUILT_IN}.yaml", *shipped)}
+    return {path.stem: path for path in (package / "data" / f"{BUILT_IN}.yaml", *shipped)}
 
 
 def example_names() -> tuple[str, ...]:
@@ -81,21 +94,11 @@ def example_text(name: str = BUILT_IN) -> str:
 
 def example_subject(name: str) -> str:
     """Subject of the file of that ``name``: the comment at its beginning, up to the line that ends a sentence."""
-    lines: list[str] = []
-    for line in example_text(name).splitlines():
-        lines.append(line.removeprefix("#").strip())
-        if line.endswith("."):
-            break
-    return " ".join(lines).rstrip(".")
+    sentence = re.split(r"\.$", example_text(name), maxsplit=1, flags=re.MULTILINE)[0]
+    return " ".join(line.removeprefix("#").strip() for line in sentence.splitlines())
 
 
-def read_contents(
-    text: str, name: str, settings: Sequence[Setting] = (), warn: Callable[[Fault], None] = lambda _: None
-) -> SpacecraftFile:
-    """The checked contents of a spacecraft file, with ``settings`` replacing its values.
-
-    ``warn`` is given each implausible number. Raises `FaultyFile` with all faults, sorted by place.
-    """
+def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> SpacecraftFile:
     other = foreign(text.removeprefix("\ufeff"))
     if other is not None:
         raise FaultyFile([Fault(name, 1, 1, "", other)])
@@ -165,24 +168,11 @@ def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: boo
 
 
 def _holds_names(annotation: Any) -> bool:
-    """True where the type of a field is that of a mapping by names."""
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
-
-
-__all__ = ["load_spacecraft", "read_spacecraft"]
-
-Vector = NDArray[np.float64]
-Part = TypeVar("Part")
-
-Warn = Callable[[Fault], None]
-"""Receiver of each number that is hardly meant."""
 
 
 POLE = 1e-9
 """rad from a pole of the frame, up to which a spin axis has no ascending node."""
-
-GROWS = {"grows": True, "decays": False, None: None}
-"""Values of ``dissipation.nutation``."""
 
 
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
@@ -195,31 +185,35 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
 
     ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
     """
-    contents = read_contents(text, name, settings, warn)
-    inertia = _inertia(contents.inertia, 0.0 if contents.wheel is None else contents.wheel.momentum)
+    contents = _contents(text, name, settings, warn)
+    given = contents.inertia
+    tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
+    moments, axes = principal_axes(tensor if given.tensor is None else symmetric(np.array(given.tensor)))
+    inertia = Inertia(moments, axes, 0.0 if contents.wheel is None else contents.wheel.momentum)
     omega0 = _rates(contents, inertia)
     center = np.array(contents.center_of_mass or (0.0, 0.0, 0.0))
-    thrusters = {entry.name: _thruster(entry, inertia.axes, contents.valve, center) for entry in contents.thrusters}
+    thrusters = {entry.name: _thruster(entry, axes, contents.valve, center) for entry in contents.thrusters}
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
+    loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
         omega0=omega0,
         mass=contents.mass,
         center_of_mass=None if contents.center_of_mass is None else center,
-        center_of_mass_per_kg=_travel(contents.center_of_mass_per_kg, inertia.axes),
+        center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
         attitude=_attitude(contents.attitude, inertia, omega0, sunward),
         channels=tuple(
             Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
         ),
         steerable=steerable,
         requirement=_requirement(contents.requirement),
-        limits=_limits(contents.limits),
+        limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ())) or Limits(),
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
-        dissipation=None if contents.dissipation is None else contents.dissipation.time_constant,
-        nutation_grows=None if contents.dissipation is None else GROWS[contents.dissipation.nutation],
+        dissipation=None if loss is None else loss.time_constant,
+        nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
         orbit=_orbit(contents.orbit),
@@ -230,10 +224,10 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         spacecraft,
         goal=_goal(contents.goal, spacecraft),
         sun=sunward,
-        keep=(*(_keep(entry, sunward) for entry in contents.keep), *_on_the_way(contents.requirement)),
-        sun_sensor=_sun_sensor(contents.sun_sensor, inertia.axes),
+        keep=tuple(_cones(contents, sunward)),
+        sun_sensor=_sun_sensor(contents.sun_sensor, axes),
         commands=_commands(contents.commands),
-        loop=_loop(contents.loop, inertia.axes, center),
+        loop=_loop(contents.loop, axes, center),
     )
 
 
@@ -279,23 +273,13 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     return kind(**{**given, **others})
 
 
-def _inertia(section: InertiaSection, wheel: float) -> Inertia:
-    if section.tensor is not None:
-        moments, axes = principal_axes(symmetric(np.array(section.tensor)))
-        return Inertia(moments, axes, wheel)
-    assert section.A is not None
-    assert section.C is not None
-    return Inertia((section.A, section.A, section.C), wheel=wheel)
-
-
 def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|, Magnus 1970 (19).
 
     So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
     """
     if contents.omega0 is not None:
-        rates: Vector = inertia.axes.T @ np.array(contents.omega0)
-        return rates
+        return np.asarray(inertia.axes.T @ np.array(contents.omega0))
     state = contents.state
     assert state is not None
     first, second, _ = inertia.moments
@@ -305,51 +289,31 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(size * way), state.spin])
 
 
-def _travel(per_kg: list[float] | None, axes: Vector) -> Vector | None:
-    """Travel of the center of mass per kg in principal axes, (3,) m/kg; None where it stays."""
-    return axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None
-
-
 def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None, center: Vector) -> Thruster:
     """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without their own."""
-    force: Vector | None = None
-    position: Vector | None = None
+    force = position = None
     if entry.torque is not None:
-        torque = np.array(entry.torque)
+        torque = axes.T @ np.array(entry.torque)
         thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
     else:
         assert entry.position is not None
         assert entry.direction is not None
         assert entry.force is not None
-        thrust, force = entry.force, force_vector(entry.direction, entry.force)
-        position = np.array(entry.position) - center
-        torque = np.cross(position, force)
-    valve = _valve(entry, every, thrust)
+        thrust, arm, push = entry.force, np.array(entry.position) - center, force_vector(entry.direction, entry.force)
+        torque, force, position = axes.T @ np.cross(arm, push), axes.T @ push, axes.T @ arm
     least, most = entry.min_on_time, math.inf if entry.max_on_time is None else entry.max_on_time
     if entry.impulse_bit is not None:  # outside its rows nothing is known
         least, most = max(least, entry.impulse_bit[0][0]), min(most, entry.impulse_bit[-1][0])
-    return Thruster(
-        name=entry.name,
-        torque=axes.T @ torque,
-        force=None if force is None else axes.T @ force,
-        thrust=thrust,
-        isp=entry.isp,
-        min_on_time=least,
-        max_on_time=most,
-        position=None if position is None else axes.T @ position,
-        valve=valve,
-    )
+    valve = _valve(entry, every, thrust)
+    return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
 
 
 def _tank(section: TankSection | None) -> Tank | None:
     if section is None:
         return None
-    isp = None if section.isp is None else tuple((pressure, value) for pressure, value in section.isp)
-    shed = section.inertia_per_kg
-    per_kg = None
-    if shed is not None and any(rows := shed if isinstance(shed, list) else [shed.A, shed.A, shed.C]):
-        per_kg = rows[0], rows[1], rows[2]
-    return _part(Tank, section, isp=isp, inertia_per_kg=per_kg)
+    isp, shed = section.isp, section.inertia_per_kg
+    rows = (shed.A, shed.A, shed.C) if isinstance(shed, ShedSection) else tuple(shed or ())
+    return _part(Tank, section, isp=isp and tuple(map(tuple, isp)), inertia_per_kg=rows if any(rows) else None)
 
 
 def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
@@ -409,12 +373,6 @@ def _attitude(
     return Attitude(quaternion, section.epoch, section.frame)
 
 
-def _orbit(section: OrbitSection | None) -> Orbit | None:
-    if section is None:
-        return None
-    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
-
-
 def _requirement(section: RequirementSection | None) -> Requirement | None:
     """None also for a requirement that names nothing."""
     if section is None or (section.nutation is None and section.momentum_shift is None):
@@ -434,7 +392,6 @@ def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
 
 
 def _sun(contents: SpacecraftFile) -> Vector | None:
-    """The direction of the Sun: as given, or at t = 0."""
     given: list[float] | str | None = contents.sun
     if not isinstance(given, str):
         return None if given is None else attitude.on_sphere(*given)
@@ -443,18 +400,21 @@ def _sun(contents: SpacecraftFile) -> Vector | None:
     return sky.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
 
 
-def _keep(section: KeepSection, sunward: Vector | None) -> Keep:
-    given: list[float] | str = section.direction
-    direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
-    assert direction is not None
-    return Keep(section.name, direction, section.min or 0.0, math.pi if section.max is None else section.max)
+def _cones(contents: SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
+    """The cones of the file, and that about the angular momentum which bounds the nutation on the way."""
+    for entry in contents.keep:
+        given: list[float] | str = entry.direction
+        direction = sunward if isinstance(given, str) else attitude.on_sphere(*given)
+        assert direction is not None
+        yield Keep(entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max)
+    if contents.requirement is not None and contents.requirement.nutation_during is not None:
+        yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
 
-def _on_the_way(section: RequirementSection | None) -> tuple[Keep, ...]:
-    """The cone about the angular momentum that bounds the nutation on the way."""
-    if section is None or section.nutation_during is None:
-        return ()
-    return (Keep("H", None, 0.0, section.nutation_during),)
+def _orbit(section: OrbitSection | None) -> Orbit | None:
+    if section is None:
+        return None
+    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
 
 
 def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | None:
@@ -491,11 +451,6 @@ def _loop(section: LoopSection | None, axes: Vector, center: Vector) -> Loop | N
     return _part(Loop, section, sensor=sensor, reversed=turned)
 
 
-def _limits(section: LimitsSection | None) -> Limits:
-    windows = () if section is None else tuple((begin, end) for begin, end in section.blackout)
-    return _part(Limits, section, blackout=windows) or Limits()
-
-
 def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
     parts: dict[str, Any] = {}
@@ -519,7 +474,6 @@ def section_schema(section: type[Section], parts: dict[str, Any]) -> dict[str, A
 
 
 def _schema(annotation: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """JSON Schema of a type."""
     origin, of = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _ruled_schema(of[0], of[1:], parts)

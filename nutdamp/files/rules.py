@@ -18,7 +18,6 @@ from nutdamp.files.fields import SMALLEST, KeyPath
 from nutdamp.files.yaml import Node, dotted
 from nutdamp.physics import attitude, sky
 from nutdamp.physics import body as rigid_body
-from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.units import parse, shown
@@ -47,6 +46,11 @@ class Facts:
     def has(self, *path: str | int) -> bool:
         """True where something is at ``path``."""
         return self.root.get(*path) is not None
+
+    def is_mapping(self, *path: str | int) -> bool:
+        """True where keys may be at ``path``."""
+        node = self.root.get(*path)
+        return node is not None and isinstance(node.value, dict)
 
     def text(self, *path: str | int) -> str | None:
         """The text at ``path``."""
@@ -77,35 +81,20 @@ class Facts:
 ALONG = 1e-3
 """rad from the spin axis, up to which the Sun counts as along it."""
 
-NO_ATTITUDE = "needs attitude, which says where the body points at t = 0"
 
-
-def sky_findings(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
-    """All faults of ``orbit``, ``sun``, ``keep`` and ``commands``.
-
-    ``axis`` (3,) is the axis in the body about which it spins at ``spin`` rad/s, or None where that cannot be read.
-    """
-    yield from _orbit(facts)
-    yield from _sun(facts)
-    yield from _command_blocks(facts, spin, axis)
-    for index, _ in facts.children("keep"):
-        yield from _cone(facts, ("keep", index))
-
-
-def _command_blocks(facts: Facts, spin: float | None, axis: Vector) -> Iterator[Finding]:
-    """Faults between sun_sensor and commands; ``axis`` (3,) is axis 3, and ``spin`` rad/s its rate."""
+def _command_blocks(facts: Facts) -> Iterator[Finding]:
     if facts.has("commands") and not facts.has("sun_sensor"):
         yield Finding(("commands",), "needs the key sun_sensor, whose pulse fires the blocks", True)
     if facts.has("sun_sensor") and not facts.has("sun"):
         yield Finding(("sun_sensor",), "needs the key sun: [right ascension, declination], or sun: epoch", True)
+    least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
+    spin = spin_of(facts)
     if spin:
         turn = 2.0 * math.pi / abs(spin)
-        width = facts.number("time", "commands", "width", "max")
-        if width is not None and width >= turn:
-            problem = f"{width:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
+        if most is not None and most >= turn:
+            problem = f"{most:g} s is not less than a spin turn of {turn:.4g} s, in which the next Sun pulse comes"
             yield Finding(("commands", "width", "max"), problem)
-        yield from _sun_in_view(facts, math.copysign(1.0, spin) * axis)
-    least, most = (facts.number("time", "commands", "width", key) for key in ("min", "max"))
+        yield from _sun_in_view(facts, math.copysign(1.0, spin) * spin_axis(facts))
     if least is not None and most is not None and least > most:
         yield Finding(("commands", "width", "min"), f"{least:g} s exceeds max; expected at most {most:g} s")
 
@@ -176,40 +165,29 @@ def _sun(facts: Facts) -> Iterator[Finding]:
     if not facts.has("sun"):
         return
     yield from _direction(facts, ("sun",))
-    if facts.text("sun") != "epoch" or not facts.has("attitude"):
-        return
-    epoch = facts.text("attitude", "epoch")
-    if epoch is None:
-        yield Finding(("sun",), "epoch needs attitude.epoch, the date of t = 0; or give [right ascension, declination]")
-        return
-    try:
-        Epoch.parse(epoch)
-    except ValueError:
-        cure = "give [right ascension, declination]"
-        yield Finding(("sun",), f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}")
+    if facts.text("sun") == "epoch" and facts.has("attitude") and _to_sun(facts) is None:
+        epoch, cure = facts.text("attitude", "epoch"), "give [right ascension, declination]"
+        problem = f"the Sun is computed for epochs from 1972 on, not for {epoch}; {cure}"
+        yield Finding(("sun",), problem if epoch else f"epoch needs attitude.epoch, the date of t = 0; or {cure}")
 
 
-def _cone(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    yield from _direction(facts, (*path, "direction"))
-    if facts.text(*path, "direction") == "sun" and not facts.has("sun"):
-        yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
-    least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
-    if not facts.has(*path, "min") and not facts.has(*path, "max"):
-        yield Finding((*path, "min"), "missing; give min, max or both, else the cone has no effect")
-    if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
-        problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
-        yield Finding((*path, "min"), problem)
+def _cones(facts: Facts) -> Iterator[Finding]:
+    for index, _ in facts.children("keep"):
+        path = ("keep", index)
+        yield from _direction(facts, (*path, "direction"))
+        if facts.text(*path, "direction") == "sun" and not facts.has("sun"):
+            yield Finding((*path, "direction"), "needs the key sun: [right ascension, declination], or sun: epoch")
+        least, most = (facts.number("angle", *path, key) for key in ("min", "max"))
+        if not facts.has(*path, "min") and not facts.has(*path, "max"):
+            yield Finding((*path, "min"), "missing; give min, max or both, else the cone has no effect")
+        if least is not None and most is not None and most < least <= math.pi:  # more than that is out of range
+            problem = f"{math.degrees(least):g} deg exceeds max; expected at most {math.degrees(most):g} deg"
+            yield Finding((*path, "min"), problem)
 
 
 def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    """Faults of a direction, by two angles or by a word."""
-    if not facts.has("attitude") and facts.has(*path):
-        yield Finding(path, NO_ATTITUDE, True)  # at the key, since its value is judged too
-    yield from _declination(facts, path)
-
-
-def _declination(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    """Fault of the second of two angles."""
+    if not facts.has("attitude") and facts.has(*path):  # at the key, since its value is judged too
+        yield Finding(path, "needs attitude, which says where the body points at t = 0", True)
     declination = facts.number("angle", *path, 1)
     if declination is not None and abs(declination) > 0.5 * math.pi * (1.0 + 1e-12):
         angle = f"{math.degrees(declination):g} deg"
@@ -238,27 +216,14 @@ SYMMETRIC = 1e-9
 def findings(root: Node) -> Iterator[Finding]:
     """All faults between the keys of a file."""
     facts = Facts(root)
-    for rule in (
-        _names,
-        _inertia,
-        _motion,
-        _attitude,
-        _disturbances,
-        _dissipation,
-        _limits,
-        _goal,
-    ):
+    of_body = (_names, _inertia, _motion, _attitude, _disturbances, _dissipation, _limits, _goal)
+    for rule in (*of_body, _orbit, _sun, _command_blocks, _cones):
         yield from rule(facts)
-    yield from sky_findings(facts, spin_of(facts), spin_axis(facts))
 
 
 def symmetric(tensor: Vector) -> Vector:
     """A tensor without the asymmetry that passes for rounding."""
     return 0.5 * (tensor + tensor.T)
-
-
-FORMULA = "=@"
-"""Beginnings of a cell that a spreadsheet takes for a formula, where they are no sign of a name such as +M1."""
 
 
 def _names(facts: Facts) -> Iterator[Finding]:
@@ -271,7 +236,7 @@ def _names(facts: Facts) -> Iterator[Finding]:
             continue
         if not name.strip() or not name.isprintable():
             yield Finding(path, f"{shown(name)} is no name; expected printable characters", at_key)
-        elif name[0] in FORMULA:
+        elif name[0] in "=@":
             yield Finding(path, f"{shown(name)} would be a formula in a spreadsheet; take another", at_key)
         elif name == STEERABLE and path[0] in ("thrusters", "channels"):
             yield Finding(path, f"the name {STEERABLE!r} is kept for the steerable torquer; take another", at_key)
@@ -285,7 +250,8 @@ def _names(facts: Facts) -> Iterator[Finding]:
 
 
 def _inertia(facts: Facts) -> Iterator[Finding]:
-    keys = [key for key, _ in facts.children("inertia") if key in ("A", "C", "tensor")]
+    node = facts.root.get("inertia")
+    keys = [key for key in ("A", "C", "tensor") if facts.has("inertia", key)]
     if "tensor" in keys:
         if len(keys) > 1:
             yield Finding(("inertia", "tensor"), "given together with A or C; keep either tensor, or A and C", True)
@@ -293,9 +259,8 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         fault = None if tensor is None else tensor_fault(tensor) or _spin_axis_fault(tensor, facts)
         if fault is not None:
             yield fault
-    elif isinstance(getattr(facts.root.get("inertia"), "value", None), dict) and not _of_tensor(facts):
-        missing = {"A": "transverse", "C": "axial"}
-        for key, what in missing.items():
+    elif node is not None and isinstance(node.value, dict) and not any(map(MOMENT.fullmatch, node.keys)):
+        for key, what in (("A", "transverse"), ("C", "axial")):
             if key not in keys:
                 yield Finding(("inertia", key), f"missing; the {what} moment of inertia, in kg m^2")
     A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
@@ -303,12 +268,6 @@ def _inertia(facts: Facts) -> Iterator[Finding]:
         most = "not physically possible (A and C swapped?); at most 2 A (a flat disc)"
         problem = f"C = {C:g} exceeds 2 A = {2 * A:g} kg m^2: {most}"
         yield Finding(("inertia", "C"), problem)
-
-
-def _of_tensor(facts: Facts) -> bool:
-    """True where there are keys that belong into a tensor; that is a fault already."""
-    node = facts.root.get("inertia")
-    return node is not None and any(map(MOMENT.fullmatch, node.keys))
 
 
 def tensor_of(facts: Facts) -> Vector | None:
@@ -340,16 +299,22 @@ def tensor_fault(tensor: Vector) -> Finding | None:
     return None
 
 
+def principal_of(facts: Facts) -> tuple[rigid_body.Moments, Vector] | None:
+    """Principal moments, kg m², and axes, by the tensor or by A and C; None where they cannot be read."""
+    tensor = tensor_of(facts)
+    if tensor is not None:
+        return None if tensor_fault(tensor) else rigid_body.principal_axes(symmetric(tensor))
+    A, C = (facts.number("inertia", "inertia", key) for key in "AC")
+    return None if A is None or C is None or A <= 0.0 or C <= 0.0 else ((A, A, C), np.eye(3))
+
+
 def inertia_of(facts: Facts) -> Inertia | None:
     """The inertia; None where it cannot be read, or no body can have it and spin."""
-    tensor = tensor_of(facts)
+    principal = principal_of(facts)
+    if principal is None or principal[0][2] > sum(principal[0][:2]) * (1.0 + SYMMETRIC):
+        return None
     try:
-        if tensor is not None:
-            return None if tensor_fault(tensor) else Inertia(*principal_axes(symmetric(tensor)), wheel_of(facts))
-        A, C = facts.number("inertia", "inertia", "A"), facts.number("inertia", "inertia", "C")
-        if A is None or C is None or min(A, C) <= 0.0 or C > 2.0 * A:
-            return None
-        return Inertia((A, A, C), wheel=wheel_of(facts))
+        return Inertia(*principal, wheel_of(facts))
     except ValueError:
         return None
 
@@ -361,7 +326,7 @@ def wheel_of(facts: Facts) -> float:
 
 def _spin_axis_fault(tensor: Vector, facts: Facts) -> Finding | None:
     """The reason why free spin about principal axis 3 is unstable, and its growth, if the spin is known."""
-    moments, spin, wheel = principal_axes(symmetric(tensor))[0], spin_of(facts), wheel_of(facts)
+    moments, spin, wheel = rigid_body.principal_axes(symmetric(tensor))[0], spin_of(facts), wheel_of(facts)
     if wheel != 0.0:
         if spin is None or (grows := rigid_body.growth(moments, spin, wheel)).stable:
             return None
@@ -406,22 +371,17 @@ def _motion(facts: Facts) -> Iterator[Finding]:
             problem = f"cancels the C ω3 of the body, {inertia.C * spin:.4g} N m s: without momentum nothing nutates"
             yield Finding(("wheel", "momentum"), problem)
         elif spin == 0.0 and facts.has("sun_sensor"):
-            yield Finding(
-                ("sun_sensor",), "the body does not turn about axis 3: there are no Sun pulses; leave it out", True
-            )
+            problem = "the body does not turn about axis 3: there are no Sun pulses; leave it out"
+            yield Finding(("sun_sensor",), problem, True)
         elif axial * spin < 0.0 and facts.has("sun_sensor"):
-            problem = (
-                "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned then"
-            )
-            yield Finding(("wheel", "momentum"), f"{problem}; leave sun_sensor out")
+            problem = "turns the angular momentum against the spin: blocks fired from the Sun pulse are not planned"
+            yield Finding(("wheel", "momentum"), f"{problem} then; leave sun_sensor out")
 
 
 def spin_axis(facts: Facts) -> Vector:
     """Principal axis 3 in the axes of the file, (3,); the file's third where the tensor cannot be read."""
-    tensor = tensor_of(facts)
-    if tensor is None or tensor_fault(tensor) is not None:
-        return np.array([0.0, 0.0, 1.0])
-    return np.asarray(principal_axes(symmetric(tensor))[1][:, 2])
+    principal = principal_of(facts)
+    return np.array([0.0, 0.0, 1.0]) if principal is None else principal[1][:, 2]
 
 
 def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
@@ -431,26 +391,22 @@ def _spin_of_omega0(facts: Facts) -> tuple[KeyPath, float | None]:
         return (), None
     if tensor is None:
         return ("omega0", 2), float(omega0[2])
-    spin = float(principal_axes(symmetric(tensor))[1][:, 2] @ omega0)
+    spin = float(spin_axis(facts) @ omega0)
     return ("omega0",), spin if abs(spin) > CANCELLED * norm(omega0) else 0.0
 
 
-BY_AXIS = ("spin_axis", "phase", "sun_phase", "of")
-"""Keys of an attitude by the direction of its spin axis."""
-
-
 def _attitude(facts: Facts) -> Iterator[Finding]:
-    by_axis = [key for key in BY_AXIS if facts.has("attitude", key)]
+    by_axis = [key for key in ("spin_axis", "phase", "sun_phase", "of") if facts.has("attitude", key)]
     if facts.has("attitude", "quaternion"):
         for key in by_axis:
             yield Finding(("attitude", key), "given together with quaternion; keep one of the two", True)
-    elif isinstance(getattr(facts.root.get("attitude"), "value", None), dict):
+    elif facts.is_mapping("attitude"):
         if "spin_axis" not in by_axis:
             cure = "or spin_axis: [right ascension, declination]"
             yield Finding(("attitude", "quaternion"), f"missing; turn from body to frame, scalar first, {cure}")
         if "sun_phase" in by_axis:
             yield from _sun_phase(facts)
-    yield from _declination(facts, ("attitude", "spin_axis"))
+    yield from _direction(facts, ("attitude", "spin_axis"))
     quaternion = facts.vector("number", 4, "attitude", "quaternion")
     if quaternion is not None and norm(quaternion) < SMALLEST:
         yield Finding(("attitude", "quaternion"), "zero; expected a rotation, such as [1, 0, 0, 0]")
@@ -480,9 +436,8 @@ def _disturbances(facts: Facts) -> Iterator[Finding]:
         if isinstance(node.value, dict):
             path = ("disturbances", index)
             turning = [key for key in ("rate", "fixed_in") if facts.has(*path, key)]
-            kind = disturbance_kind(facts.text(*path, "kind"), bool(turning))
-            if facts.has(*path, "kind") and facts.text(*path, "kind") is None:
-                kind = ""  # unreadable
+            unreadable = facts.has(*path, "kind") and facts.text(*path, "kind") is None
+            kind = "" if unreadable else disturbance_kind(facts.text(*path, "kind"), bool(turning))
             yield from _turning(facts, path, kind, turning)
             yield from _disturbing_torque(facts, path, kind)
 
@@ -529,16 +484,15 @@ def _disturbing_torque(facts: Facts, path: KeyPath, kind: str) -> Iterator[Findi
 def _dissipation(facts: Facts) -> Iterator[Finding]:
     time_constant = facts.number("time", "dissipation", "time_constant")
     if time_constant == 0.0:
-        cure = "expected a time above 0, or leave dissipation out for none"
-        yield Finding(("dissipation", "time_constant"), f"zero; {cure}")
+        problem = "zero; expected a time above 0, or leave dissipation out for none"
+        yield Finding(("dissipation", "time_constant"), problem)
     inertia, named = inertia_of(facts), facts.has("dissipation", "nutation")
     if time_constant is not None and wheel_of(facts) and not named:
         problem = "missing; with a wheel the place of the loss decides: give grows or decays"
         yield Finding(("dissipation", "nutation"), problem)
     elif inertia is not None and inertia.a == 0.0 and inertia.wheel == 0.0 and named:
-        yield Finding(
-            ("dissipation", "nutation"), "the nutation of a sphere neither grows nor decays; leave it out", True
-        )
+        problem = "the nutation of a sphere neither grows nor decays; leave it out"
+        yield Finding(("dissipation", "nutation"), problem, True)
 
 
 def _limits(facts: Facts) -> Iterator[Finding]:

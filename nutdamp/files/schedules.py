@@ -11,14 +11,14 @@ Command blocks are written by ``plan --blocks``; ``simulate --blocks`` fires the
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import nearest, printable
-from nutdamp.files.tabular import Cells, Table
+from nutdamp.files.tabular import Row, Table
 from nutdamp.flight.dynamics import Supply
 from nutdamp.planning.decision import broken_limits
 from nutdamp.planning.plan import Plan
@@ -29,44 +29,24 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, on_command, overlapping
 from nutdamp.units import shown
 
+TORQUE = ("torque_1_Nm", "torque_2_Nm", "torque_3_Nm")
+IMPULSE = ("impulse_1_Nms", "impulse_2_Nms", "impulse_3_Nms")
 PULSES_HEADER = (
-    "pulse",
-    "t_s",
-    "start_s",
-    "on_time_s",
-    "channel",
-    "torque_1_Nm",
-    "torque_2_Nm",
-    "torque_3_Nm",
-    "impulse_1_Nms",
-    "impulse_2_Nms",
-    "impulse_3_Nms",
-    "propellant_kg",
-    "nutation_before_deg",
-    "nutation_after_deg",
+    *("pulse", "t_s", "start_s", "on_time_s", "channel"),
+    *TORQUE,
+    *IMPULSE,
+    *("propellant_kg", "nutation_before_deg", "nutation_after_deg"),
 )
 EFFECTIVE = ("effective_start_s", "effective_on_time_s")
 """Behind those, where pulses go through valves: start and on-time are those of the command then."""
 
 UTC = "utc"
-IMPULSE = PULSES_HEADER[8:11]
-TORQUE = PULSES_HEADER[5:8]
-
 
 BLOCKS_HEADER = (
-    "block",
-    "channel",
-    "first_sun_pulse",
-    "first_utc",
-    "delay_s",
-    "delay_counts",
-    "delay_deg",
-    "width_s",
-    "width_counts",
-    "count",
-    "every",
-    "impulse_Nms",
-    "nutation_after_deg",
+    *("block", "channel", "first_sun_pulse", "first_utc"),
+    *("delay_s", "delay_counts", "delay_deg"),
+    *("width_s", "width_counts", "count", "every"),
+    *("impulse_Nms", "nutation_after_deg"),
 )
 
 COUNTS = 1e-6
@@ -90,21 +70,20 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
     table.expect("channel", "first_sun_pulse", *times, "count")
     blocks: list[Block] = []
-    for line, row in table.rows:
-        cells = table.cells(line, row)
-        block = None if cells is None else _block(table, line, cells, spacecraft)
-        if cells is None or block is None:
+    over = 0
+    for row in table.rows:
+        block = _block(row, spacecraft)
+        if block is None:
             continue
-        before = blocks[-1] if blocks else None
-        over = 0 if before is None else before.first + (before.count - 1) * before.every
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
-            table.fault(line, "first_sun_pulse", problem)
-        _against_commands(table, line, cells, block, spacecraft)
+            row.fault("first_sun_pulse", problem)
+        over = block.first + (block.count - 1) * block.every
+        _against_commands(row, block, spacecraft)
         blocks.append(block)
-    if sum(block.count for block in blocks) > MOST_FIRED:
-        fired = sum(block.count for block in blocks)
-        table.fault(1, "count", f"the blocks fire {fired} pulses; expected at most {MOST_FIRED}")
+    total = sum(block.count for block in blocks)
+    if total > MOST_FIRED:
+        table.fault(1, "count", f"the blocks fire {total} pulses; expected at most {MOST_FIRED}")
     table.check()
     _expect_utc(table, spacecraft, blocks)
     return tuple(blocks), table.warned
@@ -115,25 +94,25 @@ def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -
 
     So much may a delay be edited by. Without an epoch only its form is looked at.
     """
-    given = [(line, row[table.header.index("first_utc")]) for line, row in table.rows if "first_utc" in table.header]
     parsed: dict[int, Epoch] = {}
-    for line, text in given:
+    for row in table.rows:
         try:
-            if text.strip():
-                parsed[line] = Epoch.parse(text.strip())
+            if row.get("first_utc"):
+                parsed[row.line] = Epoch.parse(row["first_utc"])
         except ValueError:
-            table.fault(line, "first_utc", f"{shown(text)} is no date and time; expected 2026-03-01T12:00:00Z")
+            problem = f"{shown(row['first_utc'])} is no date and time; expected 2026-03-01T12:00:00Z"
+            row.fault("first_utc", problem)
     table.check()
     place = spacecraft.attitude
     if not parsed or place is None or place.epoch is None:
         return
     pulses, epoch, number = fired(spacecraft, blocks).pulses, Epoch.parse(place.epoch), 0
-    for (line, _), block in zip(given, blocks, strict=True):
+    for row, block in zip(table.rows, blocks, strict=True):
         begins = pulses[number].loaded[0]
         number += block.count
-        if line in parsed and abs(parsed[line].since(epoch) - begins) > spin_turn(spacecraft):
+        if row.line in parsed and abs(parsed[row.line].since(epoch) - begins) > spin_turn(spacecraft):
             cure = "correct first_sun_pulse, or leave first_utc empty"
-            table.fault(line, "first_utc", f"its first pulse begins at {spacecraft.utc(begins)}; {cure}")
+            row.fault("first_utc", f"its first pulse begins at {spacecraft.utc(begins)}; {cure}")
     table.check()
 
 
@@ -149,65 +128,51 @@ def _counted(table: Table, spacecraft: Spacecraft, name: str) -> bool:
     return alone
 
 
-def _block(table: Table, line: int, cells: Cells, spacecraft: Spacecraft) -> Block | None:
-    """The block of one row; None where it has faults."""
-    faults, channels = len(table.faults), [channel.name for channel in spacecraft.channels]
-    name = cells["channel"]
+def _block(row: Row, spacecraft: Spacecraft) -> Block | None:
+    faults, channels = len(row.table.faults), [channel.name for channel in spacecraft.channels]
+    name = row["channel"]
     if name not in channels:
         close = nearest(name, channels)
         cure = f"did you mean {shown(close)}?" if close else f"it has {', '.join(map(shown, channels)) or 'none'}"
-        table.fault(line, "channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
-    delay, width = (_time(table, line, cells, spacecraft, name) for name in TIMES)
+        row.fault("channel", f"the spacecraft file has no channel {shown(name)}; {cure}")
+    delay, width = (_time(row, spacecraft, name) for name in TIMES)
     if width == 0.0:
-        column = "width_s" if "width_s" in cells else "width_counts"
-        table.fault(line, column, "0 s fires nothing; expected a time above 0")
-    first = _whole(table, line, cells, "first_sun_pulse", LATEST)
-    count = _whole(table, line, cells, "count", MOST_FIRED)
-    every = _whole(table, line, cells, "every", LATEST) if cells.get("every") else 1
-    if len(table.faults) > faults or None in (delay, width, first, count, every):
-        return None
-    return Block(name, first or 1, delay or 0.0, width or 0.0, count or 1, every or 1)
+        row.fault("width_s" if "width_s" in row else "width_counts", "0 s fires nothing; expected a time above 0")
+    numbers = [1, 1, 1]
+    for place, (column, most) in enumerate((("first_sun_pulse", LATEST), ("count", MOST_FIRED), ("every", LATEST))):
+        value = row.number(column) if column != "every" or row.get("every") else 1.0
+        if value is not None and not (value.is_integer() and 1 <= value <= most):
+            row.fault(column, f"expected a whole number from 1 to {most}, got {row[column]}")
+        numbers[place] = int(value or 1)
+    first, count, every = numbers
+    return None if len(row.table.faults) > faults else Block(name, first, delay or 0.0, width or 0.0, count, every)
 
 
-def _time(table: Table, line: int, cells: Cells, spacecraft: Spacecraft, name: str) -> float | None:
-    """A delay or width, s: as it is given, or so many steps."""
-    column = f"{name}_s" if f"{name}_s" in cells else f"{name}_counts"
-    value = table.number(line, cells, column)
+def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
+    """A delay or width, s: as it is given, or so many steps; None for a fault."""
+    column, commands = f"{name}_s" if f"{name}_s" in row else f"{name}_counts", spacecraft.commands
+    value = row.number(column)
     if value is None:
         return None
     if value < 0.0:
-        unit = " s" if column.endswith("_s") else ""
-        table.fault(
-            line, column, f"{value:g}{unit} is negative; expected {'a time' if unit else 'a number'} of at least 0"
-        )
+        least = " s is negative; expected a time" if column.endswith("_s") else " is negative; expected a number"
+        row.fault(column, f"{value:g}{least} of at least 0")
         return None
     if column.endswith("_s"):
         return value
     if not value.is_integer():
-        table.fault(line, column, f"expected a whole number of steps, got {cells[column]}")
+        row.fault(column, f"expected a whole number of steps, got {row[column]}")
         return None
-    commands = spacecraft.commands
     if commands is None:
         return 0.0
     time = commands.delay_of(value) if name == "delay" else commands.width_of(value)
     if time is None:
-        table.fault(
-            line,
-            column,
-            f"expected the number of an entry of commands.width, 1 to {len(commands.widths)}, got {cells[column]}",
-        )
+        most = len(commands.widths)
+        row.fault(column, f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}")
     return time
 
 
-def _whole(table: Table, line: int, cells: Cells, column: str, most: int) -> int | None:
-    value = table.number(line, cells, column)
-    if value is not None and not (value.is_integer() and 1 <= value <= most):
-        table.fault(line, column, f"expected a whole number from 1 to {most}, got {cells[column]}")
-        return None
-    return None if value is None else int(value)
-
-
-def _against_commands(table: Table, line: int, cells: Cells, block: Block, spacecraft: Spacecraft) -> None:
+def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
     """Warn of pulses that cannot be commanded: they are flown as given."""
     commands = spacecraft.commands
     if commands is None:
@@ -223,18 +188,18 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
     for column, (given, near, slack) in off.items():
         if abs(given - near) > slack:
             text = f"{column} = {given:.6g} s cannot be commanded, {near:.6g} s is the nearest: flown as given"
-            table.warn(line, column, text)
+            row.warn(column, text)
     if block.count > commands.max_count:
         text = f"count = {block.count} cannot be commanded, {commands.max_count} is the most: flown as given"
-        table.warn(line, "count", text)
+        row.warn("count", text)
     if block.every not in commands.every:
-        table.warn(line, "every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
+        row.warn("every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
     counted = (commands.delay_counts(block.delay), commands.width_counts(block.width))
     for name, time, right in zip(TIMES, (block.delay, block.width), counted, strict=True):
-        counts = cells.get(f"{name}_counts", "")
-        if counts and f"{name}_s" in cells and counts != str(right):
+        counts = row.get(f"{name}_counts", "")
+        if counts and f"{name}_s" in row and counts != str(right):
             text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
-            table.warn(line, f"{name}_counts", text)
+            row.warn(f"{name}_counts", text)
 
 
 AGREES = 1e-6
@@ -248,8 +213,7 @@ def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, lis
 
     Raises CannotRead, and FaultyFile with every fault of the file.
     """
-    table = Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses")
-    return _ScheduleReader(table, spacecraft).read()
+    return _ScheduleReader(Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses"), spacecraft).read()
 
 
 def read_plan(
@@ -265,12 +229,10 @@ def read_plan(
 
 
 class _ScheduleReader:
-    """Rows of one file into pulses, collecting faults, contradictions and warnings."""
-
     def __init__(self, table: Table, spacecraft: Spacecraft) -> None:
         self.table, self.spacecraft = table, spacecraft
         self.channels = {channel.name: channel for channel in spacecraft.channels}
-        self.commanded: dict[int, Cells] = {}  # of pulses of a channel of the file, by line
+        self.commanded: dict[int, Row] = {}  # of pulses of a channel of the file, by line
 
     def read(self) -> tuple[Schedule, list[str]]:
         header = self.table.header
@@ -279,138 +241,116 @@ class _ScheduleReader:
             self.table.fault(1, STARTS[0], problem)
         bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
         self.table.expect("on_time_s", *["channel"] * bare)
-        pulses = [(line, pulse) for line, row in self.table.rows if (pulse := self._pulse(line, row)) is not None]
+        pulses = [(row.line, pulse) for row in self.table.rows if (pulse := self._pulse(row)) is not None]
         for line, other in overlapping(pulses):
             self.table.fault(line, STARTS[0], f"its channel is still firing the pulse of line {other}")
         self.table.check()
-        return Schedule(tuple(self._supplied(pulses))), self.table.warned
-
-    def _supplied(self, pulses: Sequence[tuple[int, Pulse]]) -> Iterator[Pulse]:
-        """The pulses at the strength of their place in the sequence, compared with their rows."""
-        supply = Supply(self.spacecraft)
+        # Pulses have the strength of their place in the sequence.
+        supply, supplied = Supply(self.spacecraft), []
         for line, pulse in pulses if supply.steady else sorted(pulses, key=lambda row: row[1].loaded[0]):
-            fired = supply.fire(pulse, self.channels.get(pulse.channel))
+            supplied.append(supply.fire(pulse, self.channels.get(pulse.channel)))
             if line in self.commanded:
-                self._expect(line, self.commanded[line], fired)
-            yield fired
+                self._expect(self.commanded[line], supplied[-1])
         if supply.shortage is not None:
-            self.table.warn(pulses[-1][0], "tank", f"{supply.shortage}: the last pulses do not fire")
+            self.table.rows[-1].warn("tank", f"{supply.shortage}: the last pulses do not fire")
+        return Schedule(tuple(supplied)), self.table.warned
 
-    def _instead(self, name: str) -> str:
-        """The channel that is meant by a name not in the file, or all there are."""
-        close = nearest(name, list(self.channels))
-        return f"it has {', '.join(map(shown, self.channels))}" if close is None else f"did you mean {shown(close)}?"
-
-    def _on_times(self, cells: Cells) -> str:
-        """The on-times that the channel of a row can have, in words."""
-        channel = self.channels.get(cells.get("channel", ""))
-        if channel is None or channel.max_on_time == math.inf:
-            least = 0.0 if channel is None else channel.min_on_time
-            return f"{least:g} s or more is expected (0 for an ideal impulse)"
-        return f"{channel.min_on_time:g} s to {channel.max_on_time:g} s is expected (0 for an ideal impulse)"
-
-    def _pulse(self, line: int, row: list[str]) -> Pulse | None:
-        """The pulse of one row; None where it has faults."""
-        cells = self.table.cells(line, row)
-        if cells is None:
-            return None
-        name = cells.get("channel") or STEERABLE
+    def _pulse(self, row: Row) -> Pulse | None:
+        name = row.get("channel") or STEERABLE
         if not name.isprintable():
-            self.table.fault(
-                line, "channel", f"{shown(name)} is no name of a channel; printable characters are expected"
-            )
+            row.fault("channel", f"{shown(name)} is no name of a channel; printable characters are expected")
             return None
         channel = self.channels.get(name)
-        timing = self._timing(line, cells, channel)
+        timing = self._timing(row, channel)
         if timing is None:
             return None
         t, on_time, start = timing
         if channel is not None and on_time > 0.0:
-            self.commanded[line] = cells
+            self.commanded[row.line] = row
             return channel_pulse(channel, t, on_time) if start is None else on_command(channel, start, on_time)
-        return self._as_given(line, cells, name, t, on_time)
+        return self._as_given(row, name, t, on_time)
 
-    def _timing(self, line: int, cells: Cells, channel: Channel | None) -> tuple[float, float, float | None] | None:
+    def _timing(self, row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
         """Centre and on-time, s; the start rules where there is one.
 
         Through a valve the centre is the centroid of the thrust, and the third is the start of the command, s.
         """
-        column = next((column for column in STARTS if cells.get(column)), None)
+        column = next((column for column in STARTS if row.get(column)), None)
         if column is None:
-            self.table.fault(line, STARTS[0], "the time is missing")
+            row.fault(STARTS[0], "the time is missing")
             return None
-        time, on_time = self.table.number(line, cells, column), self.table.number(line, cells, "on_time_s")
+        time, on_time = row.number(column), row.number("on_time_s")
         if time is None or on_time is None:
             return None
         if on_time < 0.0:
-            self.table.fault(line, "on_time_s", f"{on_time:g} s is negative; {self._on_times(cells)}")
+            least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
+            allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
+            problem = f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)"
+            row.fault("on_time_s", problem)
             return None
-        lead = None if channel is None or on_time == 0.0 else self._lead(line, channel, on_time)
+        lead = None if channel is None or on_time == 0.0 else self._lead(row, channel, on_time)
         centre = 0.5 * on_time if lead is None else lead
         start = time if column == STARTS[0] else time - centre
         if start < -1e-9:
-            self.table.fault(line, column, f"the pulse would start at {start:g} s; 0 s or later is expected")
+            row.fault(column, f"the pulse would start at {start:g} s; 0 s or later is expected")
             return None
         t = max(start, 0.0) + centre if column == STARTS[0] else max(time, centre)
         if not Pulse(t, on_time, "", np.zeros(3)).resolved:
-            step = math.ulp(t + 0.5 * on_time)
-            self.table.fault(
-                line, "on_time_s", f"{on_time:g} s is too short at {t:g} s, where times are {step:.2g} s apart"
-            )
+            apart = f"where times are {math.ulp(t + 0.5 * on_time):.2g} s apart"
+            row.fault("on_time_s", f"{on_time:g} s is too short at {t:g} s, {apart}")
             return None
         meant = f"start_s + on_time_s/2 = {t:g}" if lead is None else f"the centroid of the thrust, {t:g}"
-        self._compare(line, cells, (STARTS[1],), [t], meant, scale=max(t, on_time))
+        _compare(row, (STARTS[1],), [t], meant, scale=max(t, on_time))
         begins = max(start, 0.0) if column == STARTS[0] else t - centre
         return t, on_time, None if lead is None else begins
 
-    def _lead(self, line: int, channel: Channel, on_time: float) -> float | None:
+    def _lead(self, row: Row, channel: Channel, on_time: float) -> float | None:
         """Time (s) from the start of a command to the centroid of its thrust; None without a valve."""
         if channel.valve is None:
             return None
         least, most = channel.valve.known
         if not least <= on_time <= most:
             problem = f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {least:g} s to {most:g} s"
-            self.table.fault(line, "on_time_s", problem)
+            row.fault("on_time_s", problem)
         thrust = channel.valve.thrust(on_time)
         if not thrust.ramps:
             text = f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not open"
-            self.table.warn(line, f"closed {channel.name}", text)
+            row.warn(f"closed {channel.name}", text)
         return thrust.centroid
 
-    def _expect(self, line: int, cells: Cells, pulse: Pulse) -> None:
-        """Warn where the row of a pulse contradicts the spacecraft file, which rules."""
+    def _expect(self, row: Row, pulse: Pulse) -> None:
         if pulse.torque is None:
             return
         inertia, named = self.spacecraft.inertia, shown(pulse.channel)
         torque, impulse = inertia.in_file(pulse.torque), inertia.in_file(pulse.impulse)
-        self._compare(line, cells, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
+        _compare(row, TORQUE, torque, f"that of {named} in the spacecraft file, {_vector(torque)}")
         length = "effective_on_time_s" if pulse.through_valve else "on_time_s"
-        self._compare(line, cells, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
+        _compare(row, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
         if pulse.propellant is not None:
             used = f"{pulse.propellant:g} by the spacecraft file"
-            self._compare(line, cells, ("propellant_kg",), [pulse.propellant], used)
+            _compare(row, ("propellant_kg",), [pulse.propellant], used)
         if pulse.through_valve:
             meant = f"what the valve of {named} makes of the command"
             for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
-                self._compare(line, cells, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)
-        self._compare_dates(line, cells, pulse)
+                _compare(row, (column,), [value], f"{meant}, {value:g}", scale=pulse.over)
+        self._compare_dates(row, pulse)
 
-    def _as_given(self, line: int, cells: Cells, name: str, t: float, on_time: float) -> Pulse | None:
+    def _as_given(self, row: Row, name: str, t: float, on_time: float) -> Pulse | None:
         """A pulse whose torque or impulse the schedule must give: ideal, steered, or of a channel not in the file."""
         inertia, channel, faults = self.spacecraft.inertia, self.channels.get(name), len(self.table.faults)
-        torque = self._vector(line, cells, TORQUE) if on_time > 0.0 else None
-        impulse = self._vector(line, cells, IMPULSE)
+        torque = _numbers(row, TORQUE) if on_time > 0.0 else None
+        impulse = _numbers(row, IMPULSE)
         if torque is not None:
-            self._compare(line, cells, IMPULSE, torque * on_time, f"torque × on_time_s, {_vector(torque * on_time)}")
             impulse = torque * on_time
+            _compare(row, IMPULSE, impulse, f"torque × on_time_s, {_vector(impulse)}")
         if impulse is None:
             if len(self.table.faults) == faults:
-                self.table.fault(line, "on_time_s" if channel else "channel", self._missing(name, channel, on_time))
+                row.fault("on_time_s" if channel else "channel", self._missing(name, channel, on_time))
             return None
         given = inertia.axes.T @ impulse
         push = None if on_time == 0.0 else given / on_time
-        pulse = Pulse(t, on_time, name, given, push, None, self._propellant(line, name, channel, given, push))
-        self._compare_dates(line, cells, pulse)
+        pulse = Pulse(t, on_time, name, given, push, None, self._propellant(row, name, given, push))
+        self._compare_dates(row, pulse)
         return pulse
 
     def _missing(self, name: str, channel: Channel | None, on_time: float) -> str:
@@ -419,73 +359,65 @@ class _ScheduleReader:
         columns = impulse if on_time == 0.0 else f"{torque} (or {impulse})"
         if channel is not None:
             return f"with an on-time of 0 {shown(name)} fires nothing, unless {columns} give an ideal impulse"
-        known = f" ({self._instead(name)})" if self.channels else ""
+        close = nearest(name, list(self.channels))
+        known = f" (it has {', '.join(map(shown, self.channels))})" if self.channels else ""
+        known = f" (did you mean {shown(close)}?)" if close else known
         kind = "a steered pulse" if name == STEERABLE else f"{shown(name)}, not in the spacecraft file{known},"
         return f"{kind} needs {columns}"
 
-    def _propellant(
-        self, line: int, name: str, channel: Channel | None, impulse: Vector, torque: Vector | None
-    ) -> float | None:
+    def _propellant(self, row: Row, name: str, impulse: Vector, torque: Vector | None) -> float | None:
         """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
-        if channel is not None:
+        if name in self.channels:
             ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-            self.table.warn(line, f"ideal {name}", f"{shown(name)} {ideal}")
+            row.warn(f"ideal {name}", f"{shown(name)} {ideal}")
             return None
         torquer = self.spacecraft.torquer
         if name != STEERABLE or torquer is None:
             known = ", ".join(map(shown, self.channels)) or STEERABLE
             text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
-            self.table.warn(line, f"unknown {name}", text)
+            row.warn(f"unknown {name}", text)
             return None
         size = 0.0 if torque is None else float(np.linalg.norm(torque))
         if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:
             text = f"{size:g} N m is not the torque of the steerable torquer, {torquer.torque:g} N m: flown as given"
-            self.table.warn(line, "steerable torque", text)
+            row.warn("steerable torque", text)
         rate = torquer.propellant_per_impulse
         return None if rate is None else rate * float(np.linalg.norm(impulse))
 
-    def _vector(self, line: int, cells: Cells, columns: Sequence[str]) -> Vector | None:
-        """Three numbers; None where none is given, or one is a fault."""
-        if not any(cells.get(column) for column in columns):
-            return None
-        for column in columns:
-            cells.setdefault(column, "")
-        numbers = [self.table.number(line, cells, column) for column in columns]
-        return None if None in numbers else np.array(numbers, dtype=float)
-
-    def _compare(
-        self,
-        line: int,
-        cells: Cells,
-        columns: Sequence[str],
-        expected: Sequence[float] | Vector,
-        meant: str,
-        scale: float | None = None,
-    ) -> None:
-        """Warn where ``columns`` are given and contradict the values in use."""
-        texts = [cells.get(column, "") for column in columns]
-        if not any(texts):
-            return
-        try:
-            off = float(np.linalg.norm(np.array([float(text) for text in texts]) - expected))
-        except ValueError:
-            off = math.inf
-        if not off <= AGREES * (float(np.linalg.norm(expected)) if scale is None else scale):
-            named = columns[0] if len(columns) == 1 else f"{columns[0]} to {columns[-1]}"
-            given = ", ".join(map(_brief, texts))
-            given = given if len(columns) == 1 else f"({given})"
-            self.table.warn(line, columns[0], f"{named} = {given} contradicts {meant}: ignored")
-
-    def _compare_dates(self, line: int, cells: Cells, pulse: Pulse) -> None:
+    def _compare_dates(self, row: Row, pulse: Pulse) -> None:
         expected = self.spacecraft.utc(pulse.loaded[0])
-        if not cells.get(UTC) or expected is None:
+        if not row.get(UTC) or expected is None:
             return
         try:
-            off = abs(Epoch.parse(cells[UTC]).since(Epoch.parse(expected)))
+            off = abs(Epoch.parse(row[UTC]).since(Epoch.parse(expected)))
         except ValueError:
             off = math.inf
         if not off <= AGREES * max(pulse.t, 1.0):
-            self.table.warn(line, UTC, f"{UTC} = {shown(cells[UTC])} contradicts start_s, which is {expected}: ignored")
+            row.warn(UTC, f"{UTC} = {shown(row[UTC])} contradicts start_s, which is {expected}: ignored")
+
+
+def _numbers(row: Row, columns: Sequence[str]) -> Vector | None:
+    """Three numbers; None where none is given, or one is a fault."""
+    if not any(row.get(column) for column in columns):
+        return None
+    numbers = [row.number(column) for column in columns]
+    return None if None in numbers else np.array(numbers, dtype=float)
+
+
+def _compare(
+    row: Row, columns: Sequence[str], expected: Sequence[float] | Vector, meant: str, scale: float | None = None
+) -> None:
+    texts = [row.get(column, "") for column in columns]
+    if not any(texts):
+        return
+    try:
+        off = float(np.linalg.norm(np.array([float(text) for text in texts]) - expected))
+    except ValueError:
+        off = math.inf
+    if not off <= AGREES * (float(np.linalg.norm(expected)) if scale is None else scale):
+        given = ", ".join(map(_brief, texts))
+        given = f"{columns[0]} = {given}" if len(columns) == 1 else f"{columns[0]} to {columns[-1]} = ({given})"
+        row.warn(columns[0], f"{given} contradicts {meant}: ignored")
 
 
 def _vector(parts: Vector) -> str:

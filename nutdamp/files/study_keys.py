@@ -67,7 +67,7 @@ def unit_kinds(kind: str) -> list[str]:
     return [kind, "ratio"] if kind in RELATIVE and kind != "ratio" else [kind]
 
 
-def by_name(value: Mapping[str, object]) -> bool:
+def by_name(value: Mapping[Any, object]) -> bool:
     """True where a mapping holds tolerances by thruster, and is not itself one."""
     return any(isinstance(getattr(entry, "value", entry), dict) for entry in value.values())
 
@@ -104,25 +104,20 @@ class _Tolerance(Rule):
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
         """One tolerance or several, with their units."""
-        single = _json_schema(self.kind)
+        texts = [{"type": "string", "pattern": pattern(unit)} for unit in unit_kinds(self.kind)]
+        spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
+        single = {
+            "type": "object",
+            "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
+            "additionalProperties": False,
+            "minProperties": 1,
+            "maxProperties": 1,
+        }
         if self.each == "axis":
             return {"anyOf": [single, {"type": "array", "items": single, "minItems": 3, "maxItems": 3}]}
         if self.each == "thruster":
             return {"anyOf": [single, {"type": "object", "additionalProperties": single, "minProperties": 1}]}
         return single
-
-
-def _json_schema(kind: str) -> dict[str, Any]:
-    """JSON Schema of a tolerance of ``kind``."""
-    texts = [{"type": "string", "pattern": pattern(unit)} for unit in unit_kinds(kind)]
-    spread: dict[str, Any] = {"anyOf": [{"type": "number", "minimum": 0}, *texts]}
-    return {
-        "type": "object",
-        "properties": {**dict.fromkeys(KINDS, spread), "bias": {"anyOf": [{"type": "number"}, *texts]}},
-        "additionalProperties": False,
-        "minProperties": 1,
-        "maxProperties": 1,
-    }
 
 
 _Three = Annotated[list[ToleranceSection], Length(3, 3)]
@@ -238,13 +233,6 @@ def dispersions(
     thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
-
-    def fraction(name: str, tolerance: Tolerance) -> Tolerance:
-        thrust = thrusts[name]
-        if tolerance.relative or thrust is None:
-            return tolerance
-        return Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
-
     entries: dict[str, Any] = {}
     for key in (field.name for field in fields(Dispersions)):
         entry = getattr(section, key)
@@ -257,8 +245,10 @@ def dispersions(
         elif entry is not None:  # by thruster
             named = {name: part.tolerance(key) for name, part in entry.items()}
             entries[key] = dict.fromkeys(thrusts, named[ALL]) if ALL in named else named
-    if "thrust" in entries:
-        entries["thrust"] = {name: fraction(name, tolerance) for name, tolerance in entries["thrust"].items()}
+    for name, tolerance in entries.get("thrust", {}).items():
+        thrust = thrusts[name]
+        if not tolerance.relative and thrust is not None:
+            entries["thrust"][name] = Tolerance(tolerance.kind, tolerance.size / thrust, relative=True)
     return Dispersions(**entries)
 
 

@@ -104,7 +104,6 @@ def check_place(path: str) -> Path:
 
 
 def _reason(reason: Exception) -> str:
-    """The reason given by the system, without the path."""
     return getattr(reason, "strerror", None) or str(reason).partition(" from ")[0]
 
 
@@ -201,22 +200,11 @@ def json_text(data: dict[str, Any]) -> str:
 
 HEADER = (
     "t_s",
-    "omega_1_rad_s",
-    "omega_2_rad_s",
-    "omega_3_rad_s",
-    "q_w",
-    "q_x",
-    "q_y",
-    "q_z",
-    "axis_x",
-    "axis_y",
-    "axis_z",
-    "momentum_x_Nms",
-    "momentum_y_Nms",
-    "momentum_z_Nms",
-    "nutation_deg",
-    "body_cone_deg",
-    "space_cone_deg",
+    *("omega_1_rad_s", "omega_2_rad_s", "omega_3_rad_s"),
+    *("q_w", "q_x", "q_y", "q_z"),
+    *("axis_x", "axis_y", "axis_z"),
+    *("momentum_x_Nms", "momentum_y_Nms", "momentum_z_Nms"),
+    *("nutation_deg", "body_cone_deg", "space_cone_deg"),
     "pulse",
 )
 
@@ -242,14 +230,10 @@ def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) ->
     """The rows of `track_array` of all ``pieces`` as CSV, written as they come."""
     stream.write(f"{','.join(HEADER)}\r\n".encode())
     for piece in pieces:
-        if not len(piece.t):
-            continue
-        stream.write(_lines(track_array(piece, inertia).tolist()).encode())
-
-
-def _lines(rows: list[tuple[float, ...]]) -> str:
-    """Rows of finite numbers as CSV, each by its repr: the shortest text that reads back the same."""
-    return repr(rows)[2:-2].replace("), (", "\r\n").replace(", ", ",") + "\r\n"
+        if len(piece.t):
+            # Finite numbers each by their repr: the shortest text that reads back the same.
+            rows = repr(track_array(piece, inertia).tolist())[2:-2]
+            stream.write(rows.replace("), (", "\r\n").replace(", ", ",").encode() + b"\r\n")
 
 
 LARGEST = 1e15
@@ -264,14 +248,41 @@ MOST_ROWS = 100_000
 MOST_FAULTS = 5
 """Faults of one column that are listed."""
 
-Cells = dict[str, str]
+
+class Row(dict[str, str]):
+    """The cells of a ``line`` of a table by the names of the columns."""
+
+    def __init__(self, table: Table, line: int, cells: list[str]) -> None:
+        super().__init__(zip(table.header, (entry.strip() for entry in cells), strict=True))
+        self.table, self.line = table, line
+
+    def number(self, column: str) -> float | None:
+        """The number in a cell that must have one; None for a fault."""
+        text = self.get(column, "")
+        try:
+            value = float(text)
+        except ValueError:
+            self.fault(column, f"{shown(text)} is not a number")
+            return None
+        if abs(value) <= LARGEST:
+            return value
+        self.fault(column, f"{shown(text)} is out of range, {-LARGEST:g} to {LARGEST:g}")
+        return None
+
+    def fault(self, column: str, problem: str) -> None:
+        """Keep a fault in a cell."""
+        self.table.fault(self.line, column, problem)
+
+    def warn(self, subject: str, text: str) -> None:
+        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
+        self.table.warnings.setdefault(subject, []).append((self.line, text))
 
 
 class Table:
     """The rows of one file, below its first line, which names the columns.
 
-    ``header`` (the names) and ``rows``, each the number of its line and its cells. Raises CannotRead, and FaultyFile
-    for a file that is no table.
+    ``header`` (the names) and, from `expect` on, ``rows``. Raises CannotRead, and FaultyFile for a file that is no
+    table.
     """
 
     def __init__(self, path: str | Path, columns: Sequence[str], what: str) -> None:
@@ -289,15 +300,16 @@ class Table:
             raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
         if len(rows) > MOST_ROWS + 1:
             raise FaultyFile([Fault(self.name, rows[-1][0], 1, "", f"more than {MOST_ROWS} {what}")])
-        self.header, self.rows = [entry.strip() for entry in rows[0][1]], rows[1:]
+        self.header, self._lines = [entry.strip() for entry in rows[0][1]], rows[1:]
+        self.rows: list[Row] = []
         if len(self.header) == 1 and re.search(r"[;\t]", self.header[0]):
             problem = "columns are separated by commas, not by semicolons or tabs"
             raise FaultyFile([Fault(self.name, 1, 1, "", problem)])
 
     def expect(self, *columns: str) -> None:
-        """A fault for each of the ``columns`` that is missing, or that is given twice; raises FaultyFile with all.
+        """Read the rows; faults for those of other lengths, and ``columns`` that are missing, or that are given twice.
 
-        Warns of columns that are not known.
+        Raises FaultyFile with those of the columns. Warns of columns that are not known.
         """
         for column in columns:
             if column not in self.header:
@@ -307,63 +319,41 @@ class Table:
         self.check()
         for column in self.header:
             if column not in self.known:
-                self.warn(1, column, f"the column {shown(column)} is not known: ignored")
+                self.warnings[column] = [(1, f"the column {shown(column)} is not known: ignored")]
+        for line, cells in self._lines:
+            if len(cells) == len(self.header):
+                self.rows.append(Row(self, line, cells))
+            else:
+                self.fault(line, "", f"{len(cells)} values under {len(self.header)} columns")
 
     def check(self) -> None:
-        """Raise FaultyFile with the faults so far, if there are any; of many in one column with the first."""
-        if self.faults:
-            raise FaultyFile(self._first())
+        """Raise FaultyFile with the faults so far, if there are any.
 
-    def _first(self) -> list[Fault]:
-        """The faults, of more than `MOST_FAULTS` in one column the first and how many more there are."""
+        Of more than `MOST_FAULTS` in one column it has the first, and how many more there are.
+        """
         kept = []
         for where in dict.fromkeys(fault.where for fault in self.faults):
             every = [fault for fault in self.faults if fault.where == where]
             kept += every[:MOST_FAULTS]
             more = every[MOST_FAULTS:]
             kept += more if len(more) < 2 else [more[0]._replace(problem=f"and {len(more)} more such rows")]
-        return kept
+        if kept:
+            raise FaultyFile(kept)
 
     def misspelt(self, column: str) -> str:
         """The column of the header that may be meant to be a missing one, in words."""
         close = nearest(column, [entry for entry in self.header if entry not in self.known])
         return "" if close is None else f"; rename {shown(close)} if that is meant"
 
-    def cells(self, line: int, row: list[str]) -> Cells | None:
-        """The cells of a row by the names of the columns; None for a fault."""
-        if len(row) != len(self.header):
-            self.fault(line, "", f"{len(row)} values under {len(self.header)} columns")
-            return None
-        return dict(zip(self.header, (entry.strip() for entry in row), strict=True))
-
-    def number(self, line: int, cells: Cells, column: str) -> float | None:
-        """The number in a cell that must have one; None for a fault."""
-        try:
-            value = float(cells[column])
-        except ValueError:
-            self.fault(line, column, f"{shown(cells[column])} is not a number")
-            return None
-        if not abs(value) <= LARGEST:
-            problem = f"{shown(cells[column])} is out of range, {-LARGEST:g} to {LARGEST:g}"
-            self.fault(line, column, problem)
-            return None
-        return value
-
     def fault(self, line: int, where: str, problem: str) -> None:
         """Keep a fault in the column ``where``."""
         self.faults.append(Fault(self.name, line, 1, where, problem))
 
-    def warn(self, line: int, subject: str, text: str) -> None:
-        """Keep a warning; of several on one ``subject`` the first is given, with the number of others."""
-        self.warnings.setdefault(subject, []).append((line, text))
-
     @property
     def warned(self) -> list[str]:
         """The warnings in words, with file and line."""
-        return [self._worded(warnings) for warnings in self.warnings.values()]
-
-    def _worded(self, warnings: list[tuple[int, str]]) -> str:
-        line, text = warnings[0]
-        others = len(warnings) - 1
-        more = f" (and so in {others} more row{'s' if others > 1 else ''})" if others else ""
-        return f"{self.name}:{line}: {text}{more}"
+        words = []
+        for (line, text), *others in self.warnings.values():
+            more = f" (and so in {len(others)} more row{'s' if len(others) > 1 else ''})" if others else ""
+            words.append(f"{self.name}:{line}: {text}{more}")
+        return words

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nutdamp.common.time import Epoch
 from nutdamp.errors import BadRequest, Fault, FaultyFile
@@ -33,7 +34,7 @@ from nutdamp.estimation.parameters import (
     of_quaternions,
 )
 from nutdamp.files.ccsds.message import (
-    AEM_METADATA,
+    AEM_TABLE,
     BEFORE,
     BODY,
     QUATERNION_ANGVEL,
@@ -42,7 +43,6 @@ from nutdamp.files.ccsds.message import (
     VERSION,
     Checked,
     Frames,
-    Keyword,
     MessageBlock,
     expect_version,
     from_kvn,
@@ -50,7 +50,7 @@ from nutdamp.files.ccsds.message import (
     unit_length,
 )
 from nutdamp.files.tabular import HEADER as TRACK
-from nutdamp.files.tabular import Cells, Table
+from nutdamp.files.tabular import Table
 from nutdamp.files.yaml import read_bytes
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
@@ -62,18 +62,6 @@ AEM_VERSION = "CCSDS_AEM_VERS"
 
 COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}
 """Numbers in a record of each ATTITUDE_TYPE that is read, besides its time."""
-
-_OPTIONAL = {"ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"}
-_BEFORE = {"REF_FRAME_A": ("CENTER_NAME",), "STOP_TIME": ("USEABLE_START_TIME", "USEABLE_STOP_TIME")}
-_METADATA = tuple(
-    row
-    for keyword in AEM_METADATA
-    for row in (
-        *(Keyword(name, required=False, text=True) for name in _BEFORE.get(keyword.name, ())),
-        keyword._replace(required=keyword.name not in _OPTIONAL),
-    )
-)
-"""Table 4-3, but for the keywords of Euler angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,8 +135,6 @@ def read_history(path: str) -> History:
 
 
 class _HistoryReader(Frames):
-    """Segments of one message; problems go to ``faults``."""
-
     def __init__(self, path: str, faults: list[Fault]) -> None:
         super().__init__()
         self.path, self.faults = path, faults
@@ -159,7 +145,7 @@ class _HistoryReader(Frames):
 
     def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
         """Read a segment."""
-        block = Checked(self.path, metadata, _METADATA, self.faults)
+        block = Checked(self.path, metadata, AEM_TABLE, self.faults)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
@@ -253,29 +239,30 @@ def read_telemetry(
     if is_history(str(path)):
         history = read_history(str(path))
         record = record_of(history, spacecraft, schedule or Schedule())
-        if sun_pulses is not None:
-            record = _with_pulses(record, *read_sun_pulses(sun_pulses, spacecraft))
-        return record, [f"{path}: {remark}" for remark in history.remarks]
+        warnings = [f"{path}: {remark}" for remark in history.remarks]
+    else:
+        record, warnings = _read_samples(path, spacecraft, schedule or Schedule())
+    if sun_pulses is None:
+        return record, warnings
+    if len(record.sun_pulses):
+        warnings.append(f"{path}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}")
+    return _with_pulses(record, *_read_sun_pulses(sun_pulses, spacecraft)), warnings
+
+
+def _read_samples(path: str | Path, spacecraft: Spacecraft, schedule: Schedule) -> tuple[Record, list[str]]:
     table = Table(path, (*TIMES, *MEASURED, *TRACK), "samples")
     _expect_columns(table)
-    rows = [(line, cells) for line, row in table.rows if (cells := table.cells(line, row)) is not None]
     table.check()
-    times = _times(table, rows, spacecraft)
-    columns = {name: _column(table, rows, name) for name in MEASURED if name in table.header}
-    _expect_angles(table, rows, columns)
-    _expect_whole(table, rows, columns, spacecraft)
+    times = _times(table, spacecraft)
+    columns = {name: _column(table, name) for name in MEASURED if name in table.header}
+    _expect_angles(table, columns)
+    _expect_whole(table, columns, spacecraft)
     table.check()
-    signals = _signals(table, rows, columns, spacecraft)
+    signals = _signals(table, columns, spacecraft)
     _expect_unit(table, signals, spacecraft.spin)
-    seen, step = _sun_column(table, rows, times, columns.get(SUN_PULSE))
+    seen, step = _sun_column(table, times, columns.get(SUN_PULSE))
     table.check()
-    warnings = table.warned
-    if sun_pulses is not None:
-        if len(seen):
-            warnings.append(f"{table.name}: the column {SUN_PULSE} is ignored: the times are those of {sun_pulses}")
-        record = Record(times, signals, schedule=schedule or Schedule())
-        return _with_pulses(record, *read_sun_pulses(sun_pulses, spacecraft)), warnings
-    return Record(times, signals, seen, step, schedule or Schedule()), warnings
+    return Record(times, signals, seen, step, schedule), table.warned
 
 
 def _with_pulses(record: Record, pulses: Vector, aspects: Vector | None) -> Record:
@@ -297,52 +284,44 @@ def _spread(times: Vector, those: Vector, values: Vector) -> Vector:
     return spread
 
 
-def read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, Vector | None]:
-    """Times (k,) s of Sun pulses in a CSV file, and the Sun aspect angles (k,) rad if it has that column.
-
-    Raises CannotRead or FaultyFile.
-    """
+def _read_sun_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Vector, Vector | None]:
+    """Times (k,) s of Sun pulses in a CSV file, and the Sun aspect angles (k,) rad if it has that column."""
     table = Table(path, (*TIMES, ASPECTS), "Sun pulses")
     _expect_time(table)
     table.expect()
-    rows = [(line, cells) for line, row in table.rows if (cells := table.cells(line, row)) is not None]
     table.check()
-    times, aspects = _times(table, rows, spacecraft), None
-    if ASPECTS in table.header:
-        columns = {ASPECTS: _column(table, rows, ASPECTS)}
-        _expect_angles(table, rows, columns)
-        table.check()
-        aspects = np.radians(columns[ASPECTS])
-    return times, aspects
+    times = _times(table, spacecraft)
+    columns = {ASPECTS: _column(table, ASPECTS)} if ASPECTS in table.header else {}
+    _expect_angles(table, columns)
+    table.check()
+    return times, np.radians(columns[ASPECTS]) if columns else None
 
 
-def _expect_angles(table: Table, rows: Sequence[tuple[int, Cells]], columns: Mapping[str, Vector]) -> None:
-    """A fault for the first angle of each column that is none."""
+def _expect_angles(table: Table, columns: Mapping[str, Vector]) -> None:
     for name, (least, most) in LIMITS.items():
-        if name not in columns:
-            continue
-        wrong = np.flatnonzero((columns[name] < least) | (columns[name] > most))
-        if len(wrong):
-            table.fault(rows[wrong[0]][0], name, f"expected an angle of {least:g} to {most:g} deg")
+        if name in columns:
+            wrong = (columns[name] < least) | (columns[name] > most)
+            _fault_first(table, wrong, name, f"expected an angle of {least:g} to {most:g} deg")
 
 
-def _expect_whole(
-    table: Table, rows: Sequence[tuple[int, Cells]], columns: Mapping[str, Vector], spacecraft: Spacecraft
-) -> None:
+def _fault_first(table: Table, wrong: NDArray[np.bool_], name: str, problem: str) -> None:
+    """A fault in a column for the first of the rows (n,) that are ``wrong``."""
+    if wrong.any():
+        table.rows[int(wrong.argmax())].fault(name, problem)
+
+
+def _expect_whole(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> None:
     """A fault for the first row that has a part of a direction or of a quaternion; for a direction that is not said."""
+    there = {name: np.isfinite(values) for name, values in columns.items()}
     for group in (CROSSED, TOWARDS, QUATERNION):
-        if group[0] not in columns:
-            continue
-        there = np.isfinite([columns[name] for name in group])
-        wrong = np.flatnonzero(there.any(axis=0) & ~there.all(axis=0))
-        if len(wrong):
-            table.fault(rows[wrong[0]][0], group[0], f"expected all of {', '.join(group)}, or none")
-    if CROSSED[0] in columns:
-        told = np.isfinite(columns.get(TOWARDS[0], np.full(len(rows), math.nan)))
-        seen = np.isfinite(columns[CROSSED[0]])
-        if spacecraft.sun is None and (seen & ~told).any():
-            line = rows[int(np.flatnonzero(seen & ~told)[0])][0]
-            table.fault(line, TOWARDS[0], "no direction: that of the Sun needs the key sun in the spacecraft file")
+        if group[0] in columns:
+            parts = np.array([there[name] for name in group])
+            wrong = np.asarray(parts.any(axis=0) & ~parts.all(axis=0))
+            _fault_first(table, wrong, group[0], f"expected all of {', '.join(group)}, or none")
+    if CROSSED[0] in columns and spacecraft.sun is None:
+        wrong = there[CROSSED[0]] & ~there.get(TOWARDS[0], np.zeros(len(table.rows), dtype=bool))
+        problem = "no direction: that of the Sun needs the key sun in the spacecraft file"
+        _fault_first(table, wrong, TOWARDS[0], problem)
 
 
 def _expect_time(table: Table) -> None:
@@ -354,7 +333,6 @@ def _expect_time(table: Table) -> None:
 
 
 def _expect_columns(table: Table) -> None:
-    """Faults for columns that are missing, in other units, or that contradict each other."""
     _expect_time(table)
     header = table.header
     measured = [name for name in MEASURED if name in header]
@@ -378,7 +356,6 @@ def _expect_columns(table: Table) -> None:
 
 
 def _instead(name: str) -> str:
-    """The columns that a name may be meant as, with the units that there are."""
     lowered = name.lower()
     rates = ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]
     for word, columns in (
@@ -396,10 +373,10 @@ def _instead(name: str) -> str:
     return ""
 
 
-def _times(table: Table, rows: list[tuple[int, Cells]], spacecraft: Spacecraft) -> Vector:
+def _times(table: Table, spacecraft: Spacecraft) -> Vector:
     """Times of the rows, s from t = 0 of the spacecraft file; raises FaultyFile where they do not rise."""
     column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
-    if not rows:
+    if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
     epoch = None
     if column == TIMES[1]:
@@ -409,41 +386,31 @@ def _times(table: Table, rows: list[tuple[int, Cells]], spacecraft: Spacecraft) 
         else:
             epoch = Epoch.parse(given)
     table.check()
-    times = np.full(len(rows), math.nan)
+    times = np.full(len(table.rows), math.nan)
     latest = -math.inf
-    for index, (line, cells) in enumerate(rows):
-        time = table.number(line, cells, column) if epoch is None else _utc(table, line, cells, epoch)
+    for index, row in enumerate(table.rows):
+        try:
+            time = row.number(column) if epoch is None else Epoch.parse(row[column]).since(epoch)
+        except ValueError as wrong:
+            row.fault(column, str(wrong))
+            continue
         if time is None:
             continue
         if time <= latest:
-            text = f"{cells[column]} does not rise: the sample before is at {latest:.9g} s"
-            table.fault(line, column, text + (JUMPS if TRACK[-1] in table.header else ""))
+            text = f"{row[column]} does not rise: the sample before is at {latest:.9g} s"
+            row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
         times[index] = latest = time
     table.check()
     return times
 
 
-def _utc(table: Table, line: int, cells: Cells, epoch: Epoch) -> float | None:
-    try:
-        return Epoch.parse(cells["utc"]).since(epoch)
-    except ValueError as wrong:
-        table.fault(line, "utc", str(wrong))
-        return None
-
-
-def _column(table: Table, rows: list[tuple[int, Cells]], name: str) -> Vector:
+def _column(table: Table, name: str) -> Vector:
     """A column (n,), NaN where it is empty."""
-    values = np.full(len(rows), math.nan)
-    for index, (line, cells) in enumerate(rows):
-        if cells[name] and cells[name].lower() != "nan":
-            value = table.number(line, cells, name)
-            values[index] = math.nan if value is None else value
-    return values
+    numbers = (row.number(name) if row[name].lower() not in ("", "nan") else None for row in table.rows)
+    return np.array([math.nan if number is None else number for number in numbers])
 
 
-def _signals(
-    table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector], spacecraft: Spacecraft
-) -> dict[str, Vector]:
+def _signals(table: Table, columns: Mapping[str, Vector], spacecraft: Spacecraft) -> dict[str, Vector]:
     """Measured body rates, axis, attitude, directions and acceleration, in SI; quaternions go before the axis."""
     signals = {RATES[name][0]: RATES[name][1] * values for name, values in columns.items() if name in RATES}
     if ACCELERATIONS in columns:
@@ -453,14 +420,12 @@ def _signals(
     if ANGLES[0] in columns:
         signals |= dict(zip(AXIS, _towards(columns, ANGLES).T, strict=True))
     elif AXIS[0] in columns:
-        signals |= dict(zip(AXIS, _unit(table, rows, columns, AXIS, "axis").T, strict=True))
+        signals |= dict(zip(AXIS, _unit(table, columns, AXIS, "axis").T, strict=True))
     if QUATERNION[0] in columns:
-        signals |= of_quaternions(_unit(table, rows, columns, QUATERNION, "quaternion"), spacecraft)
+        signals |= of_quaternions(_unit(table, columns, QUATERNION, "quaternion"), spacecraft)
     if CROSSED[0] in columns:
         seen = _towards(columns, CROSSED)
-        to = np.full((len(rows), 3), math.nan)
-        if TOWARDS[0] in columns:
-            to = _towards(columns, TOWARDS)
+        to = _towards(columns, TOWARDS) if TOWARDS[0] in columns else np.full((len(table.rows), 3), math.nan)
         if spacecraft.sun is not None:
             to = np.where(np.isfinite(to), to, spacecraft.sun)
         signals |= dict(zip((*SEEN, *DIRECTION), np.column_stack([seen, to]).T, strict=True))
@@ -474,15 +439,12 @@ def _towards(columns: Mapping[str, Vector], names: Sequence[str]) -> Vector:
     return np.column_stack([across * np.cos(around), across * np.sin(around), np.sin(up)])
 
 
-def _unit(
-    table: Table, rows: list[tuple[int, Cells]], columns: Mapping[str, Vector], names: Sequence[str], what: str
-) -> Vector:
+def _unit(table: Table, columns: Mapping[str, Vector], names: Sequence[str], what: str) -> Vector:
     """Vectors (n, k) of length 1 by their columns; a fault for the first that has another length."""
     vectors = np.column_stack([columns[name] for name in names])
     sizes = np.linalg.norm(vectors, axis=1)
-    wrong = np.flatnonzero(np.abs(sizes - 1.0) > UNIT_LENGTH)
-    if len(wrong):
-        table.fault(rows[wrong[0]][0], names[0], f"the {what} has length {sizes[wrong[0]]:.4g}; expected 1")
+    wrong = np.abs(sizes - 1.0) > UNIT_LENGTH
+    _fault_first(table, wrong, names[0], f"the {what} has length {sizes[wrong.argmax()]:.4g}; expected 1")
     return np.asarray(vectors / sizes[:, None])
 
 
@@ -494,27 +456,27 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
     turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
-    of_values = (
-        {turned: "deg/s", per_minute: "rpm"} if RATES[column][1] == 1.0 else {1.0 / turned: "rad/s", 1.0 / 6.0: "rpm"}
-    )
-    of_file = {1.0 / turned: "deg/s", 1.0 / per_minute: "rpm"}
-    for units, where in ((of_values, "are the values of this column"), (of_file, "is the spin of the file")):
-        for size, unit in units.items():
-            if abs(ratio / size - 1.0) < SAME:
-                seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
-                table.fault(1, column, f"{seen}: {where} in {unit}?")
-                return
+    in_radians = RATES[column][1] == 1.0
+    of_values, of_file = "are the values of this column", "is the spin of the file"
+    for size, where, unit in (
+        (turned if in_radians else 1.0 / turned, of_values, "deg/s" if in_radians else "rad/s"),
+        (per_minute if in_radians else 1.0 / 6.0, of_values, "rpm"),
+        (1.0 / turned, of_file, "deg/s"),
+        (1.0 / per_minute, of_file, "rpm"),
+    ):
+        if abs(ratio / size - 1.0) < SAME:
+            seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
+            table.fault(1, column, f"{seen}: {where} in {unit}?")
+            return
 
 
-def _sun_column(
-    table: Table, rows: list[tuple[int, Cells]], times: Vector, values: Vector | None
-) -> tuple[Vector, float]:
+def _sun_column(table: Table, times: Vector, values: Vector | None) -> tuple[Vector, float]:
     """Times of Sun pulses (k,) s, half a sample before the rows that first show them, and the time between samples."""
     if values is None:
         return np.empty(0), 0.0
-    for (line, _), value in zip(rows, values, strict=True):
+    for row, value in zip(table.rows, values, strict=True):
         if np.isfinite(value) and value not in (0.0, 1.0):
-            table.fault(line, SUN_PULSE, f"expected 0 or 1, got {value:g}")
+            row.fault(SUN_PULSE, f"expected 0 or 1, got {value:g}")
     on = np.nan_to_num(values) > 0.5
     rising = np.flatnonzero(on[1:] & ~on[:-1]) + 1
     steps = np.diff(times)

@@ -17,29 +17,17 @@ from nutdamp.files.rules import (
     Vector,
     force_vector,
     norm,
-    symmetric,
-    tensor_fault,
-    tensor_of,
+    principal_of,
 )
 from nutdamp.files.study_keys import VALVE_TIMES, thrust_behind
 from nutdamp.files.yaml import Node
-from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.units import bar, shown
 
-_MOUNTING = ("position", "direction", "force")
-
-
-def thrusters(facts: Facts) -> Iterator[Finding]:
-    """Faults of each of the ``thrusters``."""
-    for index, node in facts.children("thrusters"):
-        if isinstance(node.value, dict):
-            yield from _thruster_keys(facts, ("thrusters", index))
-            yield from _thruster_values(facts, ("thrusters", index))
-
 
 def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
-    mounting = [key for key in _MOUNTING if facts.has(*path, key)]
+    needed = ("position", "direction", "force")
+    mounting = [key for key in needed if facts.has(*path, key)]
     given = " and ".join(mounting)
     if facts.has(*path, "torque"):
         if mounting:
@@ -48,9 +36,8 @@ def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     elif not mounting:
         yield Finding((*path, "torque"), "missing; give torque, or position, direction and force")
     else:
-        for key in _MOUNTING:
-            if key not in mounting:
-                yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
+        for key in (key for key in needed if key not in mounting):
+            yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
     if mounting and facts.has(*path, "lever_arm"):
         yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
 
@@ -59,7 +46,7 @@ def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     direction = facts.vector("number", 3, *path, "direction")
     if direction is not None and norm(direction) < SMALLEST:
         yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
-    elif _is_none(torque_of(facts, path)):
+    elif (torque := torque_of(facts, path)) is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1]):
         if facts.has(*path, "torque"):
             yield Finding((*path, "torque"), "zero; expected at least one component other than 0")
         else:
@@ -85,20 +72,13 @@ def torque_of(facts: Facts, path: KeyPath) -> tuple[Vector, float] | None:
     return np.cross(arm, force_vector(direction, force)), norm(position) * abs(force)
 
 
-def _is_none(torque: tuple[Vector, float] | None) -> bool:
-    """True where a torque is zero but for rounding; False where it is not known."""
-    return torque is not None and norm(torque[0]) <= max(SMALLEST, CANCELLED * torque[1])
-
-
 def on_times_of(facts: Facts, path: KeyPath) -> tuple[float, float]:
     """min_on_time and max_on_time in s; 0 and infinite where they are left out or cannot be read."""
-    least = facts.number("time", *path, "min_on_time")
     most = facts.number("time", *path, "max_on_time")
-    return (0.0 if least is None else least), (math.inf if most is None else most)
+    return facts.number("time", *path, "min_on_time") or 0.0, math.inf if most is None else most
 
 
-def channels(facts: Facts) -> Iterator[Finding]:
-    """Faults of the ``channels``: thrusters that fire together."""
+def _channels(facts: Facts) -> Iterator[Finding]:
     indices = {facts.text("thrusters", index, "name"): index for index, _ in facts.children("thrusters")}
     names = [name for name in indices if name is not None]
     for channel, node in facts.children("channels"):
@@ -107,15 +87,19 @@ def channels(facts: Facts) -> Iterator[Finding]:
         for index, entry in node.children():
             name = entry.value
             if not isinstance(name, str):
-                continue
-            if name not in indices:
+                pass  # reported already
+            elif name not in indices:
                 yield Finding((*path, index), f"no thruster is called {shown(name)}; {instead(name, names)}")
             elif (member := ("thrusters", indices[name])) in members:
                 yield Finding((*path, index), f"{shown(name)} is listed twice in this channel; expected once")
             else:
                 members.add(member)
         if members and len(members) == len(list(node.children())):
-            yield from _channel_values(facts, path, members)
+            times = [on_times_of(facts, member) for member in members]
+            least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
+            if least > most and all(shortest <= longest for shortest, longest in times):
+                problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
+                yield Finding(path, f"{problem}; let them fire in channels of their own")
 
 
 def instead(name: str, names: list[str]) -> str:
@@ -127,23 +111,6 @@ def instead(name: str, names: list[str]) -> str:
     return f"there are {', '.join(map(shown, few))}{' …' * (names != few)}" if names else "the file has none"
 
 
-def _channel_values(facts: Facts, path: KeyPath, members: set[KeyPath]) -> Iterator[Finding]:
-    times = [on_times_of(facts, member) for member in members]
-    least, most = max(shortest for shortest, _ in times), min(longest for _, longest in times)
-    if least > most and all(shortest <= longest for shortest, longest in times):
-        problem = f"min_on_time of one thruster, {least:g} s, exceeds max_on_time of another, {most:g} s"
-        yield Finding(path, f"{problem}; let them fire in channels of their own")
-
-
-def moments_of(facts: Facts) -> tuple[float, float, float] | None:
-    """Principal moments in kg m², the one about the spin axis last; None where they cannot be read."""
-    tensor = tensor_of(facts)
-    if tensor is not None:
-        return None if tensor_fault(tensor) else principal_axes(symmetric(tensor))[0]
-    A, C = (facts.number("inertia", "inertia", key) for key in ("A", "C"))
-    return None if A is None or C is None or A <= 0.0 or C <= 0.0 else (A, A, C)
-
-
 def thrusts(facts: Facts) -> dict[str, float | None]:
     """The thrust in N of each thruster of the file and its torquer; None where it is not known."""
     forces: dict[str, float | None] = {}
@@ -153,30 +120,28 @@ def thrusts(facts: Facts) -> dict[str, float | None]:
         if name is not None:
             torque = facts.vector("torque", 3, *path, "torque")
             size = None if torque is None else float(np.linalg.norm(torque))
-            lever = facts.number("length", *path, "lever_arm")
-            forces[name] = facts.number("force", *path, "force") or thrust_behind(size, lever or None)
+            lever = facts.number("length", *path, "lever_arm") or None
+            forces[name] = facts.number("force", *path, "force") or thrust_behind(size, lever)
     if facts.has("steerable") or not facts.children("thrusters"):
-        torque_, lever = facts.number("torque", "steerable", "torque"), facts.number("length", "steerable", "lever_arm")
-        forces[STEERABLE] = thrust_behind(torque_, lever or None)
+        lever = facts.number("length", "steerable", "lever_arm") or None
+        forces[STEERABLE] = thrust_behind(facts.number("torque", "steerable", "torque"), lever)
     return forces
-
-
-THRUST_KEYS = ("valve", "cold", "tank")
-"""Keys at the root of the file."""
 
 
 def thrust_findings(root: Node) -> Iterator[Finding]:
     """All faults of thrusters, channels, ``valve``, ``impulse_bit``, ``cold`` and ``tank``."""
     facts = Facts(root)
-    yield from thrusters(facts)
-    yield from channels(facts)
-    indices = [index for index, _ in facts.children("thrusters")]
-    for key in THRUST_KEYS:
-        if facts.has(key) and not indices:
+    thrusters = [("thrusters", index) for index, _ in facts.children("thrusters")]
+    for path in thrusters:
+        if facts.is_mapping(*path):
+            yield from _thruster_keys(facts, path)
+            yield from _thruster_values(facts, path)
+    yield from _channels(facts)
+    for key in ("valve", "cold", "tank"):
+        if facts.has(key) and not thrusters:
             yield Finding((key,), "applies to thrusters, and the file has none; leave it out", True)
     named, reported = thrusts(facts), set[KeyPath]()
-    for index in indices:
-        path: KeyPath = ("thrusters", index)
+    for path in thrusters:
         if facts.has(*path, "valve") and facts.has(*path, "impulse_bit"):
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
@@ -188,7 +153,7 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
     yield from _alike(facts, named)
-    if facts.has("tank") and indices:
+    if facts.has("tank") and thrusters:
         yield from _tank(facts, named)
 
 
@@ -200,35 +165,32 @@ def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
 
 
 def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
-    """A valve that closes before it opens, whatever the command."""
     opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
     longest = facts.number("time", *path, "max_on_time")
     if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
-        of = facts.text(*path, "name") or "a thruster"
-        problem = (
-            f"{opened:g} s is not less than max_on_time + close_delay = {longest + closed:g} s of {of}: its valve "
-            "closes before it opens, and no command gives thrust"
-        )
-        yield Finding((*valve, "open_delay"), problem)
+        name, least = facts.text(*path, "name") or "a thruster", f"{longest + closed:g} s"
+        problem = f"{opened:g} s is not less than max_on_time + close_delay = {least} of {name}: its valve closes"
+        yield Finding((*valve, "open_delay"), f"{problem} before it opens, and no command gives thrust")
 
 
 def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Finding]:
-    """Faults of an impulse_bit; ``thrust`` N, None where it is not known."""
     table: KeyPath = (*path, "impulse_bit")
     rows = [
         [facts.number(kind, *table, row, column) for column, kind in enumerate(("time", "impulse", "time"))]
         for row, _ in facts.children(*table)
     ]
+    rising = "expected rows with rising on-times and impulses"
+    columns = (
+        ("on-time", "s", "not above", rising),
+        ("impulse", "N s", "not above", rising),
+        ("centroid", "s", "before", "expected one not earlier"),
+    )
     for number, (before, row) in enumerate(pairwise(rows), start=1):
-        for column, what, unit in ((0, "on-time", "s"), (1, "impulse", "N s")):
+        for column, (what, unit, wrong, cure) in enumerate(columns):
             value, last = row[column], before[column]
-            if value is not None and last is not None and value <= last:
-                problem = f"{what} {value:g} {unit} is not above that of the row before, {last:g} {unit}"
-                yield Finding((*table, number, column), f"{problem}; expected rows with rising on-times and impulses")
-        value, last = row[2], before[2]
-        if value is not None and last is not None and value < last:
-            problem = f"centroid {value:g} s is before that of the row before, {last:g} s; expected one not earlier"
-            yield Finding((*table, number, 2), problem)
+            if value is not None and last is not None and (value < last or (column < 2 and value == last)):
+                problem = f"{what} {value:g} {unit} is {wrong} that of the row before, {last:g} {unit}; {cure}"
+                yield Finding((*table, number, column), problem)
     if thrust is None:
         if facts.has(*path, "force") or facts.has(*path, "lever_arm"):
             return  # what cannot be read is reported already
@@ -239,11 +201,9 @@ def _table(facts: Facts, path: KeyPath, thrust: float | None) -> Iterator[Findin
             continue
         lasts = impulse / thrust
         if centroid < 0.5 * lasts:
-            problem = (
-                f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the thrust "
-                f"would begin before the command; expected at least {0.5 * lasts:g} s"
-            )
-            yield Finding((*table, number, 2), problem)
+            problem = f"{centroid:g} s is too early: {impulse:g} N s take {lasts:g} s at {thrust:g} N, so that the"
+            cure = f"expected at least {0.5 * lasts:g} s"
+            yield Finding((*table, number, 2), f"{problem} thrust would begin before the command; {cure}")
     first, last = (rows[0][0], rows[-1][0]) if rows else (None, None)
     least, most = (facts.number("time", *path, key) for key in ("min_on_time", "max_on_time"))
     if last is not None and least is not None and least >= last:
@@ -266,7 +226,6 @@ def _alike(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
 
 
 def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
-    """Faults of the tank; ``named`` are the thrusts of the thrusters, N."""
     full, empty = (facts.number("pressure", "tank", key) for key in ("pressure", "final_pressure"))
     if full is not None and empty is not None and empty > full > 0.0:
         problem = f"{bar(empty)} exceeds pressure: it falls as propellant is used; expected at most {bar(full)}"
@@ -287,36 +246,36 @@ def _tank(facts: Facts, named: dict[str, float | None]) -> Iterator[Finding]:
         yield from _emptied(facts, propellant)
     for index, _ in facts.children("thrusters"):
         name = facts.text("thrusters", index, "name") or ""
+        problem = "missing; tank needs to know the propellant that is used"
         if not facts.has("tank", "isp") and not facts.has("thrusters", index, "isp"):
-            problem = "missing; tank needs to know the propellant that is used, by isp here or in tank"
-            yield Finding(("thrusters", index, "isp"), problem)
+            yield Finding(("thrusters", index, "isp"), f"{problem}, by isp here or in tank")
         if named.get(name, 0.0) is None and not facts.has("thrusters", index, "force"):
-            problem = "missing; tank needs to know the propellant that is used, and so the thrust"
-            yield Finding(("thrusters", index, "lever_arm"), problem)
+            yield Finding(("thrusters", index, "lever_arm"), f"{problem}, and so the thrust")
 
 
 def _emptied(facts: Facts, propellant: float) -> Iterator[Finding]:
     """Moments of inertia that no body can have once all ``propellant`` kg are used."""
     path: KeyPath = ("tank", "inertia_per_kg")
-    moments, rows = moments_of(facts), facts.vector("shed", 3, *path)
+    principal, rows = principal_of(facts), facts.vector("shed", 3, *path)
     transverse, axial = (facts.number("shed", *path, key) for key in "AC")
     if rows is None and transverse is not None and axial is not None:
         rows = np.array([transverse, transverse, axial])
-    if moments is None or rows is None or rows.min() < 0.0:
+    if principal is None or rows is None or rows.min() < 0.0:
         return  # what cannot be read, or is out of range, is reported already
-    empty = np.asarray(moments) - propellant * rows
-    values = ", ".join(f"{moment:.4g}" for moment in empty)
+    moments = np.asarray(principal[0])
+    empty = moments - propellant * rows
+    leaves = f"leaves {', '.join(f'{moment:.4g}' for moment in empty)} kg m^2 once {propellant:g} kg are used"
     least, middle, largest = np.sort(empty).tolist()
     if least <= 0.0:
         worst = int(np.argmax(rows / moments))
         most = f"expected less than {moments[worst] / propellant:.4g} kg m^2/kg of the moment {moments[worst]:g} kg m^2"
-        yield Finding(path, f"leaves {values} kg m^2 once {propellant:g} kg are used, all must be above 0; {most}")
+        yield Finding(path, f"{leaves}, all must be above 0; {most}")
     elif empty[2] == middle and least < middle < largest:
-        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the moment about axis 3 is the middle one"
-        yield Finding(path, f"{problem}, about which a spin is unstable; expected the largest or the least")
+        problem = "the moment about axis 3 is the middle one, about which a spin is unstable"
+        yield Finding(path, f"{leaves}: {problem}; expected the largest or the least")
     elif largest > (least + middle) * (1.0 + 1e-9):
-        problem = f"leaves {values} kg m^2 once {propellant:g} kg are used: the largest exceeds the sum of the others"
-        yield Finding(path, f"{problem}, which no body has; expected less off the smaller ones, or more off it")
+        problem = "the largest exceeds the sum of the others, which no body has"
+        yield Finding(path, f"{leaves}: {problem}; expected less off the smaller ones, or more off it")
 
 
 def _kind(facts: Facts, index: str | int, thrust: float | None) -> tuple[float | str | None, ...]:

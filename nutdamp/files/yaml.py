@@ -230,8 +230,6 @@ class _Events(Reader, Scanner, Parser):
 
 
 class _Builder:
-    """Builds the nodes of one text from its events."""
-
     def __init__(self, text: str, name: str) -> None:
         self.text, self.name = text, name
         self.faults: list[Fault] = []

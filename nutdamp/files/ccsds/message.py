@@ -67,10 +67,7 @@ _FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
 _QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
 _ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
-_SPIN = (
-    *_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"),
-    *_numbers("SPIN_ANGLE_VEL", unit="deg/s"),
-)
+_SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
 """Keywords of the direction of H, and of the rate of the spin axis about it."""
 
@@ -80,11 +77,7 @@ HEADER = (
     *_text("MESSAGE_ID", required=False),
 )
 
-APM_METADATA = (
-    *_text("OBJECT_NAME", "OBJECT_ID"),
-    *_text("CENTER_NAME", required=False),
-    *_text("TIME_SYSTEM"),
-)
+APM_METADATA = (*_text("OBJECT_NAME", "OBJECT_ID"), *_text("CENTER_NAME", required=False), *_text("TIME_SYSTEM"))
 
 APM_BLOCKS: dict[str, Layout] = {
     "QUAT": Layout(
@@ -154,11 +147,23 @@ OPM_BLOCKS: dict[str, Layout] = {
 }
 """Keywords written in the blocks of an OPM, in their order; the names of the blocks are not in the message."""
 
+LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
+
 AEM_METADATA = _text(
     *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
     *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
 )
 """Keywords of table 4-3 that are written."""
+
+AEM_TABLE = (
+    *_text("OBJECT_NAME", "OBJECT_ID"),
+    *_text("CENTER_NAME", required=False),
+    *_text("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
+    *_text("USEABLE_START_TIME", "USEABLE_STOP_TIME", required=False),
+    *_text("STOP_TIME", "ATTITUDE_TYPE"),
+    *_text("ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE", required=False),
+)
+"""Table 4-3, but for the keywords of Euler angles."""
 
 QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/NUTATION_MOM"
 """Values of ATTITUDE_TYPE."""
@@ -278,29 +283,23 @@ def to_xml(message: Message) -> str:
         _fill(SubElement(place, "metadata"), segment.metadata)
         data = SubElement(place, "data")
         for block in segment.blocks:
-            layout = {**APM_BLOCKS, **OPM_BLOCKS}.get(block.name)
-            if layout is None:
-                _fill(data, block)
-            else:
-                _fill(SubElement(data, layout.tag), block, layout.keywords)
+            layout = LAYOUTS.get(block.name)
+            _fill(data if layout is None else SubElement(data, layout.tag), block, layout)
         for record in segment.records:
             assert segment.record is not None
             tag, rows = segment.record
             entries = (MessageEntry(row.name, value, row.unit) for row, value in zip(rows, record, strict=True))
-            _entries(SubElement(SubElement(data, "attitudeState"), tag), entries, rows)
+            state = SubElement(SubElement(data, "attitudeState"), tag)
+            _fill(state, MessageBlock("", tuple(entries)), segment.record)
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
 
 
-def _fill(place: Element, block: MessageBlock, keywords: tuple[Keyword, ...] = ()) -> None:
+def _fill(place: Element, block: MessageBlock, layout: Layout | None = None) -> None:
     for comment in block.comments:
         SubElement(place, "COMMENT").text = comment
-    _entries(place, block.entries, keywords)
-
-
-def _entries(place: Element, entries: Iterable[MessageEntry], keywords: tuple[Keyword, ...]) -> None:
-    wraps = {keyword.name: keyword.tag for keyword in keywords}
-    for tag, group in groupby(entries, lambda entry: wraps.get(entry.keyword, "")):
+    wraps = {keyword.name: keyword.tag for keyword in layout.keywords} if layout else {}
+    for tag, group in groupby(block.entries, lambda entry: wraps.get(entry.keyword, "")):
         parent = SubElement(place, tag) if tag else place
         for entry in group:
             SubElement(parent, entry.keyword, {"units": entry.unit} if entry.unit else {}).text = entry.value
@@ -422,34 +421,29 @@ class Checked:
     def __init__(self, file: str, block: MessageBlock, keywords: tuple[Keyword, ...], faults: list[Fault]) -> None:
         self.file, self.block, self.faults = file, block, faults
         self.entries: dict[str, MessageEntry] = {}
-        self._known = {keyword.name: keyword for keyword in keywords}
-        self._fill()
-        for keyword in keywords:
-            if keyword.required and keyword.name not in self.entries:
-                self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
-
-    def _fill(self) -> None:
-        order = list(self._known)
-        last = ""
-        for entry in self.block.entries:
+        known = {keyword.name: keyword for keyword in keywords}
+        order, last = list(known), ""
+        for entry in block.entries:
             name = entry.keyword
-            if name not in self._known:
+            if name not in known:
                 close = nearest(name, order)
                 cure = f"did you mean {close}?" if close else f"known here: {', '.join(order)}"
-                self.faults.append(Fault(self.file, entry.line, 1, name, f"unknown keyword; {cure}"))
+                self.faults.append(Fault(file, entry.line, 1, name, f"unknown keyword; {cure}"))
             elif name in self.entries:
                 first = self.entries[name].line
-                self.faults.append(Fault(self.file, entry.line, 1, name, f"given again, first in line {first}"))
+                self.faults.append(Fault(file, entry.line, 1, name, f"given again, first in line {first}"))
             else:
                 self.entries[name] = entry
                 if last and order.index(name) < order.index(last):
                     self.fault(name, f"comes after {last}; the order of the standard is {', '.join(order)}")
                 else:
                     last = name
-                self._form(entry, self._known[name])
+                self._form(entry, known[name])
+        for keyword in keywords:
+            if keyword.required and keyword.name not in self.entries:
+                self.fault(keyword.name, f"missing{f' in this {block.name} block' if block.name else ''}")
 
     def _form(self, entry: MessageEntry, keyword: Keyword) -> None:
-        """Check that the value is of the kind in the table, and in its unit."""
         if not entry.value:
             self.fault(keyword.name, "empty; expected a value")
         elif not keyword.text and not _NUMBER.fullmatch(entry.value):
@@ -468,8 +462,7 @@ class Checked:
 
     def text(self, keyword: str) -> str | None:
         """The value as it is; None where it is missing or empty."""
-        entry = self.entries.get(keyword)
-        return entry.value or None if entry else None
+        return self.entries[keyword].value or None if keyword in self.entries else None
 
     def number(self, keyword: str) -> float | None:
         """The value as a number."""

@@ -11,7 +11,6 @@ import json
 import math
 import re
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -96,19 +95,14 @@ def read_apm(path: str) -> ApmContents:
 
 
 class _MessageReader(Frames):
-    """One message; problems go to ``faults``."""
-
     def __init__(self, path: str, blocks: list[MessageBlock], faults: list[Fault]) -> None:
         super().__init__()
         self.path, self.faults = path, faults
         self.outside = Checked(path, blocks[0], _OUTSIDE, faults)
         self.blocks: dict[str, list[Checked]] = {name: [] for name in APM_BLOCKS}
         self.nutation: float | None = None
-        self._sort(blocks[1:])
-
-    def _sort(self, blocks: list[MessageBlock]) -> None:
         order, last = list(APM_BLOCKS), ""
-        for block in blocks:
+        for block in blocks[1:]:
             if block.name not in APM_BLOCKS:
                 known = ", ".join(f"{name}_START" for name in order)
                 self._fault(block.line, f"{block.name}_START", f"unknown block; known are {known}")
@@ -123,8 +117,8 @@ class _MessageReader(Frames):
     def _fault(self, line: int, where: str, problem: str) -> None:
         self.faults.append(Fault(self.path, line, 1, where, problem))
 
-    def _one(self, name: str) -> Checked | None:
-        return self.blocks[name][0] if self.blocks[name] else None
+    def _first(self, name: str) -> Checked | None:
+        return next(iter(self.blocks[name]), None)
 
     def read(self) -> ApmContents | None:
         """The contents; None where faults leave none."""
@@ -161,14 +155,14 @@ class _MessageReader(Frames):
         """Quaternion body -> frame of QUAT, or of EULER."""
         turn: Vector | None = None
         forward: bool | None = None
-        block = self._one("QUAT")
+        block = self._first("QUAT")
         if block is not None:
             forward, parts = self.endpoints(block), block.numbers("QC", "Q1", "Q2", "Q3")
             if parts is not None and not unit_length(parts, UNIT):
                 block.fault("Q1", f"the quaternion has length {math.hypot(*parts):.6g}; expected 1")
             elif parts is not None and forward is not None:
                 turn = np.array(parts) / math.hypot(*parts)
-        elif (block := self._one("EULER")) is not None:
+        elif (block := self._first("EULER")) is not None:
             forward, parts = self.endpoints(block), block.numbers("ANGLE_1", "ANGLE_2", "ANGLE_3")
             sequence = block.text("EULER_ROT_SEQ") or ""
             if not re.fullmatch("[XYZ]{3}", sequence) or sequence[1] in (sequence[0], sequence[2]):
@@ -179,7 +173,7 @@ class _MessageReader(Frames):
 
     def _rates(self, quaternion: Vector | None) -> Vector | None:
         """Rates of the body against the frame, in body axes, rad/s."""
-        block = self._one("ANGVEL")
+        block = self._first("ANGVEL")
         if block is None:
             return None
         forward, parts = self.endpoints(block), block.numbers("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
@@ -201,7 +195,7 @@ class _MessageReader(Frames):
 
     def _spin(self, quaternion: Vector | None, rates: Vector | None) -> tuple[Vector | None, Vector | None]:
         """Fill in values that the other blocks lack; remark where SPIN contradicts them."""
-        block = self._one("SPIN")
+        block = self._first("SPIN")
         if block is None or self.endpoints(block, reversible=False) is None:
             return quaternion, rates
         angles = block.numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", "SPIN_ANGLE_VEL")
@@ -226,14 +220,15 @@ class _MessageReader(Frames):
             right, up, about_momentum = map(math.radians, values)
             momentum = np.array([math.cos(up) * math.cos(right), math.cos(up) * math.sin(right), math.sin(up)])
             rate += about_momentum * (attitude.matrix(turn).T @ momentum)
-        if quaternion is not None and not _same_turn(quaternion, turn):
+        off = 0.0 if quaternion is None else min(np.linalg.norm(quaternion - sign * turn) for sign in (1.0, -1.0))
+        if off > 0.5 * AGREES:
             self.remark(f"line {block.block.line}: SPIN gives another attitude than the blocks before it, which count")
         if rates is not None and not np.allclose(rates, rate, rtol=0.0, atol=AGREES * np.linalg.norm(rates)):
             self.remark(f"line {block.block.line}: SPIN gives other rates than ANGVEL, which counts")
         return turn if quaternion is None else quaternion, rate if rates is None else rates
 
     def _inertia(self) -> Vector | None:
-        block = self._one("INERTIA")
+        block = self._first("INERTIA")
         if block is None:
             return None
         self.body_frame(block, "INERTIA_REF_FRAME", block.text("INERTIA_REF_FRAME"))
@@ -279,11 +274,6 @@ def euler(sequence: str, *angles: float) -> Vector:
     return turn
 
 
-def _same_turn(first: Vector, second: Vector) -> bool:
-    """True where two quaternions are the same attitude within `AGREES`."""
-    return float(min(np.linalg.norm(first - second), np.linalg.norm(first + second))) <= 0.5 * AGREES
-
-
 ALIKE = 1e-9
 """Relative difference up to which torques count as transverse, and as of one magnitude."""
 
@@ -301,14 +291,14 @@ def imported(contents: ApmContents, path: str) -> tuple[str, Spacecraft, Schedul
     Raises FaultyFile, with lines of the message, where its contents cannot be a spacecraft for nutdamp.
     """
     if contents.tensor is None:
-        problem = (
-            "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has them"
-        )
-        raise FaultyFile([Fault(path, 1, 1, "INERTIA", problem)])
-    bare = _read(spacecraft_text(contents, path, None), contents, path)
+        problem = "missing; a spacecraft file needs moments of inertia: --into merges the message into one that has"
+        raise FaultyFile([Fault(path, 1, 1, "INERTIA", f"{problem} them")])
+    bare = _read(_file_text(contents, path, None), contents, path)
     torques = [bare.inertia.axes.T @ manoeuvre.torque for manoeuvre in contents.manoeuvres]
-    torquer = _torquer(torques)
-    text = spacecraft_text(contents, path, torquer)
+    sizes = [float(np.linalg.norm(torque)) for torque in torques]
+    transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
+    alike = sizes and transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes)
+    text = _file_text(contents, path, sizes[0] if alike else None)
     body = _read(text, contents, path)
     return text, body, _schedule(contents.manoeuvres, body)
 
@@ -337,20 +327,19 @@ def _read(text: str, contents: ApmContents, path: str) -> Spacecraft:
         raise FaultyFile(faults) from None
 
 
-def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> str:
+def _file_text(contents: ApmContents, path: str, torquer: float | None) -> str:
     """The spacecraft file as YAML; ``torquer`` N m is the torque of a steerable torquer, or None."""
+    # Texts are in double quotes, in which JSON and YAML agree.
     lines = [
         f"# From the attitude parameter message {printable(path)}; numbers as given there.",
         "# An APM knows no thruster layout, no mass, no requirement and no limits: add them.",
-        f"name: {_text(contents.name)}",
+        f"name: {json.dumps(contents.name, ensure_ascii=False)}",
     ]
     if contents.object_id is not None:
-        lines.append(f"object_id: {_text(contents.object_id)}")
+        lines.append(f"object_id: {json.dumps(contents.object_id, ensure_ascii=False)}")
     assert contents.tensor is not None
-    lines += [
-        *_inertia(contents.tensor),
-        f"omega0: [{', '.join(f'{rate!r} deg/s' for rate in _degrees(contents.rates))}]",
-    ]
+    rates = ", ".join(f"{math.degrees(rate)!r} deg/s" for rate in contents.rates.tolist())
+    lines += [*_inertia(contents.tensor), f"omega0: [{rates}]"]
     if contents.quaternion is not None:
         parts = ", ".join(repr(part) for part in contents.quaternion.tolist())
         lines += [
@@ -361,15 +350,6 @@ def spacecraft_text(contents: ApmContents, path: str, torquer: float | None) -> 
         ]
     lines += _actuators(contents.manoeuvres, torquer)
     return "\n".join(lines) + "\n"
-
-
-def _text(value: str) -> str:
-    """A text in double quotes, in which JSON and YAML agree."""
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _degrees(rates: Vector) -> list[float]:
-    return [math.degrees(rate) for rate in rates.tolist()]
 
 
 def _inertia(tensor: Vector) -> list[str]:
@@ -402,15 +382,6 @@ def _actuators(manoeuvres: tuple[Manoeuvre, ...], torquer: float | None) -> list
     ]
 
 
-def _torquer(torques: list[Vector]) -> float | None:
-    """The torque in N m that all have, where all are transverse (principal axes); None else."""
-    if not torques:
-        return None
-    sizes = [float(np.linalg.norm(torque)) for torque in torques]
-    transverse = all(abs(torque[2]) <= ALIKE * size for torque, size in zip(torques, sizes, strict=True))
-    return sizes[0] if transverse and max(sizes) - min(sizes) <= ALIKE * max(sizes) else None
-
-
 def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
     """The manoeuvres as pulses of the steerable torquer; one that overlaps another has a name of its own."""
     pulses: list[Pulse] = []
@@ -432,60 +403,39 @@ def _schedule(manoeuvres: tuple[Manoeuvre, ...], body: Spacecraft) -> Schedule:
     return Schedule(tuple(pulses))
 
 
-class MessageMotion(NamedTuple):
-    """Motion at an ``epoch`` in body axes: ``quaternion`` (4,) body -> frame, ``rates`` (3,) rad/s, ``tensor`` (3, 3).
+def merged_text(source: Source, message: ApmContents | History, at: float = 0.0, *, inertia: bool) -> str:
+    """The text of a spacecraft file with the motion of a message; with its ``inertia`` where that is asked for.
 
-    None for what the message does not give.
+    Of a history it is that of the first record from ``at`` s after its first on. Raises BadRequest where the message
+    does not give what is asked for, or nothing, and where the file would be none for nutdamp.
     """
-
-    epoch: Epoch
-    frame: str | None
-    quaternion: Vector | None
-    rates: Vector | None
-    tensor: Vector | None
-
-
-def motion_of(message: ApmContents | History, at: float = 0.0) -> MessageMotion:
-    """Motion in a message; of a history that of the first record from ``at`` s after its first on."""
-    if isinstance(message, ApmContents):
-        return MessageMotion(message.epoch, message.frame, message.quaternion, message.rates, message.tensor)
-    index = message.at(at)
-    rates = None if message.rates is None else message.rates[index]
-    epoch = message.epoch.plus(float(message.times[index]))
-    return MessageMotion(epoch, message.frame, message.quaternions[index], rates, None)
-
-
-def merged_text(source: Source, motion: MessageMotion, *, inertia: bool) -> str:
-    """The text of a spacecraft file with the ``motion`` of a message; with its ``inertia`` where that is asked for.
-
-    Raises BadRequest where the message does not give what is asked for, or nothing; FaultyFile where the file would be
-    none for nutdamp.
-    """
-    if inertia and motion.tensor is None:
+    if isinstance(message, History):
+        index, tensor = message.at(at), None
+        turn, given = message.quaternions[index], None if message.rates is None else message.rates[index]
+        epoch = message.epoch.plus(float(message.times[index]))
+    else:
+        turn, given, tensor, epoch = message.quaternion, message.rates, message.tensor, message.epoch
+    if inertia and tensor is None:
         raise BadRequest("the message has no inertia to merge")
-    if motion.quaternion is None and motion.rates is None:
-        raise BadRequest("the message has neither an attitude nor rates to merge")
     before = source.read(lambda _: None)
     after = before
-    if inertia and motion.tensor is not None:
-        after = replace(after, inertia=Inertia(*principal_axes(motion.tensor), before.inertia.wheel))
+    if inertia and tensor is not None:
+        after = replace(after, inertia=Inertia(*principal_axes(tensor), before.inertia.wheel))
     axes = after.inertia.axes
-    rates = before.rates if motion.rates is None else motion.rates
-    after = replace(after, omega0=axes.T @ rates)
+    after = replace(after, omega0=axes.T @ (before.rates if given is None else given))
     first, second, third = after.omega0.tolist()
     quaternion = before.initial.quaternion
-    if motion.quaternion is not None:
-        quaternion = attitude.multiply(motion.quaternion, attitude.from_matrix(axes))
-        given = Attitude(motion.quaternion, epoch_after(motion.epoch.text, 0.0), motion.frame)
-        after = replace(after, attitude=given)
+    if turn is not None:
+        quaternion = attitude.multiply(turn, attitude.from_matrix(axes))
+        after = replace(after, attitude=Attitude(turn, epoch_after(epoch.text, 0.0), message.frame))
     later = Later(before, after, SpinState(complex(first, second), third, quaternion))
 
     def edits(tree: Node) -> Edits:
         if inertia:
             yield from inertia_edits(tree, later)
-        if motion.rates is not None:
+        if given is not None:
             yield from rate_edits(tree, later)
-        if motion.quaternion is not None:
+        if turn is not None:
             yield from attitude_edits(tree, later)
 
     text = carry_text(*source, edits)

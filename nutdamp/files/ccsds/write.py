@@ -13,7 +13,6 @@ momentum. Nutation by annex F5 is the steady motion of bodies symmetric about ax
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +24,11 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     AEM_RECORDS,
-    APM_BLOCKS,
     APM_METADATA,
     BODY_FRAME,
     HEADER,
+    LAYOUTS,
     MOMENTUM,
-    OPM_BLOCKS,
     OPM_METADATA,
     QUATERNION_ANGVEL,
     SPIN,
@@ -49,7 +47,7 @@ from nutdamp.flight.end_state import momentum_gained
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Inertia, Orbit, Spacecraft, Vector
+from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 AXIS = 1e-12
@@ -109,22 +107,35 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     Raises BadRequest for an ideal impulse, which has no duration and so no manoeuvre block.
     """
     body = plan.spacecraft
-    spins = spinning(body.inertia)
-    state = block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *unsaid(body), *_spinless(spins))
-    blocks = [state, *_motion(body, reference.frame)]
-    if spins:
-        blocks.append(_apm_block("SPIN", {**_frames(reference.frame), **_spin(body)}))
-    blocks.append(_apm_block("INERTIA", _inertia(body)))
+    frames: Values = {"REF_FRAME_A": reference.frame, "REF_FRAME_B": BODY_FRAME}
+    motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
+    rates, quaternion = map(cleaned, motion)
+    scalar, *vector = quaternion.tolist()
+    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
+    turn = zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True)
+    blocks = [
+        block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *_unsaid(body)),
+        _block("QUAT", {**frames, **dict(turn)}),
+        _block("ANGVEL", {**frames, "ANGVEL_FRAME": BODY_FRAME, **_angular_velocity(rates)}),
+    ]
+    if spinning(body.inertia):
+        spin = spin_values(body.inertia, *(values[None] for values in motion))
+        values = {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
+        blocks.append(_block("SPIN", {**frames, **values}))
+    blocks.append(_block("INERTIA", _inertia(body)))
     blocks += [
-        _apm_block("MAN", _apm_manoeuvre(pulse, number, body, reference), *notes_on(pulse, number, reference))
+        _block("MAN", _apm_manoeuvre(pulse, number, body, reference), *_notes_on(pulse, number, reference))
         for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
     ]
-    about = block("", APM_METADATA, {**identity(body), "TIME_SYSTEM": "UTC"})
-    return Message("APM", header(plan, created), (Segment(about, tuple(blocks)),))
+    about = block("", APM_METADATA, {**_identity(body), "TIME_SYSTEM": "UTC"})
+    return Message("APM", _header(plan, created), (Segment(about, tuple(blocks)),))
 
 
-def header(plan: Plan, created: Epoch) -> MessageBlock:
-    """Originator, date and object of the message."""
+def _block(name: str, values: Values, *comments: str) -> MessageBlock:
+    return block(name, LAYOUTS[name].keywords, values, *comments)
+
+
+def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
     values: Values = {
         "CREATION_DATE": moment,
@@ -134,13 +145,11 @@ def header(plan: Plan, created: Epoch) -> MessageBlock:
     return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
 
 
-def identity(body: Spacecraft) -> Values:
-    """Name and designator of the object."""
+def _identity(body: Spacecraft) -> Values:
     return {"OBJECT_NAME": label(body.name), "OBJECT_ID": label(body.object_id or "")}
 
 
-def unsaid(body: Spacecraft) -> list[str]:
-    """Notes on parts of the spacecraft file that a message of state and pulses cannot hold."""
+def _unsaid(body: Spacecraft) -> list[str]:
     remarks = []
     if body.disturbances:
         remarks.append("The disturbances of the spacecraft file are not in this message.")
@@ -153,11 +162,12 @@ def unsaid(body: Spacecraft) -> list[str]:
     if per_kg is not None:
         values = ", ".join(f"{moment:.9g}" for moment in per_kg)
         remarks.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
+    if not spinning(body.inertia):
+        remarks.append("No SPIN block: the body is not symmetric about its third axis, as the model of that block is.")
     return remarks
 
 
-def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
-    """Comments on the manoeuvre of a pulse: its channel, and the command behind a pulse through a valve."""
+def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
     comments = [f"pulse {number}: {pulse.channel}"]
     if pulse.through_valve:
         start, on_time = pulse.loaded
@@ -166,40 +176,9 @@ def notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
     return comments
 
 
-def _spinless(spins: bool) -> list[str]:
-    if spins:
-        return []
-    return ["No SPIN block: the body is not symmetric about its third axis, as the model of that block is."]
-
-
-def _apm_block(name: str, values: Values, *comments: str) -> MessageBlock:
-    return block(name, APM_BLOCKS[name].keywords, values, *comments)
-
-
-def _frames(frame: str) -> Values:
-    return {"REF_FRAME_A": frame, "REF_FRAME_B": BODY_FRAME}
-
-
-def _motion(body: Spacecraft, frame: str) -> list[MessageBlock]:
-    """Attitude and angular velocity at t = 0."""
-    rates, quaternion = map(cleaned, body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion))
-    scalar, *vector = quaternion.tolist()
-    # The quaternion from A to B turns the axes of A into those of B (annex F2), as body -> inertial turns vectors.
-    turn: Values = dict(zip(("Q1", "Q2", "Q3", "QC"), (*vector, scalar), strict=True))
-    rate: Values = {"ANGVEL_FRAME": BODY_FRAME, **angular_velocity(rates)}
-    return [_apm_block("QUAT", {**_frames(frame), **turn}), _apm_block("ANGVEL", {**_frames(frame), **rate})]
-
-
-def angular_velocity(rates: Vector) -> dict[str, float]:
+def _angular_velocity(rates: Vector) -> dict[str, float]:
     """Components in deg/s."""
     return dict(zip(("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z"), np.degrees(rates).tolist(), strict=True))
-
-
-def _spin(body: Spacecraft) -> Values:
-    """Spin and nutation at t = 0."""
-    rates, quaternion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
-    spin = spin_values(body.inertia, rates[None], quaternion[None])
-    return {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
 
 
 def _inertia(body: Spacecraft) -> Values:
@@ -242,7 +221,7 @@ def aem(
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
         kind = SPIN
     segments = tuple(_segment(body, stretch, reference, kind) for stretch in interpolated(flown, until))
-    return Message("AEM", header(plan, created), segments)
+    return Message("AEM", _header(plan, created), segments)
 
 
 ALONE = "SPIN_ANGLE_VEL is the rate about the third axis at that moment; no transverse rates, no nutation."
@@ -255,7 +234,7 @@ def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, k
         "",
         AEM_METADATA,
         {
-            **identity(body),
+            **_identity(body),
             "REF_FRAME_A": reference.frame,
             "REF_FRAME_B": BODY_FRAME,
             "TIME_SYSTEM": "UTC",
@@ -269,25 +248,15 @@ def _segment(body: Spacecraft, stretch: AttitudeSegment, reference: Reference, k
         f"pulses completed: {stretch.completed}",
         *[ALONE] * (kind == SPIN),
     )
-    rows = _turns(stretch) if kind == QUATERNION_ANGVEL else _spins(body, stretch, kind)
-    records = tuple((time, *map(number, row)) for time, row in zip(times, rows, strict=True))
+    if kind == QUATERNION_ANGVEL:
+        columns = np.column_stack([stretch.quaternion[:, [1, 2, 3, 0]], np.degrees(stretch.rates)])
+    else:
+        spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
+        if kind == SPIN:
+            spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
+        columns = np.column_stack([spin[keyword.name] for keyword in AEM_RECORDS[kind].keywords[1:]])
+    records = tuple((time, *map(number, row)) for time, row in zip(times, columns.tolist(), strict=True))
     return Segment(metadata, records=records, record=AEM_RECORDS[kind])
-
-
-def _turns(stretch: AttitudeSegment) -> Iterable[tuple[float, ...]]:
-    """Q1 Q2 Q3 QC and the rates."""
-    for (scalar, *vector), rates in zip(stretch.quaternion.tolist(), stretch.rates, strict=True):
-        yield (*vector, scalar, *angular_velocity(rates).values())
-
-
-def _spins(body: Spacecraft, stretch: AttitudeSegment, kind: str) -> Iterable[list[float]]:
-    """Spin axis, angle and rate; with nutation momentum, and the rate about that."""
-    spin = spin_values(body.inertia, stretch.rates, stretch.quaternion)
-    if kind == SPIN:
-        spin["SPIN_ANGLE_VEL"] = np.degrees(stretch.rates[:, 2])
-    names = [keyword.name for keyword in AEM_RECORDS[kind].keywords[1:]]
-    rows: list[list[float]] = np.column_stack([spin[name] for name in names]).tolist()
-    return rows
 
 
 PART = (
@@ -308,35 +277,26 @@ def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")
     orbit = body.orbit
     centre: Values = {} if orbit is None else {"CENTER_NAME": orbit.center}
-    about = {**identity(body), **centre, "REF_FRAME": reference.frame, "TIME_SYSTEM": "UTC"}
+    about = {**_identity(body), **centre, "REF_FRAME": reference.frame, "TIME_SYSTEM": "UTC"}
     metadata = block("", OPM_METADATA, about, *(PART if orbit is None else ()))
-    blocks = [] if orbit is None else [_opm_block("STATE", {"EPOCH": reference.epoch.text, **_state(orbit)})]
-    blocks.append(_opm_block("SPACECRAFT", {"MASS": body.mass}))
+    blocks = []
+    if orbit is not None:
+        numbers = (KILO * np.concatenate([orbit.position, orbit.velocity])).tolist()
+        state = dict(zip(("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT"), numbers, strict=True))
+        blocks.append(_block("STATE", {"EPOCH": reference.epoch.text, **state}))
+    blocks.append(_block("SPACECRAFT", {"MASS": body.mass}))
     for place, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1):
-        gained = _velocity(pulse, place, flown, body.mass)
-        values = _opm_manoeuvre(pulse, place, gained, reference)
-        blocks.append(_opm_block("MANEUVER", values, *notes_on(pulse, place, reference)))
-    return Message("OPM", header(plan, created), (Segment(metadata, tuple(blocks)),))
+        values = _opm_manoeuvre(pulse, place, flown, body.mass, reference)
+        blocks.append(_block("MANEUVER", values, *_notes_on(pulse, place, reference)))
+    return Message("OPM", _header(plan, created), (Segment(metadata, tuple(blocks)),))
 
 
-def _opm_block(name: str, values: Values, *comments: str) -> MessageBlock:
-    return block(name, OPM_BLOCKS[name].keywords, values, *comments)
-
-
-def _state(orbit: Orbit) -> Values:
-    numbers = (KILO * np.concatenate([orbit.position, orbit.velocity])).tolist()
-    return dict(zip(("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT"), numbers, strict=True))
-
-
-def _velocity(pulse: Pulse, number: int, flown: Flight, mass: float) -> Vector:
-    """Velocity change by a pulse, (3,) m/s, inertial: along its force as the body turns."""
+def _opm_manoeuvre(pulse: Pulse, number: int, flown: Flight, mass: float, reference: Reference) -> Values:
     if pulse.force is None:
         cure = "give the thrusters position, direction and force"
         raise BadRequest(f"the velocity change by pulse {number} ({pulse.channel}) is not known; {cure}")
-    return cleaned(momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
-
-
-def _opm_manoeuvre(pulse: Pulse, number: int, velocity: Vector, reference: Reference) -> Values:
+    # Inertial: along its force as the body turns.
+    velocity = cleaned(momentum_gained(replace(flown, schedule=Schedule((pulse,)))) / mass)
     if pulse.propellant is None:
         cure = "give the thrusters isp"
         raise BadRequest(f"the propellant of pulse {number} ({pulse.channel}) is not known, which an OPM needs; {cure}")
