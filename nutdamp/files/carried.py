@@ -36,7 +36,7 @@ from nutdamp.files.yaml import Node, read_tree
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics.thruster import Trapezoid
 from nutdamp.planning.plan import Plan
-from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
+from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.schedule import touching
 from nutdamp.units import parse
 
@@ -65,12 +65,15 @@ def later(flight: Flight, time: float) -> Later:
     if before.attitude is not None:
         epoch = before.attitude.epoch
         changed = replace(before.attitude, epoch=None if epoch is None else epoch_after(epoch, time))
+    center, per_kg = before.center_of_mass, before.center_of_mass_per_kg
+    if per_kg is not None and used != 0.0:
+        center = np.asarray((np.zeros(3) if center is None else center) + used * (inertia.axes @ per_kg))
     after = replace(
         before,
         inertia=replace(inertia, moments=(float(moments[0]), float(moments[1]), float(moments[2]))),
         omega0=rates[0],
         attitude=changed,
-        center_of_mass=_center(before, used),
+        center_of_mass=center,
         mass=None if before.mass is None else before.mass - used,
         tank=tank,
         disturbances=tuple(
@@ -81,15 +84,6 @@ def later(flight: Flight, time: float) -> Later:
     if changed is None:
         return moved_on
     return moved_on._replace(after=replace(after, attitude=replace(changed, quaternion=moved_on.quaternion)))
-
-
-def _center(body: Spacecraft, used: float) -> Vector | None:
-    """Center of mass with ``used`` kg of propellant gone, (3,) m in the axes of the file; None where none is given."""
-    per_kg = body.center_of_mass_per_kg
-    if per_kg is None or used == 0.0:
-        return body.center_of_mass
-    given = np.zeros(3) if body.center_of_mass is None else body.center_of_mass
-    return np.asarray(given + used * (body.inertia.axes @ per_kg))
 
 
 def carried_text(flight: Flight, time: float, source: object) -> str:
@@ -227,16 +221,16 @@ def _fitted_edits(tree: Node, fit: Fit, carried: Carried) -> Edits:
     yield from _thrusts(tree, carried)
     for channel, late in _delays(fit):
         yield from _valve(tree, channel, late)
-    yield from _sensor(tree, fit)
+    at, path = fit.index("bias_acceleration"), ("loop", "sensor", "bias")
+    if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
+        yield path, as_before(tree.get(*path), float(fit.values[at]), "acceleration", "m/s^2")
     yield from _dispersions(fit, carried)
 
 
 def _grows_so(carried: Carried, growth: float) -> bool:
     """True where dissipation lets the nutation of such a body grow (or decay) at this rate; with a wheel not known."""
-    if carried.body.wheel:
-        return False
     first, second, third = carried.body.moments
-    return (0.5 * (first + second) - third) * growth > 0.0
+    return not carried.body.wheel and (0.5 * (first + second) - third) * growth > 0.0
 
 
 def _dissipation(tree: Node, fit: Fit, carried: Carried) -> Edits:
@@ -319,13 +313,6 @@ def _valve(tree: Node, name: str, late: float) -> Edits:
             yield (*path, key), values[key]
     if own is None:
         yield path, "{" + ", ".join(f"{key}: {value}" for key, value in values.items()) + "}"
-
-
-def _sensor(tree: Node, fit: Fit) -> Edits:
-    at = fit.index("bias_acceleration")
-    if at is not None and abs(fit.values[at]) > SEEN * fit.sigmas[at]:
-        given = tree.get("loop", "sensor", "bias")
-        yield ("loop", "sensor", "bias"), as_before(given, float(fit.values[at]), "acceleration", "m/s^2")
 
 
 def _quoted(name: str) -> str:

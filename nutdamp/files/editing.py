@@ -159,10 +159,10 @@ def _put(node: Node, path: KeyPath, behind: KeyPath, value: Node, place: Place) 
     if not path:
         return value
     step, rest = path[0], path[1:]
-    held = {} if node.value is None else node.value
+    held, at = {} if node.value is None else node.value, f"at {dotted(behind) or 'the root'}"
     if isinstance(held, dict):
         if isinstance(step, int):
-            raise _NoPlaceError(f"there is no list {_at(behind)}; give all of it, as [value, …]")
+            raise _NoPlaceError(f"there is no list {at}; give all of it, as [value, …]")
         child = _put(held.get(step) or Node(None, place), rest, (*behind, step), value, place)
         keys = node.keys if rest and step in node.keys else {**node.keys, step: place}
         return replace(node, value={**held, step: child}, keys=keys)
@@ -170,7 +170,7 @@ def _put(node: Node, path: KeyPath, behind: KeyPath, value: Node, place: Place) 
         index = _entry(held, step, behind)
         child = _put(held[index], rest, (*behind, index), value, place)
         return replace(node, value=[*held[:index], child, *held[index + 1 :]])
-    raise _NoPlaceError(f"there are no keys {_at(behind)}, which holds {shown(node.plain())}")
+    raise _NoPlaceError(f"there are no keys {at}, which holds {shown(node.plain())}")
 
 
 def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
@@ -190,10 +190,6 @@ def _entry(entries: list[Node], step: str | int, behind: KeyPath) -> int:
     close = nearest(step, known) if isinstance(step, str) else None
     cure = f"did you mean {shown(close)}?" if close else f"there are {', '.join(map(shown, known[:8]))}"
     raise _NoPlaceError(f"no entry of {dotted(behind)} has the name {shown(step)}; {cure}")
-
-
-def _at(path: KeyPath) -> str:
-    return f"at {dotted(path)}" if path else "at the root"
 
 
 def _of_python(value: object, place: Place, depth: int = 0) -> Node:

@@ -22,7 +22,7 @@ from nutdamp.errors import BadRequest, CannotWrite, Unsuitable
 from nutdamp.files.tabular import STDOUT, csv_text, whole_file
 from nutdamp.flight.basilisk import default_step, stretches
 from nutdamp.flight.dynamics import shed
-from nutdamp.flight.propagation import Flight, Leg
+from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.inputs import BLOCK, DispersedInput
 from nutdamp.montecarlo.statistics import OUTPUTS, Array
 from nutdamp.montecarlo.study import Study
@@ -275,7 +275,12 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
     more than `MOST_RECORDS`.
     """
     legs = [leg for leg in flown.legs if leg.start < until]
-    counts = [_records(leg, until) for leg in legs]
+    counts = []
+    for leg in legs:  # so many that the turn from one record to the next stays below `TURN`
+        end = min(leg.end, until)
+        rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
+        turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
+        counts.append(max(math.ceil(turn / TURN) + 1, LEAST_RECORDS))
     if sum(counts) > MOST_RECORDS:
         raise BadRequest(
             f"the track would have {sum(counts)} records, more than {MOST_RECORDS}; choose an earlier end (until)"
@@ -293,14 +298,6 @@ def interpolated(flown: Flight, until: float) -> Iterator[AttitudeSegment]:
         quaternion = np.asarray(quaternion * np.cumprod(np.where(steps < 0.0, -1.0, 1.0))[:, None])
         previous = quaternion[-1]
         yield AttitudeSegment(t, rates, quaternion, leg.completed)
-
-
-def _records(leg: Leg, until: float) -> int:
-    """Number of records that keeps the turn from one to the next below `TURN`."""
-    end = min(leg.end, until)
-    rates, _ = leg.path.motion(np.linspace(leg.start, end, 9))
-    turn = float(np.linalg.norm(rates, axis=1).max()) * (end - leg.start)
-    return max(math.ceil(turn / TURN) + 1, LEAST_RECORDS)
 
 
 def stk_attitude(flown: Flight, until: float, reference: Reference) -> str:

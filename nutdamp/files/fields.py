@@ -253,19 +253,17 @@ class Quantity(Rule):
         """SI value; raises ValueError with the values allowed."""
         result = parse(value, self.kind)
         if not self._allows(result):
-            raise ValueError(f"{shown(value)} is out of range; expected {self.range}{self._degrees(value)}")
+            # An angle without unit that would be in range in degrees, or a share that would be in %.
+            meant, hint = {"angle": "deg", "ratio": "%"}.get(self.kind), ""
+            if meant and not isinstance(value, str) and self._allows(parse(f"{value} {meant}", self.kind)):
+                radians, percent = f" (read as radians; write {value} deg)", f"; write {value} % if that is meant"
+                hint = radians if meant == "deg" else percent
+            raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             raise ValueError(
                 f"{shown(value)} is too small to be real; expected {self.range}, in SI at least {SMALLEST:g}"
             )
         return result
-
-    def _degrees(self, value: object) -> str:
-        """A hint for an angle without unit that would be in range in degrees, and for a share that would be in %."""
-        meant = {"angle": "deg", "ratio": "%"}.get(self.kind)
-        if meant is None or isinstance(value, str) or not self._allows(parse(f"{value} {meant}", self.kind)):
-            return ""
-        return f" (read as radians; write {value} deg)" if meant == "deg" else f"; write {value} % if that is meant"
 
     def _allows(self, result: float) -> bool:
         return all(_BOUNDS[name][0](result, limit) for name, limit in self.bounds.items())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -71,21 +70,11 @@ def loop_findings(root: Node) -> Iterator[Finding]:
     yield from _seen(facts, inertia, spin)
 
 
-class ChannelFacts(NamedTuple):
-    """A channel as far as it can be read: its torque (3,) N m, file axes, None where it is not known, and on-times, s.
+def _known_channels(facts: Facts) -> list[tuple[str, bool, bool, float, float]]:
+    """The channels of the file, or its thrusters where it names none, as far as they can be read.
 
-    ``damps``: the torque is more transverse to principal axis 3 than along it.
+    Each with its name, True where its torque is known, and where that is more transverse than axial, and on-times, s.
     """
-
-    name: str
-    torque: Vector | None
-    damps: bool
-    least: float
-    most: float
-
-
-def channel_facts(facts: Facts) -> list[ChannelFacts]:
-    """The channels of the file, or its thrusters where it names none."""
     thrusters = {
         facts.text("thrusters", index, "name"): ("thrusters", index) for index, _ in facts.children("thrusters")
     }
@@ -100,7 +89,7 @@ def channel_facts(facts: Facts) -> list[ChannelFacts]:
         damps = total is not None and norm(total - (total @ axis) * axis) > along
         times = [on_times_of(facts, path) for path in paths]
         least, most = max((time for time, _ in times), default=0.0), min((time for _, time in times), default=math.inf)
-        channels.append(ChannelFacts(name, total, damps, least, most))
+        channels.append((name, total is not None, damps, least, most))
     return channels
 
 
@@ -133,11 +122,11 @@ def _sensor(facts: Facts) -> Iterator[Finding]:
 
 
 def _channels(facts: Facts) -> Iterator[Finding]:
-    known = channel_facts(facts)
+    known = _known_channels(facts)
     law, on_time = facts.text("loop", "law"), facts.number("time", "loop", "on_time")
     if not known:
         yield Finding(("loop",), "needs channels to fire: thrusters with a torque across axis 3", True)
-    elif all(channel.torque is not None for channel in known) and not any(channel.damps for channel in known):
+    elif all(pushes and not damps for _, pushes, damps, *_ in known):
         problem = "no channel has a torque more transverse than axial, so none can damp a nutation"
         yield Finding(("loop",), problem, True)
     if law == "bang" and not facts.has("loop", "on_time"):
@@ -145,12 +134,11 @@ def _channels(facts: Facts) -> Iterator[Finding]:
     if law == "one-pulse" and facts.has("loop", "on_time"):
         yield Finding(("loop", "on_time"), "is for four-pulse and bang; one-pulse fires for as long as it takes", True)
     elif on_time is not None:
-        for channel in known:
-            if not channel.least <= on_time <= channel.most:
-                allowed = span(channel.least, channel.most, "s")
-                problem = f"{on_time:g} s is outside what {channel.name} allows: {allowed}"
+        for name, *_, least, most in known:
+            if not least <= on_time <= most:
+                problem = f"{on_time:g} s is outside what {name} allows: {span(least, most, 's')}"
                 yield Finding(("loop", "on_time"), problem)
-    names, before = [channel.name for channel in known], set()
+    names, before = [name for name, *_ in known], set()
     for index, node in facts.children("loop", "faults", "reversed"):
         path: KeyPath = ("loop", "faults", "reversed", index)
         if node.value in before:

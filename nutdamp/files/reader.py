@@ -21,23 +21,12 @@ import numpy as np
 from nutdamp import units
 from nutdamp.common.time import Epoch
 from nutdamp.errors import Fault, FaultyFile, in_order, nearest, warn
+from nutdamp.files import keys
 from nutdamp.files.dispersion_rules import dispersion_findings
 from nutdamp.files.editing import Setting, overlay, settings_of, settings_within, text_of
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
-from nutdamp.files.keys import (
-    AttitudeSection,
-    CommandsSection,
-    DisturbanceSection,
-    GoalSection,
-    OrbitSection,
-    RequirementSection,
-    ShedSection,
-    SpacecraftFile,
-    SunSensorSection,
-    ThrusterSection,
-)
 from nutdamp.files.plausibility import doubts, foreign
-from nutdamp.files.rules import CANCELLED, MOMENT, Finding, disturbance_kind, findings, force_vector, symmetric
+from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
 from nutdamp.files.study_keys import LoopSection, by_name, dispersions
 from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
@@ -45,22 +34,10 @@ from nutdamp.physics import attitude, sky
 from nutdamp.physics.body import principal_axes
 from nutdamp.physics.thruster import Cold, Tank
 from nutdamp.spacecraft.equipment import Channel, Commands, Loop, Sensor, Steerable, SunSensor, Thruster
-from nutdamp.spacecraft.model import (
-    Attitude,
-    Disturbance,
-    Goal,
-    Inertia,
-    Keep,
-    Limits,
-    Orbit,
-    Requirement,
-    Spacecraft,
-    Vector,
-)
+from nutdamp.spacecraft.model import Attitude, Disturbance, Goal, Inertia, Keep, Limits, Orbit, Requirement, Spacecraft
 from nutdamp.units import shown
 
 if TYPE_CHECKING:
-    from nutdamp.files.keys import TankSection, ValveSection
     from nutdamp.physics.thruster import Valve
 
 
@@ -98,20 +75,25 @@ def example_subject(name: str) -> str:
     return " ".join(line.removeprefix("#").strip() for line in sentence.splitlines())
 
 
-def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> SpacecraftFile:
+def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> keys.SpacecraftFile:
     other = foreign(text.removeprefix("\ufeff"))
     if other is not None:
         raise FaultyFile([Fault(name, 1, 1, "", other)])
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    faulty = [*_spelling(root, SpacecraftFile, ()), *findings(root), *dispersion_findings(root), *thrust_findings(root)]
+    faulty = [
+        *_spelling(root, keys.SpacecraftFile, ()),
+        *findings(root),
+        *dispersion_findings(root),
+        *thrust_findings(root),
+    ]
     if root.get("loop") is not None:
         from nutdamp.files.loop_rules import loop_findings
 
         faulty += loop_findings(root)
     problems: Problems = []
-    contents = SpacecraftFile.read(root.plain(), problems)
+    contents = keys.SpacecraftFile.read(root.plain(), problems)
     judged = {finding.path for finding in faulty if not finding.at_key}
     faulty += [Finding(path, problem) for path, problem in problems if path not in judged]
     faults += [_placed(finding, root, name) for finding in faulty]
@@ -196,6 +178,8 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     channels = contents.channels or {thruster: [thruster] for thruster in thrusters}
     steerable, sunward = _part(Steerable, contents.steerable), _sun(contents)
     torquer = steerable if thrusters else steerable or Steerable()
+    asked = contents.requirement
+    asks_nothing = asked is None or (asked.nutation is None and asked.momentum_shift is None)
     loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
@@ -209,7 +193,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
             Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
         ),
         steerable=steerable,
-        requirement=_requirement(contents.requirement),
+        requirement=None if asks_nothing else _part(Requirement, asked),
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ())) or Limits(),
         disturbances=tuple(_disturbance(entry, inertia, float(omega0[2])) for entry in contents.disturbances),
         dissipation=None if loss is None else loss.time_constant,
@@ -273,7 +257,7 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     return kind(**{**given, **others})
 
 
-def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
+def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|, Magnus 1970 (19).
 
     So θ is the angle between H and the spin axis at t = 0, for any I1 and I2.
@@ -289,7 +273,7 @@ def _rates(contents: SpacecraftFile, inertia: Inertia) -> Vector:
     return np.array([*(size * way), state.spin])
 
 
-def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None, center: Vector) -> Thruster:
+def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSection | None, center: Vector) -> Thruster:
     """A thruster in principal axes, about the ``center`` of mass; ``every``: valve of those without their own."""
     force = position = None
     if entry.torque is not None:
@@ -308,15 +292,15 @@ def _thruster(entry: ThrusterSection, axes: Vector, every: ValveSection | None, 
     return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
 
 
-def _tank(section: TankSection | None) -> Tank | None:
+def _tank(section: keys.TankSection | None) -> Tank | None:
     if section is None:
         return None
     isp, shed = section.isp, section.inertia_per_kg
-    rows = (shed.A, shed.A, shed.C) if isinstance(shed, ShedSection) else tuple(shed or ())
+    rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
     return _part(Tank, section, isp=isp and tuple(map(tuple, isp)), inertia_per_kg=rows if any(rows) else None)
 
 
-def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | None) -> Valve | None:
+def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust: float | None) -> Valve | None:
     """The valve of a thruster of ``thrust`` N; None where each command gives full thrust from start to end."""
     if entry.impulse_bit is None and entry.valve is None and every is None:
         return None
@@ -333,7 +317,7 @@ def _valve(entry: ThrusterSection, every: ValveSection | None, thrust: float | N
     return thruster.Trapezoid(*times, section.on_time_is == "effective") if any(times) else None
 
 
-def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
+def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
     """A disturbance in principal axes; ``spin`` is ω3 at t = 0, rad/s.
 
     What is fixed in space turns in the body at minus the spin, Magnus 1970 (27). Where the principal axes are
@@ -350,7 +334,7 @@ def _disturbance(entry: DisturbanceSection, inertia: Inertia, spin: float) -> Di
 
 
 def _attitude(
-    section: AttitudeSection | None, inertia: Inertia, omega0: Vector, sunward: Vector | None
+    section: keys.AttitudeSection | None, inertia: Inertia, omega0: Vector, sunward: Vector | None
 ) -> Attitude | None:
     """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and H in the body."""
     if section is None:
@@ -373,14 +357,7 @@ def _attitude(
     return Attitude(quaternion, section.epoch, section.frame)
 
 
-def _requirement(section: RequirementSection | None) -> Requirement | None:
-    """None also for a requirement that names nothing."""
-    if section is None or (section.nutation is None and section.momentum_shift is None):
-        return None
-    return _part(Requirement, section)
-
-
-def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
+def _goal(section: keys.GoalSection | None, spacecraft: Spacecraft) -> Goal:
     """The goal of a file; its tilt and azimuth count from the motion at t = 0."""
     if section is None:
         return Goal()
@@ -391,7 +368,7 @@ def _goal(section: GoalSection | None, spacecraft: Spacecraft) -> Goal:
     return Goal(spin=section.spin)
 
 
-def _sun(contents: SpacecraftFile) -> Vector | None:
+def _sun(contents: keys.SpacecraftFile) -> Vector | None:
     given: list[float] | str | None = contents.sun
     if not isinstance(given, str):
         return None if given is None else attitude.on_sphere(*given)
@@ -400,7 +377,7 @@ def _sun(contents: SpacecraftFile) -> Vector | None:
     return sky.direction(Epoch.parse(contents.attitude.epoch).days_of_j2000)
 
 
-def _cones(contents: SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
+def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
     """The cones of the file, and that about the angular momentum which bounds the nutation on the way."""
     for entry in contents.keep:
         given: list[float] | str = entry.direction
@@ -411,13 +388,13 @@ def _cones(contents: SpacecraftFile, sunward: Vector | None) -> Iterator[Keep]:
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
 
-def _orbit(section: OrbitSection | None) -> Orbit | None:
+def _orbit(section: keys.OrbitSection | None) -> Orbit | None:
     if section is None:
         return None
     return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
 
 
-def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | None:
+def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSensor | None:
     if section is None:
         return None
     azimuth = section.azimuth
@@ -427,7 +404,7 @@ def _sun_sensor(section: SunSensorSection | None, axes: Vector) -> SunSensor | N
     return _part(SunSensor, section, azimuth=azimuth)
 
 
-def _commands(section: CommandsSection | None) -> Commands | None:
+def _commands(section: keys.CommandsSection | None) -> Commands | None:
     if section is None:
         return None
     given, step = section.width, None
@@ -454,7 +431,7 @@ def _loop(section: LoopSection | None, axes: Vector, center: Vector) -> Loop | N
 def json_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the spacecraft file, for editors."""
     parts: dict[str, Any] = {}
-    whole = {**section_schema(SpacecraftFile, parts), "title": "nutdamp spacecraft file"}
+    whole = {**section_schema(keys.SpacecraftFile, parts), "title": "nutdamp spacecraft file"}
     schema = {"$defs": dict(sorted(parts.items())), **whole}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_in_order(schema)}
 

@@ -1,11 +1,8 @@
 """Schedules and command blocks as CSV, written and read.
 
-Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. The action of a channel of the
-spacecraft file follows from there; the columns of torque, impulse, propellant and date are only compared with it.
-Pulses of the steerable torquer, and of channels that the file does not know, take their torque (or impulse) from the
-schedule.
-
-Command blocks are written by ``plan --blocks``; ``simulate --blocks`` fires them, edited or not.
+Three columns are enough, and rule: start_s (or t_s, the centre), on_time_s and channel. The others are only compared
+with the spacecraft file. Pulses of the steerable torquer, and of channels that the file does not know, take their
+torque (or impulse) from the schedule.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import cleaned, finite
 from nutdamp.errors import CannotWrite, Fault, FaultyFile, nearest
-from nutdamp.files.yaml import read_utf8
+from nutdamp.files.yaml import read_limited, utf8_text
 from nutdamp.flight.propagation import Track, in_file_axes
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.units import shown
@@ -290,7 +290,8 @@ class Table:
         self.name, self.known = str(path), columns
         self.faults: list[Fault] = []
         self.warnings: dict[str, list[tuple[int, str]]] = {}
-        reader = csv.reader(io.StringIO(read_utf8(self.name, MOST_BYTES), newline=""))
+        text = utf8_text(read_limited(self.name, MOST_BYTES), self.name)
+        reader = csv.reader(io.StringIO(text, newline=""))
         try:
             rows = [(reader.line_num, row) for row in reader if row]
         except csv.Error as reason:

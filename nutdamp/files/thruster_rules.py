@@ -10,22 +10,14 @@ import numpy as np
 
 from nutdamp.errors import nearest
 from nutdamp.files.fields import SMALLEST, KeyPath
-from nutdamp.files.rules import (
-    CANCELLED,
-    Facts,
-    Finding,
-    Vector,
-    force_vector,
-    norm,
-    principal_of,
-)
+from nutdamp.files.rules import CANCELLED, Facts, Finding, Vector, force_vector, norm, principal_of
 from nutdamp.files.study_keys import VALVE_TIMES, thrust_behind
 from nutdamp.files.yaml import Node
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.units import bar, shown
 
 
-def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
+def _thruster(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     needed = ("position", "direction", "force")
     mounting = [key for key in needed if facts.has(*path, key)]
     given = " and ".join(mounting)
@@ -40,9 +32,6 @@ def _thruster_keys(facts: Facts, path: KeyPath) -> Iterator[Finding]:
             yield Finding((*path, key), f"missing; {given} alone cannot give a torque")
     if mounting and facts.has(*path, "lever_arm"):
         yield Finding((*path, "lever_arm"), "goes with torque only; leave it out, position gives the arm", True)
-
-
-def _thruster_values(facts: Facts, path: KeyPath) -> Iterator[Finding]:
     direction = facts.vector("number", 3, *path, "direction")
     if direction is not None and norm(direction) < SMALLEST:
         yield Finding((*path, "direction"), "zero; expected a direction, such as [1, 0, 0]")
@@ -134,8 +123,7 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
     thrusters = [("thrusters", index) for index, _ in facts.children("thrusters")]
     for path in thrusters:
         if facts.is_mapping(*path):
-            yield from _thruster_keys(facts, path)
-            yield from _thruster_values(facts, path)
+            yield from _thruster(facts, path)
     yield from _channels(facts)
     for key in ("valve", "cold", "tank"):
         if facts.has(key) and not thrusters:

@@ -61,11 +61,6 @@ def read_limited(path: str, most: int) -> bytes:
     return data
 
 
-def read_utf8(path: str, most: int) -> str:
-    """The text of a file of at most ``most`` bytes, without a byte order mark; raises CannotRead or FaultyFile."""
-    return utf8_text(read_limited(path, most), path)
-
-
 def utf8_text(data: bytes, name: str) -> str:
     """The text of UTF-8 bytes, without a byte order mark; raises FaultyFile, which calls the file ``name``."""
     try:

@@ -2,8 +2,7 @@
 
 The tables are those of CCSDS 504.0-B-2: 3-1 to 3-3 (APM), 4-2 to 4-4 (AEM), 7-3 and 7-5 (tags in XML); and of CCSDS
 502.0-B-3: 3-1 to 3-3 (OPM). Keyword = value notation (KVN) follows CCSDS 504.0-B-2 section 6 (502.0-B-3 section 7
-alike), XML section 7. Keywords are checked against their tables, and every fault has its line: other readers take what
-breaks the standard in silence (swapped frames, quaternions of any length, no epoch). Here nothing is guessed.
+alike), XML section 7. Keywords are checked against their tables, and every fault has its line: nothing is guessed.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ from nutdamp.files.yaml import read_limited, utf8_text
 VERSION = "2.0"
 """Version of APM and AEM in issue 2 of their standard. Version 1 has other keywords."""
 
-OPM_VERSION = "3.0"
-"""Version of the OPM in issue 3 of its standard."""
+VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
 
 BODY_FRAME = "SC_BODY_1"
 
@@ -65,7 +63,7 @@ def _numbers(*names: str, unit: str = "", required: bool = True, tag: str = "") 
 
 _FRAMES = _text("REF_FRAME_A", "REF_FRAME_B")
 _QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
-_ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
+ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
 _SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
 MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
@@ -97,7 +95,7 @@ APM_BLOCKS: dict[str, Layout] = {
             *_numbers("ANGLE_1_DOT", "ANGLE_2_DOT", "ANGLE_3_DOT", unit="deg/s", required=False),
         ),
     ),
-    "ANGVEL": Layout("angularVelocity", (*_FRAMES, *_text("ANGVEL_FRAME"), *_numbers(*_ANGVEL, unit="deg/s"))),
+    "ANGVEL": Layout("angularVelocity", (*_FRAMES, *_text("ANGVEL_FRAME"), *_numbers(*ANGVEL, unit="deg/s"))),
     "SPIN": Layout(
         "spin",
         (
@@ -170,7 +168,7 @@ QUATERNION_ANGVEL, SPIN, SPIN_NUTATION_MOM = "QUATERNION/ANGVEL", "SPIN", "SPIN/
 
 AEM_RECORDS = {
     QUATERNION_ANGVEL: Layout(
-        "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*_ANGVEL, unit="deg/s", tag="angVel"))
+        "quaternionAngVel", (*_text("EPOCH"), *_QUATERNION, *_numbers(*ANGVEL, unit="deg/s", tag="angVel"))
     ),
     SPIN: Layout("spin", (*_text("EPOCH"), *_SPIN)),
     SPIN_NUTATION_MOM: Layout(
@@ -217,11 +215,6 @@ class Message:
     kind: str
     header: MessageBlock
     segments: tuple[Segment, ...]
-
-    @property
-    def version(self) -> str:
-        """The version of its form."""
-        return OPM_VERSION if self.kind == "OPM" else VERSION
 
 
 def block(name: str, keywords: tuple[Keyword, ...], values: dict[str, str | float], *comments: str) -> MessageBlock:
@@ -275,7 +268,7 @@ def to_xml(message: Message) -> str:
     """The text of a message."""
     # Namespace and attributes are written as the standard prints them.
     root = Element(message.kind.lower(), {"xmlns:xsi": SCHEMA_INSTANCE, "id": f"CCSDS_{message.kind}_VERS"})
-    root.set("version", message.version)
+    root.set("version", VERSION_OF[message.kind])
     _fill(SubElement(root, "header"), message.header)
     body = SubElement(root, "body")
     for segment in message.segments:
@@ -312,13 +305,10 @@ _LINE_END = re.compile(r"\r\n|\n\r|\n|\r")
 
 def to_kvn(message: Message) -> str:
     """The text of a message."""
-    lines = [f"CCSDS_{message.kind}_VERS = {message.version}", *_block(message.header)]
+    lines = [f"CCSDS_{message.kind}_VERS = {VERSION_OF[message.kind]}", *_block(message.header)]
     for segment in message.segments:
         metadata = _block(segment.metadata)
-        if message.kind == "AEM":
-            lines += ["", "META_START", *metadata, "META_STOP"]
-        else:
-            lines += ["", *metadata]
+        lines += ["", "META_START", *metadata, "META_STOP"] if message.kind == "AEM" else ["", *metadata]
         for block in segment.blocks:
             inside, named = _block(block), block.name in APM_BLOCKS
             lines += ["", f"{block.name}_START", *inside, f"{block.name}_STOP"] if named else ["", *inside]
@@ -343,37 +333,32 @@ def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
 
     Lines count from 1; ``name`` is that of the file in faults.
     """
-    outside: list[MessageEntry] = []
-    blocks: list[MessageBlock] = []
+    begun: list[tuple[str, int, list[MessageEntry]]] = [("", 1, [])]
     faults: list[Fault] = []
-    within: tuple[str, int] | None = None
-    entries: list[MessageEntry] = []
+    within: str | None = None
     for line, raw in enumerate(_LINE_END.split(text), start=1):
         content = raw.strip()
         if not content or content.split(maxsplit=1)[0] == "COMMENT":
             continue
         pair = _PAIR.fullmatch(content)
         if pair is not None:
-            entry = MessageEntry(pair[1], pair[2], pair[3] or "", line)
-            (outside if within is None else entries).append(entry)
+            entries = begun[0 if within is None else -1][2]
+            entries.append(MessageEntry(pair[1], pair[2], pair[3] or "", line))
         elif _WORD.fullmatch(content) and content.endswith("_START"):
             if within is not None:
-                faults.append(Fault(name, line, 1, content, f"{within[0]}_STOP is missing before it"))
-                blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
-            within, entries = (content.removesuffix("_START"), line), []
+                faults.append(Fault(name, line, 1, content, f"{within}_STOP is missing before it"))
+            within = content.removesuffix("_START")
+            begun.append((within, line, []))
+        elif within is not None and content == f"{within}_STOP":
+            within = None
         elif _WORD.fullmatch(content) and content.endswith("_STOP"):
-            if within is None or content != f"{within[0]}_STOP":
-                expected = "no block is open" if within is None else f"expected {within[0]}_STOP"
-                faults.append(Fault(name, line, 1, content, expected))
-            else:
-                blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
-                within = None
+            expected = "no block is open" if within is None else f"expected {within}_STOP"
+            faults.append(Fault(name, line, 1, content, expected))
         else:
             faults.append(Fault(name, line, 1, "", f"{content[:40]!r} is no KEYWORD = value"))
     if within is not None:
-        faults.append(Fault(name, within[1], 1, f"{within[0]}_START", f"{within[0]}_STOP is missing"))
-        blocks.append(MessageBlock(within[0], tuple(entries), line=within[1]))
-    return [MessageBlock("", tuple(outside), line=1), *blocks], faults
+        faults.append(Fault(name, begun[-1][1], 1, f"{within}_START", f"{within}_STOP is missing"))
+    return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
 
 
 LARGEST = 1e15

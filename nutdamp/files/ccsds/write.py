@@ -1,13 +1,7 @@
-"""Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM) written.
+"""Attitude parameter (APM), attitude ephemeris (AEM) and orbit parameter messages (OPM, CCSDS 502.0-B-3) written.
 
-APM: state at t = 0, spin with nutation, inertia, and one manoeuvre block a pulse, in the axes of the spacecraft file,
-which the message calls `message.BODY_FRAME`.
-
-OPM (CCSDS 502.0-B-3): the velocity change of each pulse as a manoeuvre. Its state vector is the orbit of the spacecraft
-file. Without one the message is only the part with the manoeuvres, which says so: the standard demands a state.
-
-AEM: the flown motion, a new segment at each edge of a pulse; as quaternions and rates, or as spin, nutation and
-momentum. Nutation by annex F5 is the steady motion of bodies symmetric about axis 3: others have the spin alone.
+Body axes are those of the spacecraft file, which messages call `message.BODY_FRAME`. Nutation by annex F5 is the steady
+motion of bodies symmetric about axis 3: others have the spin alone.
 """
 
 from __future__ import annotations
@@ -24,6 +18,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.ccsds.message import (
     AEM_METADATA,
     AEM_RECORDS,
+    ANGVEL,
     APM_METADATA,
     BODY_FRAME,
     HEADER,
@@ -116,7 +111,7 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
     blocks = [
         block("", (Keyword("EPOCH"),), {"EPOCH": reference.epoch.text}, *_unsaid(body)),
         _block("QUAT", {**frames, **dict(turn)}),
-        _block("ANGVEL", {**frames, "ANGVEL_FRAME": BODY_FRAME, **_angular_velocity(rates)}),
+        _block("ANGVEL", {**frames, "ANGVEL_FRAME": BODY_FRAME, **dict(zip(ANGVEL, np.degrees(rates), strict=True))}),
     ]
     if spinning(body.inertia):
         spin = spin_values(body.inertia, *(values[None] for values in motion))
@@ -176,23 +171,11 @@ def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
     return comments
 
 
-def _angular_velocity(rates: Vector) -> dict[str, float]:
-    """Components in deg/s."""
-    return dict(zip(("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z"), np.degrees(rates).tolist(), strict=True))
-
-
 def _inertia(body: Spacecraft) -> Values:
     """Moments and products; the products are minus the entries off the diagonal (annex F6)."""
-    tensor = body.inertia.tensor.tolist()
-    return {
-        "INERTIA_REF_FRAME": BODY_FRAME,
-        "IXX": tensor[0][0],
-        "IYY": tensor[1][1],
-        "IZZ": tensor[2][2],
-        "IXY": -tensor[0][1],
-        "IXZ": -tensor[0][2],
-        "IYZ": -tensor[1][2],
-    }
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
+    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
+    return {"INERTIA_REF_FRAME": BODY_FRAME, **parts}
 
 
 def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
