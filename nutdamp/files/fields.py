@@ -249,7 +249,7 @@ class Quantity(Rule):
     def __init__(self, kind: str, **bounds: float) -> None:
         self.kind, self.bounds = kind, bounds
 
-    def check(self, value: object) -> float:
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
         """SI value; raises ValueError with the values allowed."""
         result = parse(value, self.kind)
         if not self._allows(result):
@@ -260,9 +260,8 @@ class Quantity(Rule):
                 hint = radians if meant == "deg" else percent
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
-            raise ValueError(
-                f"{shown(value)} is too small to be real; expected {self.range}, in SI at least {SMALLEST:g}"
-            )
+            least = f"in SI at least {SMALLEST:g}"
+            raise ValueError(f"{shown(value)} is too small to be real; expected {self.range}, {least}")
         return result
 
     def _allows(self, result: float) -> bool:
@@ -277,10 +276,6 @@ class Quantity(Rule):
             for name, limit in self.bounds.items()
         )
         return f"{KINDS[self.kind].noun} {' and '.join(bounds)}"
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
-        """See `check`."""
-        return self.check(value)
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:  # noqa: ARG002
         """A number in the bounds, or one with a unit."""
@@ -297,7 +292,7 @@ class AxialShorthand(Rule):
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
         """Three components; raises ValueError with the form allowed."""
-        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.check(value)]
+        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
 
     def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """The vector or the torque."""

@@ -83,13 +83,13 @@ def _known_channels(facts: Facts) -> list[tuple[str, bool, bool, float, float]]:
     axis, channels = spin_axis(facts), []
     for name, members in named.items():
         paths: list[KeyPath] = [thrusters[member] for member in members if member in thrusters]
-        torques = [torque_of(facts, path) for path in paths]
-        total = None if None in torques else np.sum([torque[0] for torque in torques if torque is not None], axis=0)
-        along = 0.0 if total is None else abs(float(total @ axis))
-        damps = total is not None and norm(total - (total @ axis) * axis) > along
+        torques = [torque[0] for path in paths if (torque := torque_of(facts, path)) is not None]
+        pushes = bool(torques) and len(torques) == len(paths)
+        total = np.sum(torques, axis=0) if pushes else np.zeros(3)
+        damps = norm(total - (total @ axis) * axis) > abs(float(total @ axis))
         times = [on_times_of(facts, path) for path in paths]
         least, most = max((time for time, _ in times), default=0.0), min((time for _, time in times), default=math.inf)
-        channels.append((name, total is not None, damps, least, most))
+        channels.append((name, pushes, damps, least, most))
     return channels
 
 

@@ -203,16 +203,13 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         orbit=_orbit(contents.orbit),
         cold=_part(Cold, contents.cold),
         tank=_tank(contents.tank),
-    )
-    return replace(
-        spacecraft,
-        goal=_goal(contents.goal, spacecraft),
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
         sun_sensor=_sun_sensor(contents.sun_sensor, axes),
         commands=_commands(contents.commands),
         loop=_loop(contents.loop, axes, center),
     )
+    return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 
 
 class Source(NamedTuple):

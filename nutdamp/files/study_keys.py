@@ -262,7 +262,7 @@ class Reading(Quantity):
     def __init__(self, **bounds: float) -> None:
         super().__init__("rate", **bounds)
 
-    def check(self, value: object) -> float:
+    def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
         """SI value; raises ValueError with the values allowed."""
         try:
             result = parse(value, "acceleration")
