@@ -1,10 +1,8 @@
 """Estimates of a spacecraft from telemetry: robust least squares, outliers left out, the model as wide as shown.
 
-Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits, so that they cost
-no efficiency. Noise is estimated. Tests say whether a record can be fitted, and whether what its fit leaves is noise:
-second differences of the residuals, r[k-1] - 2 r[k] + r[k+1], have the standard deviation √6 s of noise s, and next to
-nothing of what changes slowly. Residuals far larger than that s are no noise but motion that the model does not have,
-such as a pulse: their sigmas would mean nothing.
+Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits. Residuals far
+larger than the noise that their second differences show are motion that the model does not have, such as a pulse: their
+sigmas would mean nothing.
 """
 
 from __future__ import annotations
@@ -182,7 +180,7 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
 
 
 def _noise(fitted: Fit, signal: int) -> float:
-    """Noise of a signal by its second differences; at least that of its steps."""
+    """Noise s of a signal by its second differences, whose standard deviation is √6 s; at least that of its steps."""
     second = np.diff(fitted.residuals[fitted.model.signal == signal], 2)
     noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
     return max(noise, float(least(fitted.model)[signal]))

@@ -1,9 +1,7 @@
 """Start of a fit: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
 
 A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
-spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
-
-Crossings and Sun aspect angles come too seldom for a spectrum: there each C/A that the file allows is tried.
+spectrum gives C/A. Where signals come too seldom for a spectrum, each C/A that the file allows is tried.
 
 Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is known but for multiples
 of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
@@ -228,7 +226,6 @@ class _Cone(NamedTuple):
 
 
 def _axes(record: Record) -> Vector:
-    """The measured axes, (n, 3)."""
     return np.column_stack([record.signals[name] for name in AXIS])
 
 
@@ -284,8 +281,7 @@ def _strongest(
     there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
     if there.sum() < 4:
         return None
-    at = times[there]
-    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    at, values = times[there], real[there] + (0j if imaginary is None else 1j * imaginary[there])
     step = float(np.median(np.diff(at)))
     count = min(math.ceil((at[-1] - at[0]) / step) + 1, LONGEST_SPECTRUM)
     place = np.rint((at - at[0]) / step).astype(int)

@@ -1,8 +1,5 @@
 """Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were fired.
 
-A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
-pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What sensors show of it is in `signals`.
-
 Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the file's principal axes:
 regular at e = 0, where principal axes are any.
 """
@@ -168,18 +165,16 @@ class Model:
         rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(times - self.start)
         return rates @ body.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.axes.T))
 
-    def moved(self, body: Body, schedule: Schedule, time: float) -> SpinState:
-        """The motion of a body at ``time`` s, in its own principal axes; before the record it coasts."""
-        if time < self.start:
-            schedule = Schedule()
-        return _state(self._path(body, schedule, time), time - self.start)
-
     def at(self, values: Values, time: float) -> tuple[Body, SpinState]:
-        """The body, and its motion at ``time`` s; once for each, since what is estimated of it is derived again."""
+        """The body, and its motion at ``time`` s in its own principal axes; before the record it coasts.
+
+        Once for each: what is estimated of it is derived again.
+        """
         key = (time, *values.values())
         if key not in self._at:
             body = self.body(values)
-            self._at[key] = body, self.moved(body, self._fired(values), time)
+            schedule = Schedule() if time < self.start else self._fired(values)
+            self._at[key] = body, _state(self._path(body, schedule, time), time - self.start)
         return self._at[key]
 
     def predicted(self, values: Values) -> Vector:
@@ -205,27 +200,22 @@ class Model:
         return self._last[1]
 
     def _rates(self, values: Values, times: Vector) -> Vector:
-        """The rates of `motion` alone."""
         body = self.body(values)
         if self.pulses.pulses or self.spacecraft.disturbances or not body.closed:
             return self.motion(values, times)[0]
-        state, (A, _, C) = body.state, body.moments
+        state, (A, _, C), since = body.state, body.moments, times - self.start
         if not body.symmetric:
-            return triaxial.free_rates(body.moments, state.rates, times - self.start) @ body.axes.T
-        since = times - self.start
+            return triaxial.free_rates(body.moments, state.rates, since) @ body.axes.T
         omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, since, body.wheel)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
 
     def _pulses(self) -> Schedule:
         """The pulses fired since the record began; times count from there."""
-        kept = []
-        for pulse in self.record.schedule:
-            if pulse.over <= self.start:
-                continue
+        pulses = [pulse for pulse in self.record.schedule if pulse.over > self.start]
+        for pulse in pulses:
             if pulse.thrust[0] < self.start:
                 raise BadRequest(f"the pulse at {pulse.t:g} s is on as the record begins, at {self.start:g} s")
-            kept.append(pulse.moved(-self.start))
-        return Schedule(tuple(kept))
+        return Schedule(tuple(pulse.moved(-self.start) for pulse in pulses))
 
     def _fired(self, values: Values) -> Schedule:
         """The pulses with the thrust factors and delays of their channels."""
@@ -260,13 +250,11 @@ class Model:
         to_file = attitude.multiply(body.state.quaternion, attitude.from_matrix(body.axes.T))
         turn = body.axes.T @ self.spacecraft.inertia.axes
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
+        disturbances = (replace(each, transverse=about * each.transverse) for each in self.spacecraft.disturbances)
         return replace(
             self.spacecraft,
             inertia=body.inertia,
-            disturbances=tuple(
-                replace(disturbance, transverse=about * disturbance.transverse)
-                for disturbance in self.spacecraft.disturbances
-            ),
+            disturbances=tuple(disturbances),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
         )
@@ -285,10 +273,7 @@ def _coast(body: Body) -> Path:
 
 
 class _Closed(Dynamics):
-    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them.
-
-    A fit flies thousands of times, and most of a record is coast.
-    """
+    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them."""
 
     def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
         acts = bool(push.torques) or push.falling is not None or self.constant.any() or self.forcing != Forcing()
@@ -324,10 +309,7 @@ def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
     if len(record.sun_pulses) and (spacecraft.sun is None or spacecraft.sun_sensor is None):
         key = "sun" if spacecraft.sun is None else "sun_sensor"
         raise Unsuitable((key,), f"expected the key {key}: Sun pulses are timed by attitude, sun and sun_sensor")
-    for name, key, given in (
-        (SUN_ASPECT, "sun", spacecraft.sun),
-        (DIRECTION[0], "attitude", spacecraft.attitude),
-    ):
-        if record.has(name) and given is None:
-            what = CROSSING if name == DIRECTION[0] else name
-            raise Unsuitable((key,), f"expected the key {key}, for the columns of {what}")
+    if record.has(SUN_ASPECT) and spacecraft.sun is None:
+        raise Unsuitable(("sun",), f"expected the key sun, for the columns of {SUN_ASPECT}")
+    if record.has(DIRECTION[0]) and spacecraft.attitude is None:
+        raise Unsuitable(("attitude",), f"expected the key attitude, for the columns of {CROSSING}")

@@ -156,9 +156,8 @@ def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
     if fitted.index("attitude_1") is None and fitted.index("attitude_3") is None:
         # Rates say nothing of where the body points: at t = 0 it is as the file has it.
         first, at_first = model.at(fitted.named, 0.0)
-        of_file = attitude.multiply(
-            model.spacecraft.initial.quaternion, attitude.from_matrix(model.spacecraft.inertia.axes.T)
-        )
+        spacecraft = model.spacecraft
+        of_file = attitude.multiply(spacecraft.initial.quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
     return body, state
@@ -185,7 +184,7 @@ def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
         of_file,
         A=of_A,
         C=of_C,
-        wheel_momentum=(Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum),
+        wheel_momentum=Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum,
         omega0=(first, second, third),
         thrust={**of_file.thrust, **thrust},
         attitude=of_file.attitude if known.tilt is None else Tolerance("normal", known.tilt),
@@ -215,8 +214,8 @@ def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, 
     return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
 
 
-def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
-    """Derivatives (k, p) of what a function makes of body and motion, by central differences."""
+def _covariance(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
+    """Covariance (k, k) of what a function makes of body and motion, by central differences."""
     columns: list[Vector] = []
     for name, _, _, _, size in fitted.model.parameters:
         if name.startswith(OF_SENSORS):
@@ -224,12 +223,7 @@ def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
             continue
         above, below = (function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size))
         columns.append((above - below) / (2.0 * size))
-    return np.column_stack(columns)
-
-
-def _covariance(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
-    """Covariance (k, k) of what a function makes of body and motion."""
-    slopes = derivatives(fitted, function)
+    slopes = np.column_stack(columns)
     return np.asarray(slopes @ fitted.covariance @ slopes.T)
 
 
@@ -239,13 +233,14 @@ def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
 
 
 def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
-    model = fitted.model
-    spacecraft = model.spacecraft
-    phase0 = math.atan2(*_transverse(model.at(fitted.named, time))[::-1])
+    model, spacecraft = fitted.model, fitted.model.spacecraft
+    first, begun = model.at(fitted.named, time)
+    x0, y0, _ = first.axes @ begun.rates  # in the axes of the file
+    phase0 = math.atan2(y0, x0)
 
     def motion(values: Values) -> Vector:
         body, state = model.at(values, time)
-        x, y = _transverse((body, state))
+        x, y, _ = body.axes @ state.rates
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
         sense = math.copysign(1.0, body.inertia.axial(state.spin))
         nutation = arc_cones(body.moments, state.rates, sense, body.wheel).nutation
@@ -254,28 +249,18 @@ def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
     values, sigmas = motion(fitted.named), np.sqrt(np.diag(_covariance(fitted, motion)))
     if not model.record.shows_turn:
         sigmas[3] = math.inf
-    omega = complex(*spacecraft.rates[:2])
-    file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
+    omega, symmetric = complex(*spacecraft.rates[:2]), model.body(fitted.named).symmetric
     given = (spacecraft.dispersions or EXACT).omega0[2]
     spin_prior = None if given is None else prior_of(given, spacecraft.spin)[1]
+    # Carried to another time the phase is not comparable with that of the file.
     rows = (
-        ("spin", "spin ω3", "deg/s"),
-        ("nutation", "nutation" if model.body(fitted.named).symmetric else "largest nutation", "deg"),
-        ("omega", "transverse rate |ω|", "deg/s"),
-        ("phase", "phase arg(ω1 + iω2)", "deg"),
+        ("spin", "spin ω3", "deg/s", spacecraft.spin, spin_prior),
+        ("nutation", "nutation" if symmetric else "largest nutation", "deg", spacecraft.nutation, None),
+        ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
+        ("phase", "phase arg(ω1 + iω2)", "deg", math.atan2(omega.imag, omega.real) if time == 0.0 else None, None),
     )
-    for (key, label, unit), value, sigma, of_file in zip(rows, values, sigmas, file, strict=True):
-        prior = spin_prior if key == "spin" else None
-        # Carried to another time the motion is not comparable with that of the file, but for the spin and the angle.
-        known = of_file if time == 0.0 or key != "phase" else None
+    for (key, label, unit, known, prior), value, sigma in zip(rows, values, sigmas, strict=True):
         yield Estimate(key, label, unit, 1.0 / DEG, float(value), float(sigma), known, prior)
-
-
-def _transverse(now: tuple[Body, SpinState]) -> tuple[float, float]:
-    """ω1 and ω2 in the axes of the file, rad/s."""
-    body, state = now
-    rates = body.axes @ state.rates
-    return float(rates[0]), float(rates[1])
 
 
 def _of_body(fitted: Fit) -> Iterator[Estimate]:
@@ -333,7 +318,6 @@ LABELS = {
 
 
 def _of_others(fitted: Fit) -> Iterator[Estimate]:
-    """Sensors and thrusters."""
     for parameter in fitted.model.parameters:
         kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
         if kind not in LABELS:
@@ -355,9 +339,8 @@ def _at(fitted: Fit, name: str) -> tuple[float, float]:
 
 def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     """Pairs of parameters that are known together much better than apart, and their correlations."""
-    scale = fitted.sigmas
-    matrix = fitted.covariance / np.outer(scale, scale)
-    names = [pair.name for pair in fitted.model.parameters]
+    matrix = fitted.covariance / np.outer(fitted.sigmas, fitted.sigmas)
+    names = [parameter.name for parameter in fitted.model.parameters]
     pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
     return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
 
