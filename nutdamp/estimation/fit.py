@@ -97,17 +97,12 @@ def expect_enough(model: Model) -> None:
         )
 
 
-FAR = 2.0
-"""Times the noise of neighbouring samples from which on residuals are no noise."""
+FAR, PART = 2.0, 1e-3
+"""Residuals are no noise from so many times that of neighbouring samples on, and such a part of what varies in a
+signal: records without noise show smaller ones."""
 
-PART = 1e-3
-"""Part of what varies in a signal that such residuals have at least: records without noise show smaller ones."""
-
-WINDOWS = (4, 8, 16, 32, 64)
-"""Samples in a row among which those left out are counted."""
-
-CHANCE = 1e-6
-"""Probability by which they may be scattered so unevenly."""
+WINDOWS, CHANCE = (4, 8, 16, 32, 64), 1e-6
+"""Samples in a row among which those left out are counted; probability by which they may be scattered so unevenly."""
 
 FEWEST_JUDGED = 20
 """Samples of a signal that are judged at least."""
@@ -115,11 +110,9 @@ FEWEST_JUDGED = 20
 SPLITS, SAMPLES = 120, 2000
 """Times at which a step is looked for, and samples of a signal used for that, at most."""
 
-STEP = 0.7
-"""Part of the residuals that is left beside a step, at most, for it to count as found where they are no noise."""
-
-SHOWN = 50.0
-"""Decrease of the sum of squares, in units of the noise, by which a step shows in residuals that are nearly noise."""
+STEP, SHOWN = 0.7, 50.0
+"""A step counts as found where it leaves such a part of residuals that are no noise, at most; in those that are nearly
+noise, where it lowers the sum of squares by so much, in units of the noise."""
 
 
 def expect_explained(fitted: Fit) -> None:
@@ -247,14 +240,11 @@ def _remains(columns: Vector, values: Vector) -> float:
 OUTLIER = 5.0
 """Standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03."""
 
-ROUNDS = 8
-"""Fits in which noise and outliers are found anew, at most."""
+ROUNDS, STILL = 8, 1e-3
+"""Fits in which noise and outliers are found anew, at most, and relative change of the noise from which on they are."""
 
 ADJUSTED = 3
 """Rounds in which the noise is corrected for what the fit takes of it."""
-
-STILL = 1e-3
-"""Relative change of the noise from which on it is found anew."""
 
 POOR = 0.3
 """Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""

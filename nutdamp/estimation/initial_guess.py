@@ -40,11 +40,8 @@ if TYPE_CHECKING:
     from nutdamp.estimation.search import Fit
 
 
-FINER = 8
-"""The spectrum is taken at so many times as many frequencies as there are samples."""
-
-LONGEST_SPECTRUM = 1 << 16
-"""Samples of a spectrum at most; of longer records the first."""
+FINER, LONGEST_SPECTRUM = 8, 1 << 16
+"""Frequencies of a spectrum for each of its samples, and largest number of these; of longer records the first."""
 
 SMALL = 1e-3
 """Share of the spin that trial transverse rates have: the motion is linear there."""
@@ -64,11 +61,8 @@ FLAT = 0.1
 TURNS = 8
 """Starting values of the angle by which the body is turned about its axis."""
 
-TRIED = 60
-"""Values of C/A that are tried at most where no spectrum shows the nutation."""
-
-SLIP = 1.5
-"""Phase, rad, by which the nutation of two of them differs at the end of a record."""
+TRIED, SLIP = 60, 1.5
+"""Values of C/A tried at most where no spectrum shows the nutation, and phase, rad, by which two differ at the end."""
 
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:

@@ -41,11 +41,8 @@ BODY, SPACE = "body", "space"
 APART = math.sin(math.radians(1.0))
 """Sine of the angle from which on two directions are two."""
 
-STEPS = 4000
-"""Values of a signal from which the step of its quantisation is found, at most."""
-
-MULTIPLES = 0.9
-"""Share of the differences of values that are multiples of a step, for it to be one."""
+STEPS, MULTIPLES = 4000, 0.9
+"""Values of a signal from which its steps are found, at most, and share of their differences that are multiples."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,11 +30,8 @@ LEAST = 1e-9
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
 
-CLOSE = 1.0 / 125.0
-"""Part of the time shown below which firings that follow each other cannot be distinguished: 4 points on a sheet."""
-
-MANY = 3
-"""Least number of firings drawn as one."""
+CLOSE, MANY = 1.0 / 125.0, 3
+"""Part of the time shown below which firings cannot be distinguished: 4 points on a sheet; so many are drawn as one."""
 
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not distinguished from its axis."""

@@ -45,11 +45,8 @@ NUMBERED = 17
 CROWD, NEAR = 3, 0.05
 """Firings in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
 
-MANY = 12
-"""Number of firings from which on lines and arrowheads are small."""
-
-SPARSE = 40
-"""Number of firings up to which each has a dot."""
+MANY, SPARSE = 12, 40
+"""Numbers of firings above which lines and arrowheads are small, and up to which each has a dot."""
 
 ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 """Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""

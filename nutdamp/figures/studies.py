@@ -56,11 +56,8 @@ NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
 FAR = 4.0
 """A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
 
-DOTS = 2_000
-"""Largest number of cases shown as dots: more would only make the picture heavy."""
-
-DENSE = 0.8
-"""Opacity of a dot: fainter ones are not seen (less than 3:1 on white)."""
+DOTS, DENSE = 2_000, 0.8
+"""Cases shown as dots at most, more would only make the picture heavy, and their opacity: fainter ones are not seen."""
 
 TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}
 """Look of the title of a panel."""
@@ -334,11 +331,8 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
 ROWS = 6000
 """Moments of the envelope, over all windows."""
 
-AFTER = 1.25
-"""End of the time shown over the end of the last firing of the plan."""
-
-TURNS = 2.0
-"""Periods of the nutation that are shown at least."""
+AFTER, TURNS = 1.25, 2.0
+"""End of the time shown over that of the last firing of the plan, and periods of the nutation shown at least."""
 
 SHALLOW = 1e-3
 """Depth of the envelope below 0 that is the step of the linear program in time."""

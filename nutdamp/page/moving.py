@@ -100,7 +100,9 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "firing": firing,
     }
     if named:
-        columns |= _named_columns("axis", _unit(track.axis)) | _named_columns("H", _unit(track.momentum))
+        for name, ways in (("axis", track.axis), ("H", track.momentum)):
+            unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+            columns |= _named_columns(name, np.rint(SPHERE * unit.T).astype(int).tolist())
     for number, watched in enumerate((direction for direction in named if direction.watched), start=1):
         columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, watched.axis)), ANGLE_DIGITS)
     utc = _dates(body, track, clock)
@@ -145,7 +147,11 @@ def _panels(
 ) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
     """Pole curve and axis track, the columns of their paths, the place of the target in the latter, and both rooms."""
     sky, momentum = geometry.sky_paths(flown, track)
-    target = _target(flown, track, named, np.vstack([sky, momentum]))
+    target = geometry.sky_target(flown, track)
+    # Only if the globe names it and it leaves room for the paths.
+    reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
+    if not (named and np.all(np.hypot(*target.T) <= reach)):
+        target = np.empty((0, 2))
     pole = geometry.pole_path(track)
     pole_room = geometry.room(pole, 0.1, centre=True)
     sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
@@ -168,13 +174,6 @@ def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[in
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
 
 
-def _target(flown: Flight, track: Track, named: Sequence[NamedDirection], paths: Vector) -> Vector:
-    """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
-    target = geometry.sky_target(flown, track)
-    reach = FAR * float(np.hypot(*paths.T).max())
-    return target if named and len(target) and float(np.hypot(*target[0])) <= reach else np.empty((0, 2))
-
-
 def _angle_digits(track: Track) -> int:
     """Decimals of degrees that show four figures of the largest nutation."""
     largest = math.degrees(float(track.nutation.max()))
@@ -189,12 +188,6 @@ def _whole(values: Vector, digits: int) -> list[int]:
 def _steps(values: Sequence[int]) -> list[int]:
     """The first number and the difference of each from the one before: short where little changes."""
     return [now - before for before, now in zip([0, *values], values, strict=False)]
-
-
-def _unit(vectors: Vector) -> list[list[int]]:
-    """Three columns of directions as parts of `SPHERE`."""
-    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    return [column.tolist() for column in np.rint(SPHERE * unit.T).astype(int)]
 
 
 def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
@@ -220,13 +213,11 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
 def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
     """For each row the number of the text that names the firings; the first text is that of none."""
     texts, column = ["none"], []
-    pulses = list(zip(flown.schedule, flown.spans, strict=True))
+    names = [
+        f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, start=1)
+    ]
     for time in track.t.tolist():
-        on = [
-            f"{number}: {channel_text(pulse, flown.spacecraft)}"
-            for number, (pulse, (begins, ends)) in enumerate(pulses, start=1)
-            if begins <= time <= ends
-        ]
+        on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
         text = " and ".join(on) or texts[0]
         if text not in texts:
             texts.append(text)
@@ -237,12 +228,10 @@ def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
 def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
     """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
-    for direction in named[:1]:
-        if float(middle @ direction.axis) > -0.9:
-            middle = middle + direction.axis
+    if named and float(middle @ named[0].axis) > -0.9:
+        middle = middle + named[0].axis
     longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
-    turned = math.degrees(longitude or 0.0) - 20.0
-    shown = math.degrees(latitude)
+    turned, shown = math.degrees(longitude or 0.0) - 20.0, math.degrees(latitude)
     return [round(turned, 1), round(shown - 25.0 if shown > 0.0 else shown + 25.0, 1)]
 
 

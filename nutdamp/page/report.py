@@ -284,7 +284,6 @@ def _sections(
 
 
 def _title(body: Spacecraft) -> str:
-    """Title of the page: the task."""
     turn = "" if body.goal.axis is None else f", turn by {math.degrees(body.to_turn):.4g}°"
     return f"{body.name} · damp {math.degrees(body.tilt):.4g}° nutation{turn}"
 
