@@ -400,12 +400,9 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
 @carry_options("the end")
 @plot_options(FIGURES)
-@click.option("--show", "drawn", is_flag=True, help="Draw pole curve and axis track in the terminal.")
 @screen_options
 @quiet_option
-def simulate_command(
-    job: Job, real: bool, until: float | None, samples: int, at: float | None, drawn: bool, verbose: bool
-) -> None:
+def simulate_command(job: Job, real: bool, until: float | None, samples: int, at: float | None, verbose: bool) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 
     Exit status 4 where all pulses are fired, and with real widths the end does not meet the requirement, or the axis
@@ -413,8 +410,6 @@ def simulate_command(
     input; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is standard output, for
     --schedule standard input.
     """
-    if drawn and "-" in job.written.values():
-        raise click.UsageError("--show draws on standard output, where a FILE of - already goes")
     job.begin()
     plan = plan_or_read(job, jitter=True, judged=not job.silent)
 
@@ -425,10 +420,6 @@ def simulate_command(
     simulation = simulate(plan, until, flown=real, samples=samples)
     if job.silent:
         job.note(model_warnings(simulation.impulses, simulation.flown))
-    screens: list[Callable[[], RenderableType]] = [partial(simulation_screen, simulation, verbose=verbose)]
-    if drawn:
-        from nutdamp.figures.terminal import motion_drawing
-
-        screens.append(partial(motion_drawing, simulation.shown, simulation.pictured))
-    job.deliver(simulation, *screens, more=job.carried(plan, at, simulation.until))
+    screen = partial(simulation_screen, simulation, verbose=verbose)
+    job.deliver(simulation, screen, more=job.carried(plan, at, simulation.until))
     leave(missed=simulation.decision.met is False and len(simulation.flown.schedule) == len(plan.pulses))

@@ -1,10 +1,8 @@
 """Estimates of a spacecraft from telemetry: robust least squares, outliers left out, the model as wide as shown.
 
-Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits, so that they cost
-no efficiency. Noise is estimated. Tests say whether a record can be fitted, and whether what its fit leaves is noise:
-second differences of the residuals, r[k-1] - 2 r[k] + r[k+1], have the standard deviation √6 s of noise s, and next to
-nothing of what changes slowly. Residuals far larger than that s are no noise but motion that the model does not have,
-such as a pulse: their sigmas would mean nothing.
+Outliers are found under a loss that grows linearly beyond a few sigma and left out of the last fits. Residuals far
+larger than the noise that their second differences show are motion that the model does not have, such as a pulse: their
+sigmas would mean nothing.
 """
 
 from __future__ import annotations
@@ -99,17 +97,12 @@ def expect_enough(model: Model) -> None:
         )
 
 
-FAR = 2.0
-"""Times the noise of neighbouring samples from which on residuals are no noise."""
+FAR, PART = 2.0, 1e-3
+"""Residuals are no noise from so many times that of neighbouring samples on, and such a part of what varies in a
+signal: records without noise show smaller ones."""
 
-PART = 1e-3
-"""Part of what varies in a signal that such residuals have at least: records without noise show smaller ones."""
-
-WINDOWS = (4, 8, 16, 32, 64)
-"""Samples in a row among which those left out are counted."""
-
-CHANCE = 1e-6
-"""Probability by which they may be scattered so unevenly."""
+WINDOWS, CHANCE = (4, 8, 16, 32, 64), 1e-6
+"""Samples in a row among which those left out are counted; probability by which they may be scattered so unevenly."""
 
 FEWEST_JUDGED = 20
 """Samples of a signal that are judged at least."""
@@ -117,11 +110,9 @@ FEWEST_JUDGED = 20
 SPLITS, SAMPLES = 120, 2000
 """Times at which a step is looked for, and samples of a signal used for that, at most."""
 
-STEP = 0.7
-"""Part of the residuals that is left beside a step, at most, for it to count as found where they are no noise."""
-
-SHOWN = 50.0
-"""Decrease of the sum of squares, in units of the noise, by which a step shows in residuals that are nearly noise."""
+STEP, SHOWN = 0.7, 50.0
+"""A step counts as found where it leaves such a part of residuals that are no noise, at most; in those that are nearly
+noise, where it lowers the sum of squares by so much, in units of the noise."""
 
 
 def expect_explained(fitted: Fit) -> None:
@@ -171,7 +162,9 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
             # The more, the less likely: elsewhere are fewer then.
             at = int(np.argmax(counts))
             elsewhere = max(float(sums[-1] - counts[at]), 1.0) / (len(rows) - width)
-            chance = len(rows) * _tail(int(counts[at]), width, min(elsewhere, 1.0))
+            share, most = min(elsewhere, 1.0), int(counts[at])
+            tail = (math.comb(width, n) * share**n * (1.0 - share) ** (width - n) for n in range(most, width + 1))
+            chance = len(rows) * math.fsum(tail)
             if counts[at] > 0 and chance < least:
                 least = chance
                 those = model.times[rows][at : at + width][out[at : at + width]]
@@ -179,21 +172,9 @@ def left_out_together(fitted: Fit) -> tuple[str, float, float, int] | None:
     return burst
 
 
-def _tail(count: int, width: int, share: float) -> float:
-    """Probability that ``count`` or more of ``width`` samples are outliers, each by a ``share``."""
-    return math.fsum(
-        math.comb(width, number) * share**number * (1.0 - share) ** (width - number)
-        for number in range(count, width + 1)
-    )
-
-
-def _rows(fitted: Fit, signal: int) -> Vector:
-    return np.asarray(fitted.residuals[fitted.model.signal == signal])
-
-
 def _noise(fitted: Fit, signal: int) -> float:
-    """Noise of a signal by its second differences; at least that of its steps."""
-    second = np.diff(_rows(fitted, signal), 2)
+    """Noise s of a signal by its second differences, whose standard deviation is √6 s; at least that of its steps."""
+    second = np.diff(fitted.residuals[fitted.model.signal == signal], 2)
     noise = NORMAL_MAD * float(np.median(np.abs(second))) / math.sqrt(6.0)
     return max(noise, float(least(fitted.model)[signal]))
 
@@ -201,11 +182,8 @@ def _noise(fitted: Fit, signal: int) -> float:
 def _more_than_noise(fitted: Fit, signal: int) -> bool:
     model = fitted.model
     values = model.measured[model.signal == signal]
-    if (
-        model.signals[signal] == SUN_PULSE
-        or len(values) < FEWEST_JUDGED
-        or fitted.noise[signal] < FAR * _noise(fitted, signal)
-    ):
+    judged = model.signals[signal] != SUN_PULSE and len(values) >= FEWEST_JUDGED
+    if not judged or fitted.noise[signal] < FAR * _noise(fitted, signal):
         return False
     varied = NORMAL_MAD * float(np.median(np.abs(values - np.median(values))))
     return bool(fitted.noise[signal] > PART * varied) and not fitted.white(signal)
@@ -233,12 +211,10 @@ def step(fitted: Fit, signals: Sequence[int], *, small: bool = False) -> float |
 
 def _rate(fitted: Fit, signal: int) -> float:
     """Rate at which a signal shows the nutation, rad/s: in the body, or of the axis about H."""
-    rate = initial_guess.nutation_rate(fitted.model, fitted.values)
-    if KIND[fitted.model.signals[signal]].nutation != SPACE:
-        return rate
-    named = fitted.named
-    spin = named.get("omega_3", fitted.model.spacecraft.spin)
-    axial = initial_guess.axial_rate(fitted.model, named[RATIO], spin)
+    model, named = fitted.model, fitted.named
+    if KIND[model.signals[signal]].nutation != SPACE:
+        return initial_guess.nutation_rate(model, fitted.values)
+    axial = initial_guess.axial_rate(model, named[RATIO], named.get("omega_3", model.spacecraft.spin))
     return math.hypot(axial, named["omega_1"], named["omega_2"])
 
 
@@ -264,14 +240,11 @@ def _remains(columns: Vector, values: Vector) -> float:
 OUTLIER = 5.0
 """Standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03."""
 
-ROUNDS = 8
-"""Fits in which noise and outliers are found anew, at most."""
+ROUNDS, STILL = 8, 1e-3
+"""Fits in which noise and outliers are found anew, at most, and relative change of the noise from which on they are."""
 
 ADJUSTED = 3
 """Rounds in which the noise is corrected for what the fit takes of it."""
-
-STILL = 1e-3
-"""Relative change of the noise from which on it is found anew."""
 
 POOR = 0.3
 """Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""
@@ -290,9 +263,6 @@ SEEN = 4.5
 
 UNEQUAL = 5.0
 """Standard deviations from which on the transverse moments count as different, or such a body as dissipating."""
-
-GROWS = 3.0
-"""Standard deviations of κ from which on a body that turns out to have three moments is taken to dissipate."""
 
 UNEQUAL_BY = ("unequal_1", "unequal_2")
 """The parameters of unequal transverse moments."""
@@ -327,21 +297,18 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
     fitted = initial_guess.likeliest(
         [fitted, *(_settled(model, values) for values in initial_guess.neighbours(model, fitted.values))]
     )
-    grown = fitted.index("growth")
-    growing = grown is not None and bool(abs(fitted.values[grown]) > GROWS * fitted.sigmas[grown])
     if model.unequal:
         if _shows_growth(fitted):
             return _widened(fitted, Model(spacecraft, record), ("growth",))
         return _grown_a_little(fitted)
-    three = Model(spacecraft, record, unequal=True, growing=growing)
+    three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
     if not _shown(fitted, three, _begun(fitted, three), _places(three, UNEQUAL_BY)):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
     unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
-    if not growing or not _shows_growth(unequal):
+    if not fitted.grows or not _shows_growth(unequal):
         return _grown_a_little(unequal)
-    begin = _begun(fitted, three)
-    of_moments = _places(three, UNEQUAL_BY)
+    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 
@@ -380,7 +347,6 @@ def _begun(narrow: Fit, wider: Model) -> Vector:
 
 
 def _places(model: Model, names: Sequence[str]) -> list[int]:
-    """Positions of parameters by their names."""
     return [index for index, each in enumerate(model.parameters) if each.name in names]
 
 
@@ -395,9 +361,8 @@ def _widened(narrow: Fit, wider: Model, more: Sequence[str]) -> Fit:
 
 def _expect_seen(fitted: Fit) -> None:
     """Raise Infeasible where there is no nutation in the record."""
-    at = [fitted.index("omega_1"), fitted.index("omega_2")]
-    omega = np.array([fitted.values[place] for place in at if place is not None])
-    across = fitted.covariance[np.ix_(at, at)]  # type: ignore[arg-type]
+    at = _places(fitted.model, ("omega_1", "omega_2"))
+    omega, across = fitted.values[at], fitted.covariance[np.ix_(at, at)]
     # Its size counts: where the phase is hardly known, the rate across it is not either.
     size = float(np.linalg.norm(omega))
     sigma = size / math.sqrt(float(omega @ np.linalg.pinv(across, hermitian=True) @ omega))
@@ -426,10 +391,8 @@ def _best(model: Model) -> Vector:
 
 def _grown(model: Model, share: float, values: Vector) -> tuple[Vector, float]:
     """The fit of the first ``share`` of the record, then of twice as much, to the whole."""
-    begin, length = model.start, model.record.length
-    cost = math.inf
     while True:
-        rows = model.times <= begin + share * length
+        rows = model.times <= model.start + share * model.record.length
         values, cost = search(model, values, scales_of(model), rows, robust=True, near=False)
         if share >= 1.0:
             return values, cost
@@ -449,15 +412,11 @@ def _try(model: Model, begins: Sequence[dict[str, float]]) -> tuple[Vector, floa
         if share_left(model, ends[-1][0]) < POOR:
             break
     values, cost = min(ends, key=lambda end: end[1])
-    if _unlikely(model, values):
+    rows, nominal = model.prior
+    # Where the file hardly allows for the values, the search may have left the valley in which it began.
+    if np.any(np.abs(rows @ values - nominal) > UNLIKELY):
         ends = [(values, cost), *(search(model, begin, scales, every, robust=True) for begin in vectors[:STARTS])]
     return min(ends, key=lambda end: end[1])
-
-
-def _unlikely(model: Model, values: Vector) -> bool:
-    """True where the file hardly allows for the values: the search may have left the valley in which it began."""
-    rows, nominal = model.prior
-    return bool(np.any(np.abs(rows @ values - nominal) > UNLIKELY))
 
 
 def _settled(model: Model, values: Vector) -> Fit:

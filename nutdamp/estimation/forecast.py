@@ -8,7 +8,7 @@ cases dispersed by that covariance and by what else the file disperses.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
@@ -18,11 +18,22 @@ import numpy as np
 from nutdamp.common import results
 from nutdamp.common.numerics import finite
 from nutdamp.errors import Infeasible
-from nutdamp.estimation.fit import GROWS, estimated
+from nutdamp.estimation.fit import estimated
 from nutdamp.estimation.model import Model
-from nutdamp.estimation.parameters import AXIS, CROSSING, DIRECTION, GYROS, QUATERNION, SEEN, SUN_PULSE, Record, Vector
+from nutdamp.estimation.parameters import (
+    AXIS,
+    CROSSING,
+    DIRECTION,
+    GYROS,
+    QUATERNION,
+    RATIO,
+    SEEN,
+    SUN_PULSE,
+    Record,
+    Vector,
+)
 from nutdamp.estimation.results import Carried, Estimate, carried, estimates, moving, posterior, replaced
-from nutdamp.estimation.search import Fit
+from nutdamp.estimation.search import Fit, named_of
 from nutdamp.montecarlo import study as dispersion
 from nutdamp.montecarlo.cases import DispersedCases
 from nutdamp.montecarlo.inputs import Draws
@@ -101,9 +112,8 @@ class Outlook:
     @property
     def longer(self) -> Prospect | None:
         """The shortest longer coast that pays; None where none does."""
-        return next(
-            (prospect for prospect in self.coasts if self._pays(prospect) and prospect.length > self.now.length), None
-        )
+        longer = (prospect for prospect in self.coasts if prospect.length > self.now.length)
+        return next(filter(self._pays, longer), None)
 
     @property
     def probe(self) -> Prospect | None:
@@ -138,46 +148,32 @@ def outlook(fitted: Fit, time: float, progress: Callable[[int], None] = lambda _
     if plan is None or not len(plan.pulses):
         raise Infeasible("no plan from the estimate has pulses: more telemetry would change nothing")
     probability = required_share(spacecraft.requirement)
-    length, done, coasts = fitted.model.record.length, 0, []
-    for share in LENGTHS:
-        coasts.append(_prospect(plan, fitted, time, probability, share * length))
-        progress(done := done + 1)
-    probes = []
-    for name, on_time in _probes(plan, body):
-        probes.append(_prospect(plan, fitted, time, probability, length, name, on_time))
-        progress(done := done + 1)
-    return Outlook(plan.scheme, tuple(coasts), tuple(probes), probability, plan.propellant)
-
-
-def _probes(plan: Plan, body: Spacecraft) -> Iterator[tuple[str, float]]:
-    """The channels that the plan fires, and their mean on-time."""
-    known = {channel.name for channel in body.channels}
+    length, channels = fitted.model.record.length, {channel.name for channel in body.channels}
+    looked_at = [(share * length, "", 0.0) for share in LENGTHS]
+    # Of each channel that the plan fires, a pulse as long as its mean on-time.
     for name in dict.fromkeys(pulse.channel for pulse in plan.pulses):
-        lengths = [pulse.on_time for pulse in plan.pulses if pulse.channel == name]
-        if name in known and min(lengths) > 0.0:
-            yield name, math.fsum(lengths) / len(lengths)
+        on_times = [pulse.on_time for pulse in plan.pulses if pulse.channel == name]
+        if name in channels and min(on_times) > 0.0:
+            looked_at.append((length, name, math.fsum(on_times) / len(on_times)))
+    prospects = []
+    for done, (length, probe, on_time) in enumerate(looked_at, start=1):
+        prospects.append(_prospect(plan, fitted, time, probability, length, probe, on_time))
+        progress(done)
+    coasts, probes = tuple(prospects[: len(LENGTHS)]), tuple(prospects[len(LENGTHS) :])
+    return Outlook(plan.scheme, coasts, probes, probability, plan.propellant)
 
 
 def _prospect(
-    plan: Plan, fitted: Fit, time: float, level: float, length: float, probe: str = "", on_time: float = 0.0
+    plan: Plan, fitted: Fit, time: float, level: float, length: float, probe: str, on_time: float
 ) -> Prospect:
     imagined = _imagined(fitted, length, probe, on_time)
     known = carried(imagined, time - (fitted.model.record.end - length))
-    body = plan.spacecraft
-    dispersed = replace(body, dispersions=posterior(fitted.model.spacecraft.dispersions, known))
+    dispersed = replace(plan.spacecraft, dispersions=posterior(fitted.model.spacecraft.dispersions, known))
     nutation, met = left_in_cases(dispersion.study_of(dispersed, plan.pulses), level)
-    at = imagined.index("C/A")
-    assert at is not None
-    return Prospect(
-        length,
-        float(imagined.sigmas[at]),
-        nutation,
-        met,
-        probe,
-        on_time,
-        float(imagined.sigmas[imagined.index(f"thrust {probe}") or 0]) if probe else math.nan,
-        imagined.model.record.schedule.propellant if probe else None,
-    )
+    sigmas = named_of(imagined.model, imagined.sigmas)
+    thrust = sigmas.get(f"thrust {probe}", math.nan)
+    propellant = imagined.model.record.schedule.propellant if probe else None
+    return Prospect(length, sigmas[RATIO], nutation, met, probe, on_time, thrust, propellant)
 
 
 def left_in_cases(study: Study, level: float) -> tuple[float, float | None]:
@@ -233,11 +229,8 @@ def _imagined(fitted: Fit, length: float, probe: str, on_time: float) -> Fit:
         fired = Schedule((channel_pulse(channel, 0.5 * length, on_time),))
     interval = max(model.record.interval, length / MOST_SAMPLES)
     times = np.asarray(interval * np.arange(max(math.floor(length / interval), 8) + 1), dtype=np.float64)
-    grown = fitted.index("growth")
     # Of three moments a growth takes integrations, which one that does not show is not worth.
-    growing = grown is not None and (
-        not model.unequal or abs(float(fitted.values[grown])) > GROWS * float(fitted.sigmas[grown])
-    )
+    growing = fitted.grows if model.unequal else fitted.index("growth") is not None
 
     def of(record: Record) -> tuple[Model, dict[str, float]]:
         imagined = Model(body, record, unequal=model.unequal, growing=growing)

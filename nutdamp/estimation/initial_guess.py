@@ -1,9 +1,7 @@
 """Start of a fit: rate and size of the nutation from the spectrum of one signal, the rest by linear least squares.
 
 A symmetric body's ω = ω1 + iω2 turns in the body at -aω3, its axis in space about H at |H|/A: so the peak of a
-spectrum gives C/A. The motion is linear in ω0 for small angles, and nearly so for large ones.
-
-Crossings and Sun aspect angles come too seldom for a spectrum: there each C/A that the file allows is tried.
+spectrum gives C/A. Where signals come too seldom for a spectrum, each C/A that the file allows is tried.
 
 Aliases: seen every T s, a rate looks like any other that differs by a multiple of 2π/T. C/A is known but for multiples
 of 2π/(|ω3| T), and one transverse signal alone does not show the sense of the rate either.
@@ -35,18 +33,15 @@ from nutdamp.estimation.parameters import (
     Vector,
     wrapped,
 )
-from nutdamp.estimation.search import scales_of
+from nutdamp.estimation.search import named_of, scales_of
 from nutdamp.physics import attitude
 
 if TYPE_CHECKING:
     from nutdamp.estimation.search import Fit
 
 
-FINER = 8
-"""The spectrum is taken at so many times as many frequencies as there are samples."""
-
-LONGEST_SPECTRUM = 1 << 16
-"""Samples of a spectrum at most; of longer records the first."""
+FINER, LONGEST_SPECTRUM = 8, 1 << 16
+"""Frequencies of a spectrum for each of its samples, and largest number of these; of longer records the first."""
 
 SMALL = 1e-3
 """Share of the spin that trial transverse rates have: the motion is linear there."""
@@ -66,19 +61,17 @@ FLAT = 0.1
 TURNS = 8
 """Starting values of the angle by which the body is turned about its axis."""
 
-TRIED = 60
-"""Values of C/A that are tried at most where no spectrum shows the nutation."""
-
-SLIP = 1.5
-"""Phase, rad, by which the nutation of two of them differs at the end of a record."""
+TRIED, SLIP = 60, 1.5
+"""Values of C/A tried at most where no spectrum shows the nutation, and phase, rad, by which two differ at the end."""
 
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
     """Values to begin with: from the first ``share`` of the record, as the file has them otherwise."""
-    spin = _spin(model)
+    spin, record = _spin(model), model.record
     yield from _starts(model, share, spin)
     # The Sun does not go round a sensor once a turn where it is near the axis: then the file knows better.
-    if _by_pulses(model) and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
+    by_pulses = len(record.sun_pulses) > 1 and not record.has(GYROS[2]) and _seen_around(model) is None
+    if by_pulses and abs(spin / model.spacecraft.spin - 1.0) > OTHER:
         yield from _starts(model, share, model.spacecraft.spin)
 
 
@@ -94,7 +87,12 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
     linear = of_file | ({} if rate is None else _moments(model, rate, spin))
     if model.record.has(*AXIS):
         linear |= _towards(model, np.nanmean(_axes(model.record), axis=0))
-    ratios = [linear[RATIO]] if rate is not None or not _seldom(model) else _ratios(model, spin)
+    ratios: Sequence[float] | Vector = [linear[RATIO]]
+    if rate is None and _seldom(model):
+        # All that the file allows, so near to each other that one of them leads to the least.
+        _, low, high = _range(model)
+        count = math.ceil((high - low) * abs(spin) * model.record.length / SLIP) + 1
+        ratios = np.linspace(low, high, min(count, TRIED))
     angles = [2.0 * math.pi * turn / TURNS for turn in range(TURNS)] if "attitude_3" in of_file else []
     if _seen_around(model) is not None:
         angles = [_around(model)[1]]
@@ -114,18 +112,6 @@ def _starts(model: Model, share: float, spin: float) -> Iterator[dict[str, float
 def _seldom(model: Model) -> bool:
     """True where only signals that come too seldom for a spectrum show a nutation."""
     return not any(KIND[name].nutation for name in model.signals if name == "axis" or KIND[name].nutation == BODY)
-
-
-def _ratios(model: Model, spin: float) -> Vector:
-    """The values of C/A that the file allows, so near to each other that one of them leads to the least."""
-    _, low, high = _range(model)
-    count = math.ceil((high - low) * abs(spin) * model.record.length / SLIP) + 1
-    return np.linspace(low, high, min(count, TRIED))
-
-
-def _by_pulses(model: Model) -> bool:
-    """True where Sun pulses alone show the spin."""
-    return len(model.record.sun_pulses) > 1 and not model.record.has(GYROS[2]) and _seen_around(model) is None
 
 
 def _seen_around(model: Model) -> tuple[Vector, Vector] | None:
@@ -154,10 +140,8 @@ def _around(model: Model) -> tuple[float, float]:
     seen = _seen_around(model)
     assert seen is not None
     times, angles = seen
-    spin = model.spacecraft.spin
     gyro = model.record.samples(GYROS[2:])[1]
-    if len(gyro):
-        spin = float(np.median(gyro))
+    spin = float(np.median(gyro)) if len(gyro) else model.spacecraft.spin
     # Turns between two samples by the spin as it is known; then a line through all.
     steps = spin * np.diff(times)
     steps = steps + wrapped(np.diff(angles) - steps)
@@ -210,9 +194,8 @@ def _peak(model: Model, spin: float, share: float) -> float | None:
     record, body = model.record, model.spacecraft
     expected = body.inertia.nutation_rate(spin)
     most = abs(spin) if body.inertia.wheel == 0.0 else max(abs(spin), 2.0 * abs(expected))
-    count = max(int(share * len(record.times)), min(len(record.times), 16))
-    times = record.times[: min(count, LONGEST_SPECTRUM)]
-    signals = {name: values[: len(times)] for name, values in record.signals.items()}
+    count = _count(record, share)
+    times, signals = record.times[:count], {name: values[:count] for name, values in record.signals.items()}
     if record.has(*GYROS[:2]):
         return _strongest(times, signals[GYROS[0]], signals[GYROS[1]], -expected, most, -1.0)
     for name in (*GYROS[:2], ACCELERATION):
@@ -237,8 +220,12 @@ class _Cone(NamedTuple):
 
 
 def _axes(record: Record) -> Vector:
-    """The measured axes, (n, 3)."""
     return np.column_stack([record.signals[name] for name in AXIS])
+
+
+def _count(record: Record, share: float) -> int:
+    """Samples of a spectrum of the first ``share`` of a record."""
+    return min(max(int(share * len(record.times)), min(len(record.times), 16)), LONGEST_SPECTRUM)
 
 
 def _cone(model: Model, share: float) -> _Cone | None:
@@ -246,7 +233,7 @@ def _cone(model: Model, share: float) -> _Cone | None:
     record, body = model.record, model.spacecraft
     if not record.has(*AXIS):
         return None
-    count = min(max(int(share * len(record.times)), min(len(record.times), 16)), LONGEST_SPECTRUM)
+    count = _count(record, share)
     times, axis = record.times[:count], _axes(record)[:count]
     there = np.isfinite(axis).all(axis=1)
     if there.sum() < 4:
@@ -288,8 +275,7 @@ def _strongest(
     there = np.isfinite(real) if imaginary is None else np.isfinite(real) & np.isfinite(imaginary)
     if there.sum() < 4:
         return None
-    at = times[there]
-    values = real[there] + (0j if imaginary is None else 1j * imaginary[there])
+    at, values = times[there], real[there] + (0j if imaginary is None else 1j * imaginary[there])
     step = float(np.median(np.diff(at)))
     count = min(math.ceil((at[-1] - at[0]) / step) + 1, LONGEST_SPECTRUM)
     place = np.rint((at - at[0]) / step).astype(int)
@@ -381,26 +367,22 @@ def neighbours(model: Model, values: Vector) -> list[Vector]:
     Where the file gives no tolerance, all that are possible, if the nutation found is itself sampled too slowly.
     """
     at, low, high = _range(model)
-    if math.isinf(model.parameters[at].prior) and not too_slow(model, values):
+    of_file = model.parameters[at]
+    if math.isinf(of_file.prior) and not too_slow(model, values):
         return []
-    step = 2.0 * math.pi / (abs(_spin_of(model, values)) * interval(model))
+    spin = named_of(model, values).get("omega_3", model.spacecraft.spin)
+    step = 2.0 * math.pi / (abs(spin) * interval(model))
     # a -> a + k step; of one transverse signal also a -> -a + k step.
     one_sided = len(_transverse(model)) == 1 and not any(KIND[name].nutation == SPACE for name in model.signals)
     mirrored = [(2.0 - values[at], False)] * one_sided + [(-values[at], False)] * _seldom(model)
     ratios = []
     for begin, itself in ((values[at], True), *mirrored):
-        nearest = round((model.parameters[at].file - begin) / step)
-        ratios += [
-            begin + k * step for k in range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1) if k != 0 or not itself
-        ]
-    ratios = sorted(
-        (ratio for ratio in ratios if low < ratio < high), key=lambda ratio: abs(ratio - model.parameters[at].file)
-    )
-    vectors = []
-    for ratio in ratios[:MOST_ALIASES]:
-        vectors.append(values.copy())
-        vectors[-1][at] = ratio
-    return vectors
+        nearest = round((of_file.file - begin) / step)
+        turns = range(nearest - MOST_ALIASES, nearest + MOST_ALIASES + 1)
+        ratios += [begin + k * step for k in turns if k != 0 or not itself]
+    possible = sorted((ratio for ratio in ratios if low < ratio < high), key=lambda ratio: abs(ratio - of_file.file))
+    every = np.arange(len(values))
+    return [np.where(every == at, ratio, values) for ratio in possible[:MOST_ALIASES]]
 
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
@@ -444,8 +426,9 @@ def too_slow(model: Model, values: Vector) -> bool:
 
 def nutation_rate(model: Model, values: Vector) -> float:
     """Rate at which the signals show the nutation, rad/s: in the body, or in space where only the axis is seen."""
-    spin = _spin_of(model, values)
-    axial = axial_rate(model, float(values[_range(model)[0]]), spin)
+    named = named_of(model, values)
+    spin = named.get("omega_3", model.spacecraft.spin)
+    axial = axial_rate(model, named[RATIO], spin)
     return spin - axial if _transverse(model) else axial
 
 
@@ -466,17 +449,8 @@ def _transverse(model: Model) -> list[str]:
     return [name for name in model.signals if KIND[name].nutation == BODY]
 
 
-def _spin_of(model: Model, values: Vector) -> float:
-    names = [parameter.name for parameter in model.parameters]
-    return float(values[names.index("omega_3")]) if "omega_3" in names else model.spacecraft.spin
-
-
 def _range(model: Model) -> tuple[int, float, float]:
     """Position of C/A among the parameters, and the range that the file leaves it."""
-    at = next(index for index, parameter in enumerate(model.parameters) if parameter.name == RATIO)
-    parameter = model.parameters[at]
-    return (
-        at,
-        max(parameter.file - WITHIN * parameter.prior, POSSIBLE[0]),
-        min(parameter.file + WITHIN * parameter.prior, POSSIBLE[1]),
-    )
+    at, of_file = next((at, each) for at, each in enumerate(model.parameters) if each.name == RATIO)
+    (least, most), reach = POSSIBLE, WITHIN * of_file.prior
+    return at, max(of_file.file - reach, least), min(of_file.file + reach, most)

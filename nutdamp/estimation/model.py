@@ -1,8 +1,5 @@
 """Prediction of telemetry from parameters: closed forms for coasts, the flight where pulses were fired.
 
-A coast of a symmetric body is that of `energy_sink`, of three different moments that of `triaxial`; where there are
-pulses, disturbances, or dissipation of three moments, it is `flight.flown`. What sensors show of it is in `signals`.
-
 Transverse moments that differ are A[[1 + e1, e2], [e2, 1 - e1]] about the axes 1 and 2 of the file's principal axes:
 regular at e = 0, where principal axes are any.
 """
@@ -14,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nutdamp.common import work
 from nutdamp.control_loop.sensor import is_blind
@@ -43,7 +39,7 @@ from nutdamp.physics import attitude, energy_sink, triaxial
 from nutdamp.physics.taylor import Forcing
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
 
 PREDICTION, SHOWN, SAMPLE = 0.1, 2e-4, 1e-3
 """Units of `work` of a prediction, of each sample, and of each time of a motion that is new, besides steps."""
@@ -104,7 +100,7 @@ class Model:
         self.start = record.start
         self._at: dict[tuple[float, ...], tuple[Body, SpinState]] = {}
         self._last: tuple[tuple[tuple[str, float], ...], tuple[Vector, Vector]] | None = None
-        self.parameters = parameters(spacecraft, record, unequal=self.unequal, growing=growing)
+        self.parameters = tuple(parameters(spacecraft, record, unequal=self.unequal, growing=growing))
         self.prior = prior(spacecraft, self.parameters)
         self.pulses = self._pulses()
         kinds = record.kinds
@@ -114,24 +110,24 @@ class Model:
         rows = [kind.samples(record) for kind in kinds]
         self.samples = [samples for _, samples in rows]
         self.times = np.concatenate([np.tile(times, kind.parts) for kind, (times, _) in zip(kinds, rows, strict=True)])
-        counts = [kind.parts * len(samples) for kind, samples in zip(kinds, self.samples, strict=True)]
-        self.signal = np.repeat(np.arange(len(rows)), counts)
-        self.measured = np.concatenate(
-            [
-                np.zeros(kind.parts * len(samples)) if kind.off else samples[:, 0]
-                for kind, samples in zip(kinds, self.samples, strict=True)
-            ]
-        )
+        compared = [
+            np.zeros(kind.parts * len(samples)) if kind.off else samples[:, 0]
+            for kind, samples in zip(kinds, self.samples, strict=True)
+        ]
+        self.measured = np.concatenate(compared)
+        self.signal = np.repeat(np.arange(len(rows)), [len(values) for values in compared])
+        # Rows of the motion at all times that show each sample of a signal.
+        self._instants, back = np.unique(self.times, return_inverse=True)
+        firsts = np.searchsorted(self.signal, np.arange(len(rows)))
+        self._rows = [back[first : first + len(samples)] for first, samples in zip(firsts, self.samples, strict=True)]
 
     @cached_property
     def reference(self) -> SpinState:
         """The motion at the start of the record as the file has it."""
         inertia = self.spacecraft.inertia
-        state = self.spacecraft.initial
-        body = Body(inertia.moments, inertia.axes, state, self.spacecraft.growth, inertia.wheel)
+        body = Body(inertia.moments, inertia.axes, self.spacecraft.initial, self.spacecraft.growth, inertia.wheel)
         # As if the record began at t = 0; a file's disturbances are too small to turn it much before.
-        rates, quaternion = _coast(body).motion(np.array([self.start]))
-        return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
+        return _state(_coast(body), self.start)
 
     def parameter(self, name: str) -> Parameter | None:
         """The one of that name, if it is estimated."""
@@ -169,85 +165,57 @@ class Model:
         rates, quaternion = self._path(body, self._fired(values), float(times[-1])).motion(times - self.start)
         return rates @ body.axes.T, attitude.multiply(quaternion, attitude.from_matrix(body.axes.T))
 
-    def moved(self, body: Body, schedule: Schedule, time: float) -> SpinState:
-        """The motion of a body at ``time`` s, in its own principal axes; before the record it coasts."""
-        if time < self.start:
-            schedule = Schedule()
-        path = self._path(body, schedule, time)
-        rates, quaternion = path.motion(np.array([time - self.start]))
-        return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
-
     def at(self, values: Values, time: float) -> tuple[Body, SpinState]:
-        """The body, and its motion at ``time`` s; once for each, since what is estimated of it is derived again."""
+        """The body, and its motion at ``time`` s in its own principal axes; before the record it coasts.
+
+        Once for each: what is estimated of it is derived again.
+        """
         key = (time, *values.values())
         if key not in self._at:
             body = self.body(values)
-            self._at[key] = body, self.moved(body, self._fired(values), time)
+            schedule = Schedule() if time < self.start else self._fired(values)
+            self._at[key] = body, _state(self._path(body, schedule, time), time - self.start)
         return self._at[key]
 
     def predicted(self, values: Values) -> Vector:
         """Samples of `measured` as they would be without noise, (m,)."""
         work.spend(PREDICTION + SHOWN * len(self.measured))
         rates, quaternion = self._remembered(values)
-        moments, parts = self._moments(values), []
+        (A, C), e1, parts = in_moments(self.spacecraft, values), values.get("unequal_1", 0.0), []
+        moments = A * (1.0 + e1), A * (1.0 - e1), C
         for name, samples, rows in zip(self.signals, self.samples, self._rows, strict=True):
             seen = Sighting(self.spacecraft, values, moments, samples, rates[rows], quaternion[rows])
             parts.append(KIND[name].predicted(seen))
         return np.concatenate(parts)
 
-    def _moments(self, values: Values) -> tuple[float, float, float]:
-        A, C = in_moments(self.spacecraft, values)
-        e1 = values.get("unequal_1", 0.0)
-        return A * (1.0 + e1), A * (1.0 - e1), C
-
     def _remembered(self, values: Values) -> tuple[Vector, Vector]:
         """The motion at all times; once for values that differ in what only the sensors are off."""
         key = tuple((name, value) for name, value in values.items() if not name.startswith(OF_SENSORS))
         if self._last is None or self._last[0] != key:
-            times, _ = self._all_times
+            times = self._instants
             work.spend(SAMPLE * len(times))
+            shows_attitude = any(KIND[name].attitude for name in self.signals)
             bare = np.empty((len(times), 0))
-            self._last = key, self.motion(values, times) if self._turned else (self._rates(values, times), bare)
+            self._last = key, self.motion(values, times) if shows_attitude else (self._rates(values, times), bare)
         return self._last[1]
 
-    @property
-    def _turned(self) -> bool:
-        """True where any signal shows the attitude."""
-        return any(KIND[name].attitude for name in self.signals)
-
     def _rates(self, values: Values, times: Vector) -> Vector:
-        """The rates of `motion` alone."""
         body = self.body(values)
         if self.pulses.pulses or self.spacecraft.disturbances or not body.closed:
             return self.motion(values, times)[0]
-        state, (A, _, C) = body.state, body.moments
+        state, (A, _, C), since = body.state, body.moments, times - self.start
         if not body.symmetric:
-            return triaxial.free_rates(body.moments, state.rates, times - self.start) @ body.axes.T
-        since = times - self.start
+            return triaxial.free_rates(body.moments, state.rates, since) @ body.axes.T
         omega, spin = energy_sink.rates_on_arc(A, C, body.growth, state.omega, state.spin, since, body.wheel)
         return np.column_stack([omega.real, omega.imag, spin]) @ body.axes.T
 
-    @cached_property
-    def _rows(self) -> list[NDArray[np.intp]]:
-        """Rows of the motion at all times that show each sample of a signal."""
-        _, back = self._all_times
-        firsts = np.searchsorted(self.signal, np.arange(len(self.signals)))
-        return [back[first : first + len(samples)] for first, samples in zip(firsts, self.samples, strict=True)]
-
-    @cached_property
-    def _all_times(self) -> tuple[Vector, NDArray[np.intp]]:
-        return np.unique(self.times, return_inverse=True)
-
     def _pulses(self) -> Schedule:
         """The pulses fired since the record began; times count from there."""
-        kept = []
-        for pulse in self.record.schedule:
-            if pulse.over <= self.start:
-                continue
+        pulses = [pulse for pulse in self.record.schedule if pulse.over > self.start]
+        for pulse in pulses:
             if pulse.thrust[0] < self.start:
                 raise BadRequest(f"the pulse at {pulse.t:g} s is on as the record begins, at {self.start:g} s")
-            kept.append(pulse.moved(-self.start))
-        return Schedule(tuple(kept))
+        return Schedule(tuple(pulse.moved(-self.start) for pulse in pulses))
 
     def _fired(self, values: Values) -> Schedule:
         """The pulses with the thrust factors and delays of their channels."""
@@ -271,29 +239,30 @@ class Model:
         spacecraft = self._as_spacecraft(body)
         acting = make_dynamics(spacecraft)
         dynamics = _Closed(body.moments, acting.constant, Forcing(acting.forcing.turning, body.growth, body.wheel))
-        pulses = tuple(self._in_axes(body, pulse) for pulse in fired)
+        turn = body.axes.T @ self.spacecraft.inertia.axes  # from the principal axes of the file to those of the body
+        pulses = tuple(
+            replace(pulse, torque=None if pulse.torque is None else turn @ pulse.torque, impulse=turn @ pulse.impulse)
+            for pulse in fired
+        )
         return _Flown(flown(spacecraft, Schedule(pulses), until - self.start, dynamics=dynamics))
-
-    def _in_axes(self, body: Body, pulse: Pulse) -> Pulse:
-        """A pulse, which is in the principal axes of the file, in those of the ``body``."""
-        turn = body.axes.T @ self.spacecraft.inertia.axes
-        torque = None if pulse.torque is None else turn @ pulse.torque
-        return replace(pulse, torque=torque, impulse=turn @ pulse.impulse)
 
     def _as_spacecraft(self, body: Body) -> Spacecraft:
         to_file = attitude.multiply(body.state.quaternion, attitude.from_matrix(body.axes.T))
         turn = body.axes.T @ self.spacecraft.inertia.axes
         about = complex(turn[0, 0], turn[1, 0])  # both have axis 3
+        disturbances = (replace(each, transverse=about * each.transverse) for each in self.spacecraft.disturbances)
         return replace(
             self.spacecraft,
             inertia=body.inertia,
-            disturbances=tuple(
-                replace(disturbance, transverse=about * disturbance.transverse)
-                for disturbance in self.spacecraft.disturbances
-            ),
+            disturbances=tuple(disturbances),
             omega0=body.state.rates,
             attitude=Attitude(to_file),
         )
+
+
+def _state(path: Path, time: float) -> SpinState:
+    rates, quaternion = path.motion(np.array([time]))
+    return SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
 
 
 def _coast(body: Body) -> Path:
@@ -304,10 +273,7 @@ def _coast(body: Body) -> Path:
 
 
 class _Closed(Dynamics):
-    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them.
-
-    A fit flies thousands of times, and most of a record is coast.
-    """
+    """Dynamics whose coasts are closed forms for three different moments too, where nothing acts on them."""
 
     def _path(self, state: SpinState, start: float, end: float, push: Push, most: int) -> tuple[Path, SpinState]:
         acts = bool(push.torques) or push.falling is not None or self.constant.any() or self.forcing != Forcing()
@@ -315,8 +281,7 @@ class _Closed(Dynamics):
             return super()._path(state, start, end, push, most)
         work.spend(POLHODE)
         coast = FreeCoast(self.moments, start, state)
-        rates, quaternion = coast.motion(np.array([end]))
-        return coast, SpinState(complex(rates[0, 0], rates[0, 1]), float(rates[0, 2]), quaternion[0])
+        return coast, _state(coast, end)
 
 
 @dataclass(frozen=True)
@@ -344,10 +309,7 @@ def _expect_described(spacecraft: Spacecraft, record: Record) -> None:
     if len(record.sun_pulses) and (spacecraft.sun is None or spacecraft.sun_sensor is None):
         key = "sun" if spacecraft.sun is None else "sun_sensor"
         raise Unsuitable((key,), f"expected the key {key}: Sun pulses are timed by attitude, sun and sun_sensor")
-    for name, key, given in (
-        (SUN_ASPECT, "sun", spacecraft.sun),
-        (DIRECTION[0], "attitude", spacecraft.attitude),
-    ):
-        if record.has(name) and given is None:
-            what = CROSSING if name == DIRECTION[0] else name
-            raise Unsuitable((key,), f"expected the key {key}, for the columns of {what}")
+    if record.has(SUN_ASPECT) and spacecraft.sun is None:
+        raise Unsuitable(("sun",), f"expected the key sun, for the columns of {SUN_ASPECT}")
+    if record.has(DIRECTION[0]) and spacecraft.attitude is None:
+        raise Unsuitable(("attitude",), f"expected the key attitude, for the columns of {CROSSING}")

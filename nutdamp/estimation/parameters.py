@@ -21,7 +21,7 @@ from nutdamp.physics import attitude, sky
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.spacecraft.tolerances import Tolerance
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -41,11 +41,8 @@ BODY, SPACE = "body", "space"
 APART = math.sin(math.radians(1.0))
 """Sine of the angle from which on two directions are two."""
 
-STEPS = 4000
-"""Values of a signal from which the step of its quantisation is found, at most."""
-
-MULTIPLES = 0.9
-"""Share of the differences of values that are multiples of a step, for it to be one."""
+STEPS, MULTIPLES = 4000, 0.9
+"""Values of a signal from which its steps are found, at most, and share of their differences that are multiples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,23 +205,20 @@ def _gyro(index: int) -> Callable[[Sighting], Vector]:
 
 
 def _felt(seen: Sighting) -> Vector:
-    """Acceleration at the accelerometer, m/s²."""
+    """Acceleration at the accelerometer, m/s².
+
+    Dissipation counts as the torque that changes H in the body alike: of a body whose axis e turns at κ cos θ (t × e)
+    besides, t along H, dH/dt = κ cos θ (cos θ H - |H| e).
+    """
     spacecraft, moments = seen.spacecraft, np.array(seen.moments)
     assert spacecraft.loop is not None
     rates = seen.rates @ spacecraft.inertia.axes
-    sinking = _sinking(moments * rates, seen.values.get("growth", spacecraft.growth))
-    columns = felt(spacecraft.loop.sensor, moments, rates.T, sinking.T)
-    return np.asarray(columns[0] + seen.values.get("bias_acceleration", 0.0))
-
-
-def _sinking(momentum: Vector, growth: float) -> Vector:
-    """The torque (n, 3) N m that would change H (n, 3) N m s in the body as dissipation does.
-
-    Of a body whose axis e turns at κ cos θ (t × e) besides, t along H: dH/dt = κ cos θ (cos θ H - |H| e).
-    """
+    momentum, growth = moments * rates, seen.values.get("growth", spacecraft.growth)
     size = np.linalg.norm(momentum, axis=1, keepdims=True)
     cosine = momentum[:, 2:] / size
-    return np.asarray(growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0])))
+    sinking = growth * cosine * (cosine * momentum - size * np.array([0.0, 0.0, 1.0]))
+    columns = felt(spacecraft.loop.sensor, moments, rates.T, sinking.T)
+    return np.asarray(columns[0] + seen.values.get("bias_acceleration", 0.0))
 
 
 def _axis_off(seen: Sighting) -> Vector:
@@ -343,14 +337,6 @@ class Parameter(NamedTuple):
     step: float
 
 
-def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool) -> tuple[Parameter, ...]:
-    """The parameters of a record, the motion first; ``unequal``: with I1 ≠ I2, ``growing``: with dissipation.
-
-    Rates are those at the start of the record.
-    """
-    return tuple(_all(spacecraft, record, unequal, growing))
-
-
 def moments(spacecraft: Spacecraft) -> Iterator[Parameter]:
     """A and the ratio C/A, as far as the file lets them differ from its values; the ratio in any case.
 
@@ -398,31 +384,37 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
     return np.array(rows).reshape(-1, len(chosen)), np.array(values)
 
 
+EXACT = Dispersions()
+"""The dispersions of a file that has none."""
+
+
 def _together(spacecraft: Spacecraft) -> float:
     """Correlation of A and C by the file."""
-    pairs = () if spacecraft.dispersions is None else spacecraft.dispersions.correlation
+    pairs = (spacecraft.dispersions or EXACT).correlation
     return next((value for first, second, value in pairs if {first, second} == {"A", "C"}), 0.0)
 
 
 def _of_moments(spacecraft: Spacecraft) -> tuple[tuple[float, float], tuple[float, float]]:
     """Means and standard deviations of A and C by the file, kg m²."""
-    given, inertia = spacecraft.dispersions, spacecraft.inertia
-    pairs = ((inertia.A, None if given is None else given.A), (inertia.C, None if given is None else given.C))
-    of_A, of_C = ((value, 0.0) if tolerance is None else prior_of(tolerance, value) for value, tolerance in pairs)
-    return of_A, of_C
+    given, inertia = spacecraft.dispersions or EXACT, spacecraft.inertia
+    return prior_of(given.A, inertia.A), prior_of(given.C, inertia.C)
 
 
-def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -> Iterator[Parameter]:
-    given, spin, step = spacecraft.dispersions, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
+def parameters(spacecraft: Spacecraft, record: Record, *, unequal: bool, growing: bool) -> Iterator[Parameter]:
+    """The parameters of a record, the motion first; ``unequal``: with I1 ≠ I2, ``growing``: with dissipation.
+
+    Rates are those at the start of the record.
+    """
+    given, spin, step = spacecraft.dispersions or EXACT, float(spacecraft.omega0[2]), TINY * spacecraft.fastest
     yield from moments(spacecraft)
-    if given is not None and given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
+    if given.wheel_momentum is not None and spacecraft.inertia.wheel != 0.0:
         wheel, sigma = prior_of(given.wheel_momentum, spacecraft.inertia.wheel)
         yield Parameter("wheel", "N m s", wheel, sigma, TINY * abs(wheel))
     for number in (1, 2):
         yield Parameter(f"omega_{number}", "rad/s", float(spacecraft.omega0[number - 1]), math.inf, step)
     if record.shows_spin:
         yield Parameter("omega_3", "rad/s", spin, math.inf, step)
-    elif given is not None and given.omega0[2] is not None:
+    elif given.omega0[2] is not None:
         mean, sigma = prior_of(given.omega0[2], spin)
         yield Parameter("omega_3", "rad/s", mean, sigma, step)
     if growing and (spacecraft.inertia.a != 0.0 or spacecraft.inertia.wheel != 0.0):
@@ -445,10 +437,14 @@ def _all(spacecraft: Spacecraft, record: Record, unequal: bool, growing: bool) -
 
 def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Turns of the attitude at the start about body axes; the last shows only beside what turns with the body."""
-    seen, given = _tells_attitude(spacecraft, record), spacecraft.dispersions
+    # A record of the axis tells the attitude, or of two directions: of one it may be turned about it.
+    ways = record.samples(DIRECTION)[1]
+    if record.has(SUN_ASPECT) and spacecraft.sun is not None:
+        ways = np.vstack([ways, spacecraft.sun])
+    apart = len(ways) > 0 and np.linalg.norm(np.cross(ways, ways[0]), axis=1).max() > APART
     sigma = math.inf
-    if not seen:
-        sigma = 0.0 if given is None or given.attitude is None else prior_of(given.attitude, 0.0)[1]
+    if not (apart or record.has("axis_x")):
+        sigma = prior_of((spacecraft.dispersions or EXACT).attitude, 0.0)[1]
         # The file has the attitude at t = 0: where on its cone the axis is as the record begins is less sure.
         turn = min(2.0 * math.pi / spacecraft.inertial_period * abs(record.start), math.pi)
         sigma = math.hypot(sigma, 2.0 * math.sin(0.5 * turn) * spacecraft.nutation) if sigma > 0.0 else 0.0
@@ -458,24 +454,12 @@ def _attitude(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
         yield Parameter("attitude_3", "rad", 0.0, math.inf, TINY)
 
 
-def _tells_attitude(spacecraft: Spacecraft, record: Record) -> bool:
-    """True for a record of the axis, or of two directions: of one the attitude may be turned about it."""
-    if record.has("axis_x"):
-        return True
-    directions = [record.samples(DIRECTION)[1]]
-    if record.has(SUN_ASPECT) and spacecraft.sun is not None:
-        directions.append(spacecraft.sun[None, :])
-    every = np.concatenate(directions)
-    return len(every) > 0 and bool(np.linalg.norm(np.cross(every, every[0]), axis=1).max() > APART)
-
-
 def _gyros(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
     """Biases; misalignment only beside gyro 3, for else it looks like a bias of gyros 1 and 2."""
-    loop, given = spacecraft.loop, spacecraft.dispersions
-    mean = loop.sensor.bias if loop is not None and loop.sensor.kind == GYRO else 0.0
-    sigma = BIAS
-    if loop is not None and given is not None and given.sensor_bias is not None and loop.sensor.kind == GYRO:
-        mean, sigma = prior_of(given.sensor_bias, mean)
+    loop, given = spacecraft.loop, (spacecraft.dispersions or EXACT).sensor_bias
+    mean, sigma = 0.0, BIAS
+    if loop is not None and loop.sensor.kind == GYRO:
+        mean, sigma = (loop.sensor.bias, BIAS) if given is None else prior_of(given, loop.sensor.bias)
     aligned = record.has(GYROS[2])
     for name in GYROS:
         if record.has(name):
@@ -497,18 +481,19 @@ def _channels(spacecraft: Spacecraft, record: Record) -> Iterator[Parameter]:
 
 def thrust_prior(spacecraft: Spacecraft, name: str) -> tuple[float, float]:
     """Thrust factor of a channel by the file, and its standard deviation; that is infinite without a tolerance."""
-    given = spacecraft.dispersions
+    given = (spacecraft.dispersions or EXACT).thrust
     channel = next((channel for channel in spacecraft.channels if channel.name == name), None)
-    if given is None or channel is None:
+    if channel is None:
         return 1.0, math.inf
-    sizes = [given.thrust.get(thruster.name) for thruster in channel.thrusters]
-    priors = [prior_of(size, 1.0) for size in sizes if size is not None]
-    mean = 1.0 + math.fsum(factor - 1.0 for factor, _ in priors) / len(sizes)
-    return mean, math.hypot(*(sigma for _, sigma in priors)) / len(sizes) or math.inf
+    priors = [prior_of(given.get(thruster.name), 1.0) for thruster in channel.thrusters]
+    mean = 1.0 + math.fsum(factor - 1.0 for factor, _ in priors) / len(priors)
+    return mean, math.hypot(*(sigma for _, sigma in priors)) / len(priors) or math.inf
 
 
-def prior_of(tolerance: Tolerance, nominal: float) -> tuple[float, float]:
-    """Mean and standard deviation of a value of the file, in its unit."""
+def prior_of(tolerance: Tolerance | None, nominal: float) -> tuple[float, float]:
+    """Mean and standard deviation of a value of the file, in its unit; zero without a tolerance."""
+    if tolerance is None:
+        return nominal, 0.0
     size = tolerance.size * (abs(nominal) if tolerance.relative else 1.0)
     if tolerance.kind == "bias":
         return nominal + math.copysign(size, tolerance.size), 0.0

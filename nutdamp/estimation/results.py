@@ -15,7 +15,7 @@ import numpy as np
 from nutdamp.estimation import initial_guess
 from nutdamp.estimation.fit import step
 from nutdamp.estimation.model import OF_SENSORS, Body
-from nutdamp.estimation.parameters import RATIO, Matrix, Values, Vector, in_moments, prior_of, thrust_prior
+from nutdamp.estimation.parameters import EXACT, RATIO, Matrix, Values, Vector, in_moments, prior_of, thrust_prior
 from nutdamp.estimation.search import KEPT, Fit
 from nutdamp.physics import attitude
 from nutdamp.physics.triaxial import arc_cones
@@ -126,10 +126,12 @@ def carried(fitted: Fit, time: float) -> Carried:
     factors: dict[str, str] = {}
     for parameter in model.parameters:
         kind, _, name = parameter.name.partition(" ")
-        if kind == "thrust" and name in channels and _calibrated(fitted, name):
-            factors |= {f"thrust {member.name}": parameter.name for member in channels[name].thrusters}
-    more = {WHEEL: "wheel"} if fitted.index("wheel") is not None else {}
-    more |= factors
+        if kind == "thrust" and name in channels:
+            value, sigma = _at(fitted, parameter.name)
+            # It fired, and the data tell its thrust better than the file.
+            if value > LEAST_THRUST and sigma < thrust_prior(model.spacecraft, name)[1]:
+                factors |= {f"thrust {member.name}": parameter.name for member in channels[name].thrusters}
+    more = ({WHEEL: "wheel"} if fitted.index("wheel") is not None else {}) | factors
     names = ("A", "C", "omega0_1", "omega0_2", "omega0_3", *more)
 
     def inputs(values: Values) -> Vector:
@@ -137,10 +139,13 @@ def carried(fitted: Fit, time: float) -> Carried:
         rates = body.axes @ state.rates
         return np.array([*in_moments(model.spacecraft, values), *rates, *(values[name] for name in more.values())])
 
-    slopes, tilt = derivatives(fitted, inputs), None
+    def axis(values: Values) -> Vector:
+        return attitude.rotate(model.at(values, time)[1].quaternion, np.array([0.0, 0.0, model.spacecraft.sense]))
+
+    tilt = None
     if fitted.index("attitude_1") is not None:
-        tilt = math.sqrt(0.5 * float(np.trace(_axis_covariance(fitted, time))))
-    covariance = slopes @ fitted.covariance @ slopes.T
+        tilt = math.sqrt(0.5 * float(np.trace(_covariance(fitted, axis))))
+    covariance = _covariance(fitted, inputs)
     return Carried(time, names, inputs(fitted.named), covariance, *moving(fitted, time), tilt)
 
 
@@ -151,18 +156,11 @@ def moving(fitted: Fit, time: float) -> tuple[Body, SpinState]:
     if fitted.index("attitude_1") is None and fitted.index("attitude_3") is None:
         # Rates say nothing of where the body points: at t = 0 it is as the file has it.
         first, at_first = model.at(fitted.named, 0.0)
-        of_file = attitude.multiply(
-            model.spacecraft.initial.quaternion, attitude.from_matrix(model.spacecraft.inertia.axes.T)
-        )
+        spacecraft = model.spacecraft
+        of_file = attitude.multiply(spacecraft.initial.quaternion, attitude.from_matrix(spacecraft.inertia.axes.T))
         back = attitude.conjugate(attitude.multiply(at_first.quaternion, attitude.from_matrix(first.axes.T)))
         state = replace(state, quaternion=attitude.multiply(attitude.multiply(of_file, back), state.quaternion))
     return body, state
-
-
-def _calibrated(fitted: Fit, channel: str) -> bool:
-    """True where a channel fired, and the data tell its thrust better than the file."""
-    value, sigma = _at(fitted, f"thrust {channel}")
-    return value > LEAST_THRUST and sigma < thrust_prior(fitted.model.spacecraft, channel)[1]
 
 
 def replaced(spacecraft: Spacecraft, known: Carried) -> Spacecraft:
@@ -180,13 +178,13 @@ def posterior(given: Dispersions | None, known: Carried) -> Dispersions:
     sigmas = dict(zip(known.names, known.sigmas.tolist(), strict=True))
     of_A, of_C = (Tolerance("normal", sigmas[name]) if sigmas[name] > 0.0 else None for name in ("A", "C"))
     first, second, third = (Tolerance("normal", sigmas[f"omega0_{number}"]) for number in (1, 2, 3))
-    of_file = given or Dispersions()
+    of_file = given or EXACT
     thrust = {name: Tolerance("normal", sigma / factor, True) for name, (factor, sigma) in known.factors.items()}
     return replace(
         of_file,
         A=of_A,
         C=of_C,
-        wheel_momentum=(Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum),
+        wheel_momentum=Tolerance("normal", sigmas[WHEEL]) if WHEEL in sigmas else of_file.wheel_momentum,
         omega0=(first, second, third),
         thrust={**of_file.thrust, **thrust},
         attitude=of_file.attitude if known.tilt is None else Tolerance("normal", known.tilt),
@@ -216,30 +214,16 @@ def correlations(known: Carried, given: Dispersions | None) -> tuple[tuple[str, 
     return (*(pair for pair in pairs if pair[2] != 0.0), *kept)
 
 
-def derivatives(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
-    """Derivatives (k, p) of what a function makes of body and motion, by central differences."""
+def _covariance(fitted: Fit, function: Callable[[Values], Vector]) -> Matrix:
+    """Covariance (k, k) of what a function makes of body and motion, by central differences."""
     columns: list[Vector] = []
-    for parameter in fitted.model.parameters:
-        if parameter.name.startswith(OF_SENSORS):
+    for name, _, _, _, size in fitted.model.parameters:
+        if name.startswith(OF_SENSORS):
             columns.append(np.zeros_like(columns[0]))  # the motion comes first of the parameters
             continue
-        ends = [
-            function(fitted.named | {parameter.name: fitted.named[parameter.name] + sign * parameter.step})
-            for sign in (1.0, -1.0)
-        ]
-        columns.append((ends[0] - ends[1]) / (2.0 * parameter.step))
-    return np.column_stack(columns)
-
-
-def _axis_covariance(fitted: Fit, time: float) -> Matrix:
-    """Covariance (3, 3) of the inertial unit vector along the spin axis."""
-    sense = fitted.model.spacecraft.sense
-
-    def axis(values: Values) -> Vector:
-        _, state = fitted.model.at(values, time)
-        return attitude.rotate(state.quaternion, sense * np.array([0.0, 0.0, 1.0]))
-
-    slopes = derivatives(fitted, axis)
+        above, below = (function(fitted.named | {name: fitted.named[name] + way}) for way in (size, -size))
+        columns.append((above - below) / (2.0 * size))
+    slopes = np.column_stack(columns)
     return np.asarray(slopes @ fitted.covariance @ slopes.T)
 
 
@@ -249,44 +233,34 @@ def estimates(fitted: Fit, time: float) -> tuple[Estimate, ...]:
 
 
 def _of_motion(fitted: Fit, time: float) -> Iterator[Estimate]:
-    model = fitted.model
-    spacecraft = model.spacecraft
-    phase0 = math.atan2(*_transverse(model.at(fitted.named, time))[::-1])
+    model, spacecraft = fitted.model, fitted.model.spacecraft
+    first, begun = model.at(fitted.named, time)
+    x0, y0, _ = first.axes @ begun.rates  # in the axes of the file
+    phase0 = math.atan2(y0, x0)
 
     def motion(values: Values) -> Vector:
         body, state = model.at(values, time)
-        x, y = _transverse((body, state))
+        x, y, _ = body.axes @ state.rates
         turned = math.remainder(math.atan2(y, x) - phase0, 2.0 * math.pi)
         sense = math.copysign(1.0, body.inertia.axial(state.spin))
         nutation = arc_cones(body.moments, state.rates, sense, body.wheel).nutation
         return np.array([state.spin, nutation, math.hypot(x, y), phase0 + turned])
 
-    slopes = derivatives(fitted, motion)
-    values, sigmas = motion(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
+    values, sigmas = motion(fitted.named), np.sqrt(np.diag(_covariance(fitted, motion)))
     if not model.record.shows_turn:
         sigmas[3] = math.inf
-    omega = complex(*spacecraft.rates[:2])
-    file = [spacecraft.spin, spacecraft.nutation, abs(omega), math.atan2(omega.imag, omega.real)]
-    given = spacecraft.dispersions
-    spin_prior = None if given is None or given.omega0[2] is None else prior_of(given.omega0[2], spacecraft.spin)[1]
+    omega, symmetric = complex(*spacecraft.rates[:2]), model.body(fitted.named).symmetric
+    given = (spacecraft.dispersions or EXACT).omega0[2]
+    spin_prior = None if given is None else prior_of(given, spacecraft.spin)[1]
+    # Carried to another time the phase is not comparable with that of the file.
     rows = (
-        ("spin", "spin ω3", "deg/s"),
-        ("nutation", "nutation" if model.body(fitted.named).symmetric else "largest nutation", "deg"),
-        ("omega", "transverse rate |ω|", "deg/s"),
-        ("phase", "phase arg(ω1 + iω2)", "deg"),
+        ("spin", "spin ω3", "deg/s", spacecraft.spin, spin_prior),
+        ("nutation", "nutation" if symmetric else "largest nutation", "deg", spacecraft.nutation, None),
+        ("omega", "transverse rate |ω|", "deg/s", abs(omega), None),
+        ("phase", "phase arg(ω1 + iω2)", "deg", math.atan2(omega.imag, omega.real) if time == 0.0 else None, None),
     )
-    for (key, label, unit), value, sigma, of_file in zip(rows, values, sigmas, file, strict=True):
-        prior = spin_prior if key == "spin" else None
-        # Carried to another time the motion is not comparable with that of the file, but for the spin and the angle.
-        known = of_file if time == 0.0 or key != "phase" else None
+    for (key, label, unit, known, prior), value, sigma in zip(rows, values, sigmas, strict=True):
         yield Estimate(key, label, unit, 1.0 / DEG, float(value), float(sigma), known, prior)
-
-
-def _transverse(now: tuple[Body, SpinState]) -> tuple[float, float]:
-    """ω1 and ω2 in the axes of the file, rad/s."""
-    body, state = now
-    rates = body.axes @ state.rates
-    return float(rates[0]), float(rates[1])
 
 
 def _of_body(fitted: Fit) -> Iterator[Estimate]:
@@ -296,11 +270,10 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
         A, C = in_moments(spacecraft, values)
         return np.array([values[RATIO], 1.0 - values[RATIO], A, C])
 
-    slopes = derivatives(fitted, body)
-    values, sigmas = body(fitted.named), np.sqrt(np.diag(slopes @ fitted.covariance @ slopes.T))
-    given = spacecraft.dispersions
-    of_A = None if given is None or given.A is None else prior_of(given.A, inertia.A)[1]
-    of_C = None if given is None or given.C is None else prior_of(given.C, inertia.C)[1]
+    values, sigmas = body(fitted.named), np.sqrt(np.diag(_covariance(fitted, body)))
+    given = spacecraft.dispersions or EXACT
+    of_A = None if given.A is None else prior_of(given.A, inertia.A)[1]
+    of_C = None if given.C is None else prior_of(given.C, inertia.C)[1]
     ratio = inertia.C / inertia.A
     both = ratio * math.hypot((of_A or 0.0) / inertia.A, (of_C or 0.0) / inertia.C) or None
     rows = (
@@ -315,18 +288,12 @@ def _of_body(fitted: Fit) -> Iterator[Estimate]:
     if fitted.model.record.shows_turn and not fitted.model.record.shows_spin:
         yield _rate(fitted)
     if fitted.index("wheel") is not None:
-        assert given is not None
-        assert given.wheel_momentum is not None
         known = prior_of(given.wheel_momentum, inertia.wheel)[1]
         yield Estimate("wheel", "wheel momentum h", "N m s", 1.0, *_at(fitted, "wheel"), inertia.wheel, known)
-    if fitted.index("growth") is not None:
-        value, sigma = _at(fitted, "growth")
-        yield Estimate("growth", "growth 1/τ", "1/s", 1.0, value, sigma, spacecraft.growth, None)
-    for number, label in ((1, "(I1 - I2)/(I1 + I2)"), (2, "I12/A")):
-        if fitted.index(f"unequal_{number}") is not None:
-            value, sigma = _at(fitted, f"unequal_{number}")
-            parameter = fitted.model.parameters[fitted.index(f"unequal_{number}") or 0]
-            yield Estimate(f"unequal_{number}", label, "", 1.0, value, sigma, parameter.file, None)
+    others = (("growth", "growth 1/τ", "1/s"), ("unequal_1", "(I1 - I2)/(I1 + I2)", ""), ("unequal_2", "I12/A", ""))
+    for key, label, unit in others:
+        if (parameter := fitted.model.parameter(key)) is not None:
+            yield Estimate(key, label, unit, 1.0, *_at(fitted, key), parameter.file, None)
 
 
 def _rate(fitted: Fit) -> Estimate:
@@ -336,10 +303,8 @@ def _rate(fitted: Fit) -> Estimate:
         body = fitted.model.body(values)
         return np.array([body.inertia.nutation_rate(body.state.spin)])
 
-    slopes = derivatives(fitted, rate)
-    value, sigma = float(rate(fitted.named)[0]), math.sqrt(float((slopes @ fitted.covariance @ slopes.T)[0, 0]))
-    inertia, spin = fitted.model.spacecraft.inertia, fitted.model.spacecraft.spin
-    file = inertia.nutation_rate(spin)
+    value, sigma = float(rate(fitted.named)[0]), math.sqrt(float(_covariance(fitted, rate)[0, 0]))
+    file = fitted.model.spacecraft.inertia.nutation_rate(fitted.model.spacecraft.spin)
     return Estimate("rate", "nutation rate in the body", "deg/s", 1.0 / DEG, value, sigma, file, None)
 
 
@@ -353,7 +318,6 @@ LABELS = {
 
 
 def _of_others(fitted: Fit) -> Iterator[Estimate]:
-    """Sensors and thrusters."""
     for parameter in fitted.model.parameters:
         kind, _, which = parameter.name.partition(" " if " " in parameter.name else "_")
         if kind not in LABELS:
@@ -375,9 +339,8 @@ def _at(fitted: Fit, name: str) -> tuple[float, float]:
 
 def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     """Pairs of parameters that are known together much better than apart, and their correlations."""
-    scale = fitted.sigmas
-    matrix = fitted.covariance / np.outer(scale, scale)
-    names = [pair.name for pair in fitted.model.parameters]
+    matrix = fitted.covariance / np.outer(fitted.sigmas, fitted.sigmas)
+    names = [parameter.name for parameter in fitted.model.parameters]
     pairs = [(names[i], names[j], float(matrix[i, j])) for i in range(len(names)) for j in range(i)]
     return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
 
@@ -439,9 +402,8 @@ def _of_schedule(fitted: Fit) -> Iterator[str]:
         span = f"the record, {record.start:g} s to {record.end:g} s"
         count = f"{outside} of {len(record.schedule)} pulses of the schedule" if record.fired else "the whole schedule"
         yield f"{count} is outside {span}: of its channels the record tells nothing"
-    for index, parameter in enumerate(fitted.model.parameters):
+    for parameter, value, sigma in zip(fitted.model.parameters, fitted.values, fitted.sigmas, strict=True):
         kind, _, channel = parameter.name.partition(" ")
-        value, sigma = float(fitted.values[index]), float(fitted.sigmas[index])
         if kind == "delay" and abs(value) > max(LATE, SURE * sigma):
             way = "late" if value < 0.0 else "early"
             yield (

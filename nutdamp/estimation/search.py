@@ -53,9 +53,8 @@ def least(model: Model) -> Vector:
 
 def robust(model: Model, left: Vector) -> Vector:
     """One sigma of each signal by its median magnitude, which outliers hardly change."""
-    return np.array(
-        [NORMAL_MAD * float(np.median(np.abs(left[model.signal == index]))) for index in range(len(model.signals))]
-    )
+    sizes = [np.median(np.abs(left[model.signal == index])) for index in range(len(model.signals))]
+    return NORMAL_MAD * np.array(sizes)
 
 
 def plain(model: Model, left: Vector, used: NDArray[np.bool_], leverage: Vector | None = None) -> Vector:
@@ -129,12 +128,8 @@ def jacobian(model: Model, values: Vector, which: Iterable[int], *, one_sided: b
 def units_of(model: Model) -> Vector:
     """Sizes in which the parameters are searched: their priors, or what is usual."""
     usual = {"rad/s": 1e-2 * model.spacecraft.fastest, "1/s": 0.1 / max(model.record.length, 1e-9)}
-    return np.array(
-        [
-            parameter.prior if math.isfinite(parameter.prior) else usual.get(parameter.unit, 1e-2)
-            for parameter in model.parameters
-        ]
-    )
+    sizes = (each.prior if math.isfinite(each.prior) else usual.get(each.unit, 1e-2) for each in model.parameters)
+    return np.array(list(sizes))
 
 
 def search(
@@ -268,6 +263,9 @@ CURVED = 7.0
 """By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
 for 2 to 10 parameters, whether s is small or large."""
 
+GROWS = 3.0
+"""Standard deviations of κ from which on it shows."""
+
 KEPT = 0.9
 """Share of its prior above which a parameter's sigma is where the data do not tell it."""
 
@@ -303,6 +301,12 @@ class Fit:
     def index(self, name: str) -> int | None:
         """Position of a parameter; None where it is not estimated."""
         return next((at for at, parameter in enumerate(self.model.parameters) if parameter.name == name), None)
+
+    @property
+    def grows(self) -> bool:
+        """True where κ is estimated and shows: then a body of three moments is taken to dissipate."""
+        at = self.index("growth")
+        return at is not None and bool(abs(self.values[at]) > GROWS * self.sigmas[at])
 
     @cached_property
     def region(self) -> Matrix:

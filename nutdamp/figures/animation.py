@@ -174,12 +174,11 @@ class Scene:
         rims = np.vstack([part for at in cones for part in (at.body, at.space, at.axis[None], at.rotation[None])])
         sphere.draw_ground(self.space, self.looked, self.path)
         sphere.frame(self.space, self.looked, np.vstack([rims, self.path.axis]))
-        much = self.looked.magnified
-        self.space.set_title("Cones" + (f" (angles × {much:g})" if much != 1.0 else ""))
+        self.space.set_title(f"Cones{self.looked.scale}")
         shown = geometry.on_sky(self.plane, np.vstack([rims, self.path.axis]))
         style.square(self.sky, shown, margin=0.06)
-        sky = geometry.sky_names(flight)
-        self.sky.set(xlabel=sky.x, ylabel=sky.y, title=f"Seen along H(0)\n{sky.view}")
+        x, y, sense = geometry.sky_names(flight)
+        self.sky.set(xlabel=x, ylabel=y, title=f"Seen along H(0)\n{sense}")
         history.nutation_history(self.strip, flight, self.path)
         self.strip.set(xlabel=history.TIME)
         sphere.name_directions(self.sky)
@@ -200,7 +199,7 @@ class Scene:
         for artist in self._changing:
             artist.remove()
         now, cones = float(self.timed.times[number]), self.cones(number)
-        kept = [set(axes.get_children()) for axes in self.figure.axes]
+        kept = {artist for axes in self.figure.axes for artist in axes.get_children()}
         done = self.path.t <= now
         sphere.draw_cones(self.space, self.looked, cones)
         sphere.draw_line(self.space, self.looked, self.path.axis[done], MOTION, 0.9)
@@ -211,12 +210,8 @@ class Scene:
             self.sky.plot(*geometry.on_sky(self.plane, mark).T, "D", color=MOTION, markersize=4)
         self.sky.plot(*geometry.on_sky(self.plane, self.path.axis[done]).T, color=MOTION, linewidth=0.9)
         self.strip.axvline(now, color=INK, linewidth=1.2)
-        self._changing = [
-            artist
-            for axes, before in zip(self.figure.axes, kept, strict=True)
-            for artist in axes.get_children()
-            if artist not in before
-        ]
+        drawn = (artist for axes in self.figure.axes for artist in axes.get_children())
+        self._changing = [artist for artist in drawn if artist not in kept]
         self.title.set_text(self.caption(now))
 
     def caption(self, now: float) -> str:
@@ -226,13 +221,9 @@ class Scene:
             for number, pulse in enumerate(self.flight.schedule, start=1)
             if pulse.start <= now <= pulse.end + HELD * self.timed.pace
         ]
-        return (
-            f"{style.short_name(self.flight.spacecraft)}   t = {now:.{self._digits}f} s{firing[-1] if firing else ''}"
-        )
-
-    @property
-    def _digits(self) -> int:
-        return max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
+        digits = max(0, min(6, math.ceil(-math.log10(self.timed.until / self.timed.frames))))
+        name = style.short_name(self.flight.spacecraft)
+        return f"{name}   t = {now:.{digits}f} s{firing[-1] if firing else ''}"
 
     def pixels(self) -> NDArray[np.uint8]:
         """The frame, (height, width, 3): the changing parts drawn over the fixed ones."""

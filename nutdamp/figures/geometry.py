@@ -30,11 +30,8 @@ LEAST = 1e-9
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
 
-CLOSE = 1.0 / 125.0
-"""Part of the time shown below which firings that follow each other cannot be distinguished: 4 points on a sheet."""
-
-MANY = 3
-"""Least number of firings drawn as one."""
+CLOSE, MANY = 1.0 / 125.0, 3
+"""Part of the time shown below which firings cannot be distinguished: 4 points on a sheet; so many are drawn as one."""
 
 NO_CONE = 1e-10
 """Half-angle in rad below which a cone is not distinguished from its axis."""
@@ -67,16 +64,15 @@ def drawn(flight: Flight, track: Track) -> Track:
 
 def quickest(flight: Flight) -> float:
     """The shortest period of the nutation, seen in the body or in space, s."""
-    body = flight.spacecraft
-    size = float(np.linalg.norm(body.momentum))
-    return float(min(body.body_period, 2 * math.pi * min(flight.moments) / size))
+    size = float(np.linalg.norm(flight.spacecraft.momentum))
+    return float(min(flight.spacecraft.body_period, 2 * math.pi * min(flight.moments) / size))
 
 
 def channels_fired(flight: Flight) -> list[str]:
     """Channels that fire, in the order of the file."""
     used = dict.fromkeys(pulse.channel for pulse in flight.schedule)
     order = [channel.name for channel in flight.spacecraft.channels]
-    return sorted(used, key=lambda name: order.index(name) if name in order else -1)
+    return [*(name for name in used if name not in order), *(name for name in order if name in used)]
 
 
 class TrackPiece(NamedTuple):
@@ -142,10 +138,9 @@ def runs(items: Sequence[Item], near: Callable[[Item, Item], bool], least: int) 
     """Items together where each is ``near`` the one before and there are ``least`` of them; all others alone."""
     groups: list[list[Item]] = []
     for item in items:
-        if groups and near(groups[-1][-1], item):
-            groups[-1].append(item)
-        else:
-            groups.append([item])
+        if not groups or not near(groups[-1][-1], item):
+            groups.append([])
+        groups[-1].append(item)
     return [part for group in groups for part in ([group] if len(group) >= least else [[alone] for alone in group])]
 
 
@@ -161,19 +156,11 @@ def sky_plane(flight: Flight, momentum: Vector) -> Vector:
     return np.array([first, np.cross(up, first), up])
 
 
-class Sky(NamedTuple):
-    """Names of the two angles of `on_sky`, and the sense of the view."""
-
-    x: str
-    y: str
-    view: str
-
-
-def sky_names(flight: Flight, centre: str = "H(0)") -> Sky:
-    """The names for a view centred on ``centre``."""
+def sky_names(flight: Flight, centre: str = "H(0)") -> tuple[str, str, str]:
+    """Names of the two angles of `on_sky` in a view centred on ``centre``, and the sense of the view."""
     if flight.spacecraft.attitude is None:
-        return Sky("towards inertial x, °", "towards inertial y, °", "H towards you, inertial x to the right")
-    return Sky(f"east of {centre}, °", f"north of {centre}, °", "H towards you, east to the right")
+        return "towards inertial x, °", "towards inertial y, °", "H towards you, inertial x to the right"
+    return f"east of {centre}, °", f"north of {centre}, °", "H towards you, east to the right"
 
 
 def on_sky(plane: Vector, directions: Vector) -> Vector:
@@ -202,12 +189,14 @@ def sky_paths(flight: Flight, track: Track) -> tuple[Vector, Vector]:
     return on_sky(plane, track.axis), on_sky(plane, track.momentum)
 
 
+def aimed(flight: Flight) -> Vector:
+    """(n, 3): the target axis, or none."""
+    return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
+
+
 def sky_target(flight: Flight, track: Track) -> Vector:
     """(n, 2): the target axis in the same angles; empty where there is none."""
-    axis = flight.spacecraft.goal.axis
-    if axis is None:
-        return np.empty((0, 2))
-    return on_sky(sky_plane(flight, track.momentum[0]), axis[None])
+    return on_sky(sky_plane(flight, track.momentum[0]), aimed(flight))
 
 
 def momentum_inset(flight: Flight, track: Track) -> Vector | None:

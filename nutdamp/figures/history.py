@@ -13,7 +13,7 @@ from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import STEERABLE, Pulse
+from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.text import steering
 
 if TYPE_CHECKING:
@@ -67,16 +67,15 @@ def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
 
 def courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> list[Axes]:
     """The panels of `heights` in ``cells`` of a figure, from above."""
-    panels: list[Axes] = []
-    for cell in cells:
-        panels.append(figure.add_subplot(cell, sharex=panels[0] if panels else None))
-    first, *others = panels
+    first = figure.add_subplot(cells[0])
+    panels = [first, *(figure.add_subplot(cell, sharex=first) for cell in cells[1:])]
+    others = iter(panels[1:])
     nutation_history(first, flight, track)
     if len(flight.schedule):
-        firings(others.pop(0), flight, float(track.t[-1]))
-    rate_history(others.pop(0), flight, track)
-    if others:
-        _spin_history(others[0], flight, track)
+        firings(next(others), flight, float(track.t[-1]))
+    rate_history(next(others), flight, track)
+    for axes in others:
+        _spin_history(axes, flight, track)
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
     panels[-1].set_xlabel(TIME)
@@ -126,7 +125,6 @@ def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
 
 
 def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
-    """Axial rate ω3."""
     spin = np.degrees(track.rates[:, 2])
     axes.plot(track.t, spin, color=MOTION, label="_ω3")
     axes.margins(y=0.12)
@@ -176,14 +174,10 @@ def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> No
         [(block.begins, size)], (row - 0.5 * BAR, BAR), facecolor=PULSE if dense else (PULSE, PALE), edgecolor=PULSE,
         linewidth=0.8, label=None if dense else "firings too close to be distinguished",
     )  # fmt: skip
-    pulse = flight.schedule.pulses[block.first - 1]
-    text = _firing(block.first, pulse, flight) if block.many == 1 else f"{block.name}: {style.number(block.on)} s"
+    how, pulse = f"{style.number(block.on)} s", flight.schedule.pulses[block.first - 1]
+    if block.many == 1:
+        how = how if pulse.on_time else f"{style.number(pulse.magnitude)} N m s"
+        if pulse.channel == STEERABLE:
+            how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
     place: Vector = np.array([block.begins + 0.5 * size, row + 0.5 * BAR])
-    labels.add(axes, text, place, INK, role="bar", short=block.name)
-
-
-def _firing(number: int, pulse: Pulse, flight: Flight) -> str:
-    how = f"{style.number(pulse.on_time)} s" if pulse.on_time else f"{style.number(pulse.magnitude)} N m s"
-    if pulse.channel == STEERABLE:
-        how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
-    return f"{number}: {how}"
+    labels.add(axes, f"{block.name}: {how}", place, INK, role="bar", short=block.name)

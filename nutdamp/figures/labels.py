@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from nutdamp.figures.style import INK, LEADER, SMALL, STAR, TICK_SIZE
+from nutdamp.figures.style import INK, LEADER, SMALL, STAR, TARGET, TICK_SIZE
 from nutdamp.spacecraft.model import Vector
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def add(
     axes: Axes,
     text: str,
     place: Vector,
-    colour: str = INK,
+    colour: str,
     *,
     role: str = "label",
     short: str = "",
@@ -47,20 +47,24 @@ def add(
     of a firing, and reads ``short`` where not all of them have room. The point ``meant`` is nearest to the label, or
     joined to it by a thin line.
     """
-    note = axes.annotate(
-        text,
-        (float(place[0]), float(place[1])),
-        xytext=(0, 0),
-        textcoords="offset points",
-        color=colour,
-        fontsize=SMALL,
-        ha="center",
-        va="bottom" if role == "bar" else "center_baseline",
-        annotation_clip=False,
-    )
+    at, vertical = (float(place[0]), float(place[1])), "bottom" if role == "bar" else "center_baseline"
+    look: dict[str, Any] = {"color": colour, "fontsize": SMALL, "ha": "center", "va": vertical}
+    note = axes.annotate(text, at, xytext=(0, 0), textcoords="offset points", annotation_clip=False, **look)
     note.set_label(f"_{role}{short}")  # begins so that no legend shows it
     if meant is not None:
         _MEANT[note] = meant
+
+
+def meant(places: Vector, rows: Sequence[int]) -> Meant:
+    """Some rows of ``places`` (n, 2), which are not to be taken for the others."""
+    return Meant(places[rows], np.delete(places, rows, axis=0))
+
+
+def target(axes: Axes, places: Vector, name: str = "target") -> None:
+    """The star of the target (n, 2) with its label, and the ``name`` in the legend; none where there is none."""
+    if len(places):
+        axes.plot(*places.T, label=name, **TARGET)
+        add(axes, "target", places[0], INK, role="vital")
 
 
 PASSES = 8
@@ -79,10 +83,8 @@ _FAR = [
     for step in (24.0, 34.0, 46.0, 60.0, 76.0)
     for turn in np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
 ]
-_OFFSETS = {
-    "_vital": [*_AROUND, *_FAR],
-    "_label": _AROUND[:16],
-}
+_OFFSETS = {"_vital": [*_AROUND, *_FAR], "_label": _AROUND[:16]}
+
 FAR = 15.0
 """Points from which a line leads from a label to its point."""
 
@@ -131,12 +133,8 @@ def settle(figure: Figure) -> None:
                 axes.set_in_layout(True)
         begun = now
     figure.set_layout_engine("none")  # labels are put where panels are now
-    order = list(_OFFSETS)
     for axes in panels(figure):
-        notes: list[Any] = sorted(
-            (note for note in axes.texts if note.get_label() in order),
-            key=lambda note: order.index(str(note.get_label())),
-        )
+        notes: list[Any] = [note for role in _OFFSETS for note in axes.texts if note.get_label() == role]
         curves = _inked(axes) if notes else np.empty((0, 2))
         taken: list[Bbox] = []
         leads = _stars(axes)
@@ -147,19 +145,12 @@ def settle(figure: Figure) -> None:
                 leads = np.vstack([leads, _lead(note, box, points)])
             _MEANT.pop(note, None)
         bars: list[Any] = [note for note in axes.texts if str(note.get_label()).startswith("_bar")]
-        if bars:
-            _settle_bars(bars, window, points)
-
-
-def _settle_bars(notes: list[Annotation], window: Bbox, points: float) -> None:
-    """Labels of bars as they are where all have room in their rows, else as many of the short ones as have."""
-    if len(_in_rows(notes, window, points)) == len(notes):
-        return
-    for note in notes:
-        note.set_text(str(note.get_label()).removeprefix("_bar"))
-    fitting = _in_rows(notes, window, points)
-    for note in notes:
-        note.set_visible(note in fitting)
+        if len(_in_rows(bars, window, points)) < len(bars):  # else all have room as they are
+            for note in bars:
+                note.set_text(str(note.get_label()).removeprefix("_bar"))
+            fitting = _in_rows(bars, window, points)
+            for note in bars:
+                note.set_visible(note in fitting)
 
 
 def _in_rows(notes: list[Annotation], window: Bbox, points: float) -> set[Annotation]:

@@ -81,8 +81,7 @@ def first_seconds(plan: LoopPlan) -> float:
 
 
 def _signal(axes: Axes, plan: LoopPlan, until: float) -> None:
-    run = plan.flown_run
-    sensor = run.loop.sensor
+    run, sensor = plan.flown_run, plan.flown_run.loop.sensor
     if sensor.rate is None:
         times = np.linspace(0.0, until, SAMPLES)
         values = Signal(plan.spacecraft, sensor, run.key).shown(run.flight.motion(times)[0])

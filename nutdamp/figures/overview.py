@@ -45,11 +45,8 @@ NUMBERED = 17
 CROWD, NEAR = 3, 0.05
 """Firings in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
 
-MANY = 12
-"""Number of firings from which on lines and arrowheads are small."""
-
-SPARSE = 40
-"""Number of firings up to which each has a dot."""
+MANY, SPARSE = 12, 40
+"""Numbers of firings above which lines and arrowheads are small, and up to which each has a dot."""
 
 ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 """Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
@@ -92,7 +89,7 @@ def overview(flight: Flight, track: Track) -> Figure:
     figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
     ratio = ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
     grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
-    planes(figure, [grid[0, 0], grid[0, 1]], flight, track)
+    planes(figure, (grid[0, 0], grid[0, 1]), flight, track)
     cells = [grid[row + 1, :] for row in range(len(sizes))]
     style.legend(figure, history.courses(figure, cells, flight, track))
     return figure
@@ -117,9 +114,8 @@ def planes(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: 
 def pole_curve(axes: Axes, flight: Flight, track: Track) -> None:
     """Path of the rotation vector in the 1-2 plane of the body (Magnus 1970 fig. 5), firings and channels marked."""
     rates = geometry.pole_path(track)
-    size = float(np.hypot(*rates.T).max())
     _path(axes, flight, track, rates)
-    arrows = _directions(axes, flight, size)
+    arrows = _directions(axes, flight, float(np.hypot(*rates.T).max()))
     style.square(axes, rates, margin=0.45 if arrows else 0.12, centre=True)
     title = "Pole curve: ω in the body" + ("\narrows: torque of the channels" if arrows else "")
     axes.set(xlabel=f"ω1, °/s{geometry.pole_note(flight)}", ylabel="ω2, °/s", title=title)
@@ -133,11 +129,9 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     path, momentum = geometry.sky_paths(flight, track)
     target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
-    width = float(np.ptp(path, axis=0).max())
-    places = _momentum(axes, flight, track, momentum, width)
-    _target(axes, target)
-    middle, half = geometry.room(np.vstack([path, momentum, target]), 0.14)
-    style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
+    places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
+    labels.target(axes, target)
+    middle, half = style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     if small is None:
         labels.add(axes, "H", places[0], TURNED, role="vital")
     else:
@@ -145,15 +139,8 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
         axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
         axes.set_xticks(ticks)
         _inset(axes, flight, track, small)
-    sky = geometry.sky_names(flight)
-    axes.set(xlabel=sky.x, ylabel=sky.y, title=f"Axis track: spin axis in space\n{sky.view}")
-
-
-def _target(axes: Axes, target: Vector) -> None:
-    """The star of the target (n, 2) with its name; none where there is none."""
-    if len(target):
-        axes.plot(*target.T, label="target", **style.TARGET)
-        labels.add(axes, "target", target[0], INK, role="vital")
+    x, y, sense = geometry.sky_names(flight)
+    axes.set(xlabel=x, ylabel=y, title=f"Axis track: spin axis in space\n{sense}")
 
 
 def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
@@ -162,10 +149,9 @@ def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
     momentum = geometry.sky_paths(flight, track)[1]
     stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
-        meant = labels.Meant(stations[[number + 1]], np.delete(stations, number + 1, axis=0))
-        labels.add(inset, str(number + 1), stations[number + 1], FIRED, meant=meant)
+        labels.add(inset, str(number + 1), stations[number + 1], FIRED, meant=labels.meant(stations, [number + 1]))
     labels.add(inset, "t = 0", stations[0], INK, role="vital")
-    _target(inset, geometry.sky_target(flight, track))
+    labels.target(inset, geometry.sky_target(flight, track))
     style.square(inset, small, margin=0.25)
     inset.locator_params(nbins=3)
     inset.tick_params(labelsize=style.SMALL)
@@ -211,8 +197,7 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
             continue
         firings.append(rows)
         if stretch.pulse in numbered and np.hypot(*(rows[-1] - rows[0])) > 0.03 * width:
-            fine = _refined(rows)
-            style.heads(axes, fine, [len(fine) - 1], PULSE, size)
+            style.heads(axes, _refined(rows), [len(_refined(rows)) - 1], PULSE, size)
     _number(axes, [_refined(rows) for rows in firings], width)
     axes.plot(*style.joined(coasts).T, color=MOTION, linewidth=thin * style.LINE, label="path")
     if firings:
@@ -267,7 +252,8 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
     channels = channels or [entry for entry in flight.spacecraft.channels if entry.name in used]
     groups: list[list[Channel]] = []
     for channel in channels:
-        group = next((others for others in groups if _apart(others[0], channel) < ALIKE), None)
+        across = channel.transverse.conjugate()
+        group = next((group for group in groups if abs(np.angle(group[0].transverse * across)) < ALIKE), None)
         if group is None:
             groups.append([channel])
         else:
@@ -280,10 +266,6 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
         labels.add(axes, names, 1.2 * way, INK, role="vital")
     return bool(groups)
-
-
-def _apart(first: Channel, second: Channel) -> float:
-    return abs(float(np.angle(first.transverse * second.transverse.conjugate())))
 
 
 DRAWN = {"overview": overview, "motion": motion, "sphere": sphere.sphere, "history": history.history}

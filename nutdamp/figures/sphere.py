@@ -19,11 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-ELEVATION = math.radians(28.0)
-"""Direction from which the sphere is seen: above the plane square to H(0)."""
-
-ASIDE = math.radians(65.0)
-"""The spin axis leans to the right at t = 0, this far round from the viewer."""
+ELEVATION, ASIDE = math.radians(28.0), math.radians(65.0)
+"""The sphere is seen from above the plane square to H(0); the spin axis leans to the right at t = 0, so far round."""
 
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
@@ -54,6 +51,11 @@ class View:
     azimuth: float
     magnified: float
 
+    @property
+    def scale(self) -> str:
+        """Words on the magnification in a title."""
+        return f" (angles × {self.magnified:g})" if self.magnified != 1.0 else ""
+
     def seen(self, directions: Vector) -> tuple[Vector, Vector]:
         """Places on paper (n, 2), and heights towards the viewer (n,)."""
         local = np.atleast_2d(directions) @ self.plane.T * np.array([self.magnified, self.magnified, 1.0])
@@ -69,7 +71,7 @@ def view(flight: Flight, track: Track) -> View:
     plane = geometry.sky_plane(flight, track.momentum[0])
     first = geometry.cones(flight, track.rates[0], track.quaternion[0])
     local = first.axis @ plane.T
-    shown = np.vstack([track.axis, track.momentum, first.body, first.space, *aimed(flight)])
+    shown = np.vstack([track.axis, track.momentum, first.body, first.space, geometry.aimed(flight)])
     angles = np.radians(np.hypot(*geometry.on_sky(plane, shown).T))
     return View(plane, math.atan2(local[1], local[0]) - ASIDE, magnification(float(angles.max())))
 
@@ -98,17 +100,15 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     draw_ground(axes, looked, track)
     fired = draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, rolling)
-    target = flight.spacecraft.goal.axis
-    if target is not None:
-        place = looked.seen(target)[0]
-        axes.plot(*place.T, label="_target", **style.TARGET)
-        labels.add(axes, "target", place[0], INK, role="vital")
-    _name_tips(axes, looked.seen(_directions(rolling))[0])
+    labels.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
+    tips = looked.seen(_directions(rolling))[0]
+    for number, (_, colour, name) in enumerate(DIRECTIONS):
+        meant = labels.meant(tips, [number])
+        labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
     name_lines(axes, rolling, fired=fired)
-    frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, *aimed(flight)]))
-    much = looked.magnified
+    frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, geometry.aimed(flight)]))
     before = ", before firing 1" * any(pulse.thrust[0] <= 0.0 for pulse in flight.schedule.pulses[:1])
-    axes.set_title(f"Cones at t = 0{before}" + (f" (angles × {much:g})" if much != 1.0 else ""))
+    axes.set_title(f"Cones at t = 0{before}{looked.scale}")
 
 
 def draw_ground(axes: Axes, looked: View, track: Track) -> None:
@@ -140,8 +140,10 @@ def draw_path(axes: Axes, looked: View, flight: Flight, track: Track) -> bool:
 def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
     """Space cone, body cone, and the three directions that lie in one plane."""
     for rim, within, colour, alpha in _rims(rolling):
-        if len(rim):
-            _cone(axes, looked, rim, within, (colour, alpha))
+        # From the centre to its rim: its area on paper filled and outlined, rim drawn.
+        covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
+        axes.fill(*covered.T, facecolor=(colour, alpha), edgecolor=colour, linewidth=RIM)
+        axes.plot(*looked.seen(rim)[0].T, color=colour, linewidth=RIM)
     for tip, (_, colour, _) in zip(looked.seen(_directions(rolling))[0], DIRECTIONS, strict=True):
         axes.plot(*np.outer(tip, [0.0, 0.97]), color=colour, linewidth=1.2)
         style.heads(axes, np.outer([0.9, 1.0], tip), [1], colour)
@@ -150,19 +152,16 @@ def draw_cones(axes: Axes, looked: View, rolling: DrawnCones) -> None:
 def name_lines(axes: Axes, rolling: DrawnCones, *, fired: bool) -> None:
     """The two cones, the path of the spin axis and that of H for the legend."""
     if len(rolling.body):
+        about = (rolling.axis, rolling.momentum)
+        body, space = (float(np.arccos(np.clip(rolling.rotation @ axis, -1.0, 1.0))) for axis in about)
+        # Where the body cone is so small that the marks of the axes in it hide it.
+        hidden = f" ({style.angle(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
         axes.fill([], [], facecolor=(MOMENTUM, SPACE), edgecolor=MOMENTUM, label="space cone")
-        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{_hidden(rolling)}")
+        axes.fill([], [], facecolor=(MOTION, BODY), edgecolor=MOTION, label=f"body cone{hidden}")
     axes.plot([], [], color=MOTION, linewidth=style.LINE, label="path of the spin axis")
     if fired:
         axes.plot([], [], color=PULSE, linewidth=1.8, label="firing")
     axes.plot([], [], label="path of H", **style.PATH_OF_H)
-
-
-def _hidden(rolling: DrawnCones) -> str:
-    """Words in the legend where the body cone is so small that the marks of the axes in it hide it."""
-    about = (rolling.axis, rolling.momentum)
-    body, space = (float(np.arccos(np.clip(rolling.rotation @ axis, -1.0, 1.0))) for axis in about)
-    return f" ({style.angle(body)}, under the marks)" if body < HIDDEN * max(space, body) else ""
 
 
 def name_directions(axes: Axes) -> None:
@@ -176,28 +175,10 @@ def _directions(rolling: DrawnCones) -> Vector:
     return np.array([rolling.momentum, rolling.rotation, rolling.axis])
 
 
-def aimed(flight: Flight) -> Vector:
-    """(n, 3): the target axis, or none."""
-    return np.empty((0, 3)) if flight.spacecraft.goal.axis is None else flight.spacecraft.goal.axis[None]
-
-
-def _name_tips(axes: Axes, tips: Vector) -> None:
-    """The names of the `DIRECTIONS` at the ``tips`` (3, 2) of their arrows, each in the colour of its own."""
-    for number, (_, colour, name) in enumerate(DIRECTIONS):
-        meant = labels.Meant(tips[[number]], np.delete(tips, number, axis=0))
-        labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
-
-
-def _rims(rolling: DrawnCones) -> tuple[tuple[Vector, Vector, str, float], ...]:
-    """Rim, circle about it, colour and density of the cones."""
-    return (rolling.space, rolling.swept, MOMENTUM, SPACE), (rolling.body, rolling.body, MOTION, BODY)
-
-
-def _cone(axes: Axes, looked: View, rim: Vector, within: Vector, filled: tuple[str, float]) -> None:
-    """A cone from the centre to its rim: its area on paper filled and outlined, rim drawn."""
-    covered = geometry.hull(np.vstack([looked.seen(np.vstack([rim, within]))[0], [[0.0, 0.0]]]))
-    axes.fill(*covered.T, facecolor=filled, edgecolor=filled[0], linewidth=RIM)
-    axes.plot(*looked.seen(rim)[0].T, color=filled[0], linewidth=RIM)
+def _rims(rolling: DrawnCones) -> list[tuple[Vector, Vector, str, float]]:
+    """Rim, circle about it, colour and density of the cones that there are."""
+    both = (rolling.space, rolling.swept, MOMENTUM, SPACE), (rolling.body, rolling.body, MOTION, BODY)
+    return [cone for cone in both if len(cone[0])]
 
 
 def draw_line(axes: Axes, looked: View, directions: Vector, colour: str, width: float, *, back: bool = True) -> None:
@@ -222,12 +203,11 @@ def frame(axes: Axes, looked: View, directions: Vector) -> None:
 def draw_circles(axes: Axes, plane: Vector, rolling: DrawnCones) -> None:
     """Rims of the cones with their axes and line of contact, on the sky."""
     for rim, within, colour, alpha in _rims(rolling):
-        if len(rim):
-            filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
-            axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
-            axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
-            if within is not rim:  # a rim that does not close: its filled circle has its own outline
-                axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
+        filled = geometry.hull(geometry.on_sky(plane, np.vstack([rim, within])))
+        axes.fill(*filled.T, facecolor=colour, alpha=alpha, edgecolor="none")
+        axes.plot(*geometry.on_sky(plane, rim).T, color=colour, linewidth=1.0)
+        if within is not rim:  # a rim that does not close: its filled circle has its own outline
+            axes.plot(*geometry.on_sky(plane, within).T, color=colour, linewidth=0.5)
     places = geometry.on_sky(plane, _directions(rolling))
     axes.plot(*places.T, color=GREY, linewidth=0.8, label="plane of H, ω and spin axis")
     for place, (mark, colour, _) in zip(places, DIRECTIONS, strict=True):

@@ -56,11 +56,8 @@ NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
 FAR = 4.0
 """A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
 
-DOTS = 2_000
-"""Largest number of cases shown as dots: more would only make the picture heavy."""
-
-DENSE = 0.8
-"""Opacity of a dot: fainter ones are not seen (less than 3:1 on white)."""
+DOTS, DENSE = 2_000, 0.8
+"""Cases shown as dots at most, more would only make the picture heavy, and their opacity: fainter ones are not seen."""
 
 TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}
 """Look of the title of a panel."""
@@ -186,7 +183,7 @@ def _momentum(axes: Axes, results: Results) -> None:
     points, limit = momentum_cases(results), style.limit_of(body, aim)
     # A case has an H(0) of its own: the momentum shift is counted from there, so that it is the centre in each.
     centre, about = ("H(0)", "the H(0) of each case") if aim is Part.SHIFT else ("the target", "the target")
-    sky = geometry.sky_names(results.study.nominal, centre)
+    x, y, sense = geometry.sky_names(results.study.nominal, centre)
     widest = float(np.hypot(*points.T).max())
     if widest < NOTHING:
         axes.set_title(f"Where H ends, about {about}", **TITLE)
@@ -214,8 +211,8 @@ def _momentum(axes: Axes, results: Results) -> None:
         mark: dict[str, Any] = {"marker": "+", "color": INK, "markersize": 9, "linestyle": "", "zorder": 3}
         axes.plot(0.0, 0.0, label=centre.removeprefix("the "), **(mark if aim is Part.SHIFT else style.TARGET))
     axes.locator_params(nbins=4)  # of shifts of thousandths of a degree more labels would run into each other
-    axes.set(xlabel=sky.x, ylabel=sky.y)
-    axes.set_title(f"Where H ends, about {about}\n{sky.view}", **TITLE)
+    axes.set(xlabel=x, ylabel=y)
+    axes.set_title(f"Where H ends, about {about}\n{sense}", **TITLE)
 
 
 LOOKS = ((MOTION, "o", "-"), (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))), (INK, "s", (0, (5, 1.5))), (GREY, "v", ":"))
@@ -316,7 +313,8 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         axes.plot(ends, costs, mark, color=colour, markersize=5, zorder=3.5, clip_on=False)
         axes.plot([], [], color=colour, linestyle=line, marker=mark, markersize=5, label=name)
         for index, end, cost in own:
-            same = next((place for place in shown if _same_ends((end, cost), place[:2])), None)
+            near = (place for place in shown if math.isclose(end, place[0], rel_tol=SAME_ENDS[0]))
+            same = next((place for place in near if math.isclose(cost, place[1], rel_tol=SAME_ENDS[1])), None)
             if same is None:
                 shown.append((end, cost, [index]))
             else:
@@ -326,22 +324,15 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
     places = np.array([place[:2] for place in shown])
     for row, (_, _, numbers) in enumerate(shown):
-        meant = labels.Meant(places[[row]], np.delete(places, row, axis=0))
-        labels.add(axes, ", ".join(map(str, numbers)), places[row], INK, role="vital", meant=meant)
-
-
-def _same_ends(first: tuple[float, float], second: tuple[float, float]) -> bool:
-    return all(math.isclose(a, b, rel_tol=near) for a, b, near in zip(first, second, SAME_ENDS, strict=True))
+        text, meant = ", ".join(map(str, numbers)), labels.meant(places, [row])
+        labels.add(axes, text, places[row], INK, role="vital", meant=meant)
 
 
 ROWS = 6000
 """Moments of the envelope, over all windows."""
 
-AFTER = 1.25
-"""End of the time shown over the end of the last firing of the plan."""
-
-TURNS = 2.0
-"""Periods of the nutation that are shown at least."""
+AFTER, TURNS = 1.25, 2.0
+"""End of the time shown over that of the last firing of the plan, and periods of the nutation shown at least."""
 
 SHALLOW = 1e-3
 """Depth of the envelope below 0 that is the step of the linear program in time."""

@@ -158,14 +158,15 @@ def words(axes: Axes, text: str) -> None:
     axes.set(xticks=[], yticks=[])
 
 
-def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> None:
-    """Equal scales on both axes, and room for all ``points`` (n, 2); ``centre`` puts zero in the middle."""
+def square(axes: Axes, points: Vector, *, margin: float, centre: bool = False) -> tuple[Vector, float]:
+    """Equal scales on both axes, and `room` for all ``points`` (n, 2), which is returned."""
     middle, half = room(points, margin, centre=centre)
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + half)
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(nbins=6)
     axes.grid()
+    return middle, half
 
 
 def thickness(path: Vector, turns: float | None = None) -> float:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -163,15 +163,11 @@ EDGES = (350, 150, 1960, 1760)
 """Frame of a square panel in units of its SVG, which is 2000 wide and high: left, top, right, bottom."""
 
 
-Mark = tuple[float, str]
-"""A place on a scale, and the number there."""
-
-
 class Scale(NamedTuple):
-    """A scale with its name and marks."""
+    """A scale with its name and marks: places with the numbers there."""
 
     name: str
-    marks: tuple[Mark, ...]
+    marks: tuple[tuple[float, str], ...]
 
 
 class Panel(NamedTuple):
@@ -203,20 +199,17 @@ class Strip(NamedTuple):
     closed: tuple[tuple[float, float], ...]
 
 
-RATIO, THRUST = 1.0, 5.0
-"""Largest change of C/A and of the thrust by the sliders, per cent."""
-
-
 class Workbench(NamedTuple):
     """Fixed parts of the workbench: quantities at the end, and the pulses by number and channel.
 
-    ``rows``: name of each quantity for the script and for people, and its bound in words.
+    ``rows``: name of each quantity for the script and for people, and its bound in words. ``ratio``, ``thrust``:
+    largest change of C/A and of the thrust by the sliders, per cent.
     """
 
     rows: tuple[tuple[str, str, str], ...]
     pulses: tuple[str, ...]
-    ratio: float = RATIO
-    thrust: float = THRUST
+    ratio: float = 1.0
+    thrust: float = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,18 +331,13 @@ class Page:
     @property
     def footer(self) -> str:
         """Text at the foot of each sheet of paper, beside its number."""
-        return ", ".join(
-            filter(None, (self.control.number or self.title, self.control.date, self.source, self.made_by))
-        )
+        parts = (self.control.number or self.title, self.control.date, self.source, self.made_by)
+        return ", ".join(filter(None, parts))
 
 
 def sheet(table: DataTable, place: str = "page", **look: Any) -> Sheet:
     """A declared table as a `Sheet` with further fields of its ``look``."""
     return Sheet(table.title, table.headings(place), table.cells(place), table.mark, **look)
-
-
-SHARES = (Shared.LINEAR, Shared.CASES)
-"""Columns of shares of the variance."""
 
 
 def sheet_of(title: str, table: Table) -> Sheet:
@@ -359,7 +347,8 @@ def sheet_of(title: str, table: Table) -> Sheet:
         name, _, unit = plain(column.header).partition("\n")
         columns.append(Heading(name, unit, column.justify == "right"))
     first = columns[0]
-    return Sheet(title, (first._replace(name=first.name or "quantity"), *columns[1:]), _rows(table), bars=SHARES)
+    named = first._replace(name=first.name or "quantity")
+    return Sheet(title, (named, *columns[1:]), _rows(table), bars=(Shared.LINEAR, Shared.CASES))
 
 
 def facts_of(title: str, table: Table) -> FactList:
@@ -380,11 +369,9 @@ def blocks_of(title: str, screen: RenderableType) -> Iterator[Block]:
         if isinstance(part, Table):
             maker = sheet_of if part.show_header else facts_of
             yield maker(above or title, part)
-            above = ""
-            continue
-        if above:
+        elif above:
             yield Prose(above)
-        above = plain(part)
+        above = "" if isinstance(part, Table) else plain(part)
     if above:
         yield Prose(above)
 
@@ -399,8 +386,7 @@ def _parts(screen: RenderableType) -> Iterator[RenderableType]:
 
 
 def _rows(table: Table) -> tuple[tuple[str, ...], ...]:
-    cells: list[Iterable[str]] = [map(plain, column.cells) for column in table.columns]
-    return tuple(zip(*cells, strict=True))
+    return tuple(zip(*(map(plain, column.cells) for column in table.columns), strict=True))
 
 
 def plain(cell: object) -> str:

@@ -18,6 +18,7 @@ from nutdamp.planning.notes import ideal_code
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes.block_model import to_sun_pulse
 from nutdamp.spacecraft import requirements
+from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
@@ -49,7 +50,9 @@ def manoeuvre_blocks(
 ) -> Iterator[document.Block]:
     """Blocks of the sheet of a plan: ``identity`` of document and file first, then the ``summary`` of the decision."""
     plan, body = decision.plan, decision.plan.spacecraft
-    obstacles = [*_uncommandable(plan)]
+    obstacles = [] if plan.commandable else [sentence(text(note("not-commandable", scheme=plan.scheme)))]
+    if code := ideal_code(plan):
+        obstacles.append(f"{plan.scheme} cannot be commanded: {text(note(code, scheme=plan.scheme))}.")
     if obstacles or not len(plan.pulses):
         yield Prose(" ".join(obstacles) or summary, alarm=bool(obstacles))
         return
@@ -66,21 +69,9 @@ def manoeuvre_blocks(
     yield FactList("Totals and hold", (("totals", _totals(plan)), ("on hold", ON_HOLD), ("phase", _phase_note(body))))
     yield Sheet(
         "Signatures",
-        tuple(Heading(name, number=False) for name in SIGNED),
+        tuple(Heading(name, number=False) for name in ("sheet", "name", "signature", "date")),
         (("prepared", "", "", ""), ("checked", "", "", "")),
     )
-
-
-SIGNED = ("sheet", "name", "signature", "date")
-"""Columns of the table for signatures."""
-
-
-def _uncommandable(plan: Plan) -> Iterator[str]:
-    """Reasons why the pulses cannot be commanded."""
-    if not plan.commandable:
-        yield sentence(text(note("not-commandable", scheme=plan.scheme)))
-    if code := ideal_code(plan):
-        yield f"{plan.scheme} cannot be commanded: {text(note(code, scheme=plan.scheme))}."
 
 
 def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tuple[str, str]]:
@@ -94,11 +85,9 @@ def _conditions(decision: Decision, points: Checkpoints | None) -> Iterator[tupl
         yield "phase window", f"not known: {why}"
         return
     spins = f"{points.spin.least * RPM:.5g} to {points.spin.most * RPM:.5g} rpm"
+    angles = f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg"
     yield "spin", f"{spins} (nominal {spin})"
-    yield (
-        "nutation",
-        f"{short_angle(points.nutation.least)} to {short_angle(points.nutation.most)} deg (nominal {nutation})",
-    )
+    yield "nutation", f"{angles} (nominal {nutation})"
     yield "phase window", _window(body, points)
 
 
@@ -200,9 +189,8 @@ def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float
     rows = [number - 1 for number in even(len(counts), CHECKED)]
     texts = [MISSING] * len(counts)
     for row, (least, most) in zip(rows, points.nutation_after([counts[row] for row in rows]), strict=True):
-        texts[row] = (
-            f"{short_angle(min(least, expected[row]), limit)} to {short_angle(max(most, expected[row]), limit)}"
-        )
+        bounds = min(least, expected[row]), max(most, expected[row])
+        texts[row] = " to ".join(short_angle(bound, limit) for bound in bounds)
     return texts
 
 
@@ -210,9 +198,8 @@ def _thrusters(pulse: Pulse, body: Spacecraft) -> str:
     """Channel of a pulse, with its thrusters where they have other names."""
     if pulse.channel == STEERABLE:
         return channel_text(pulse, body)
-    members = [
-        thruster.name for channel in body.channels if channel.name == pulse.channel for thruster in channel.thrusters
-    ]
+    channel = channel_of(body, pulse)
+    members = [] if channel is None else [thruster.name for thruster in channel.thrusters]
     return pulse.channel if members in ([], [pulse.channel]) else f"{pulse.channel} ({', '.join(members)})"
 
 
@@ -241,9 +228,8 @@ def _decimals(body: Spacecraft) -> int:
     """Decimals of times in s: as many as the steps of commands need, else no finer than the tolerance of timing."""
     tick, given = body.limits.tick, body.dispersions
     if tick is not None:
-        return next(
-            (digits for digits in range(FINEST) if math.isclose(tick, round(tick, digits), rel_tol=1e-9)), FINEST
-        )
+        fine = (digits for digits in range(FINEST) if math.isclose(tick, round(tick, digits), rel_tol=1e-9))
+        return next(fine, FINEST)
     sizes = [] if given is None else [each.size for each in (given.timing, given.timing_offset) if each is not None]
     coarsest = max(map(abs, sizes), default=0.0)
     return MILLISECONDS if coarsest == 0.0 else min(max(math.ceil(-math.log10(coarsest) - 1e-9), 0), FINEST)

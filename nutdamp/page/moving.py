@@ -24,7 +24,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.views.pulses import channel_text
 from nutdamp.views.spacecraft import angle_names, angle_texts
 from nutdamp.views.text import MISSING, most, quantity
@@ -81,14 +81,10 @@ def named_directions(body: Spacecraft) -> tuple[NamedDirection, ...]:
     return tuple(directions)
 
 
-def samples_for(flown: Flight, until: float) -> int:
-    """Even rows to ``until`` s: steep tracks need more."""
-    return min(max(math.ceil(ROWS_A_TURN * until / geometry.quickest(flown)), LEAST_ROWS), MOST_ROWS) + 1
-
-
 def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirection] = ()) -> Moving:
     """The view of a flight of ``scheme`` to ``until`` s, with ``named`` directions and circles on its globe."""
-    body, samples = flown.spacecraft, samples_for(flown, until)
+    body, turns = flown.spacecraft, until / geometry.quickest(flown)
+    samples = min(max(math.ceil(ROWS_A_TURN * turns), LEAST_ROWS), MOST_ROWS) + 1
     track = flown.sampled(samples, until)
     panels, columns, target, rooms = _panels(flown, track, named)
     strip, span = strip_of(flown, track, until)
@@ -104,11 +100,12 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "firing": firing,
     }
     if named:
-        columns |= _named_columns("axis", _unit(track.axis)) | _named_columns("H", _unit(track.momentum))
+        for name, ways in (("axis", track.axis), ("H", track.momentum)):
+            unit = ways / np.linalg.norm(ways, axis=1, keepdims=True)
+            columns |= _named_columns(name, np.rint(SPHERE * unit.T).astype(int).tolist())
     for number, watched in enumerate((direction for direction in named if direction.watched), start=1):
         columns[f"aspect{number}"] = _whole(np.degrees(attitude.angle_between(track.axis, watched.axis)), ANGLE_DIGITS)
     utc = _dates(body, track, clock)
-    turns = until / geometry.quickest(flown)
     absent = absence(body, flown.schedule)
     data: dict[str, Any] = {
         "digits": {"t": clock, "cone": cone, "angle": ANGLE_DIGITS},
@@ -121,7 +118,15 @@ def moving(flown: Flight, until: float, scheme: str, named: Sequence[NamedDirect
         "firings": texts,
         "utc": utc,
         "target": target,
-        "named": [_mark(direction) for direction in named],
+        "named": [
+            {
+                "name": direction.name,
+                "kind": direction.kind,
+                "axis": [round(part, 6) for part in direction.axis.tolist()],
+                "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in direction.circles],
+            }
+            for direction in named
+        ],
         "look": _look(track, named),
         "dots": turns * COARSE > samples,
         "bench": None if absent else workbench_data(flown, track, *rooms, until),
@@ -142,14 +147,18 @@ def _panels(
 ) -> tuple[tuple[Panel, ...], dict[str, list[int]], list[int] | None, tuple[Room, Room]]:
     """Pole curve and axis track, the columns of their paths, the place of the target in the latter, and both rooms."""
     sky, momentum = geometry.sky_paths(flown, track)
-    target = _target(flown, track, named, np.vstack([sky, momentum]))
+    target = geometry.sky_target(flown, track)
+    # Only if the globe names it and it leaves room for the paths.
+    reach = FAR * float(np.hypot(*np.vstack([sky, momentum]).T).max())
+    if not (named and np.all(np.hypot(*target.T) <= reach)):
+        target = np.empty((0, 2))
     pole = geometry.pole_path(track)
     pole_room = geometry.room(pole, 0.1, centre=True)
     sky_room = geometry.room(np.vstack([sky, momentum, target]), 0.1)
-    names = geometry.sky_names(flown)
+    x, y, _ = geometry.sky_names(flown)
     panels = (
         panel("pole", "Pole curve: ω in the body", pole_room, (f"ω1, deg/s{geometry.pole_note(flown)}", "ω2, deg/s")),
-        panel("sky", "Axis track, H towards you", sky_room, (names.x, names.y)),
+        panel("sky", "Axis track, H towards you", sky_room, (x, y)),
     )
     columns = {
         **_named_columns("pole", placed(pole, *pole_room)),
@@ -163,23 +172,6 @@ def _panels(
 def _named_columns(name: str, columns: Sequence[list[int]]) -> dict[str, list[int]]:
     """Columns by a common name and their number, from 1."""
     return {f"{name}{number}": column for number, column in enumerate(columns, start=1)}
-
-
-def _mark(direction: NamedDirection) -> dict[str, Any]:
-    """A direction as the script takes it."""
-    return {
-        "name": direction.name,
-        "kind": direction.kind,
-        "axis": [round(part, 6) for part in direction.axis.tolist()],
-        "circles": [{"radius": circle.radius, "kind": circle.kind} for circle in direction.circles],
-    }
-
-
-def _target(flown: Flight, track: Track, named: Sequence[NamedDirection], paths: Vector) -> Vector:
-    """(n, 2): the target as angles from H(0), if the globe names it and it leaves room for the paths."""
-    target = geometry.sky_target(flown, track)
-    reach = FAR * float(np.hypot(*paths.T).max())
-    return target if named and len(target) and float(np.hypot(*target[0])) <= reach else np.empty((0, 2))
 
 
 def _angle_digits(track: Track) -> int:
@@ -198,20 +190,13 @@ def _steps(values: Sequence[int]) -> list[int]:
     return [now - before for before, now in zip([0, *values], values, strict=False)]
 
 
-def _unit(vectors: Vector) -> list[list[int]]:
-    """Three columns of directions as parts of `SPHERE`."""
-    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    return [column.tolist() for column in np.rint(SPHERE * unit.T).astype(int)]
-
-
 def _pointing(body: Spacecraft, axes: Vector) -> list[list[int]]:
     """Two columns: the angles of directions (n, 3), as every table shows them, in units of their last decimal."""
-    texts = [angle_texts(body, axis) for axis in axes]
-    numbers = [
-        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in row]
-        for row in texts
+    columns = zip(*(angle_texts(body, axis) for axis in axes), strict=True)
+    return [
+        [NONE if text == MISSING else round(float(text.removesuffix(" deg")) * 10**ANGLE_DIGITS) for text in column]
+        for column in columns
     ]
-    return [list(column) for column in zip(*numbers, strict=True)]
 
 
 def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None:
@@ -228,13 +213,11 @@ def _dates(body: Spacecraft, track: Track, digits: int) -> dict[str, Any] | None
 def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
     """For each row the number of the text that names the firings; the first text is that of none."""
     texts, column = ["none"], []
-    pulses = list(zip(flown.schedule, flown.spans, strict=True))
+    names = [
+        f"{number}: {channel_text(pulse, flown.spacecraft)}" for number, pulse in enumerate(flown.schedule, start=1)
+    ]
     for time in track.t.tolist():
-        on = [
-            f"{number}: {channel_text(pulse, flown.spacecraft)}"
-            for number, (pulse, (begins, ends)) in enumerate(pulses, start=1)
-            if begins <= time <= ends
-        ]
+        on = (name for name, (begins, ends) in zip(names, flown.spans, strict=True) if begins <= time <= ends)
         text = " and ".join(on) or texts[0]
         if text not in texts:
             texts.append(text)
@@ -245,12 +228,10 @@ def _firing(flown: Flight, track: Track) -> tuple[list[int], list[str]]:
 def _look(track: Track, named: Sequence[NamedDirection]) -> list[float]:
     """Longitude and latitude in degrees of the viewer of the globe: the track in front, seen a little from the side."""
     middle = track.momentum[0] / np.linalg.norm(track.momentum[0])
-    for direction in named[:1]:
-        if float(middle @ direction.axis) > -0.9:
-            middle = middle + direction.axis
+    if named and float(middle @ named[0].axis) > -0.9:
+        middle = middle + named[0].axis
     longitude, latitude = attitude.sphere_angles(middle / np.linalg.norm(middle))
-    turned = math.degrees(longitude or 0.0) - 20.0
-    shown = math.degrees(latitude)
+    turned, shown = math.degrees(longitude or 0.0) - 20.0, math.degrees(latitude)
     return [round(turned, 1), round(shown - 25.0 if shown > 0.0 else shown + 25.0, 1)]
 
 
@@ -262,9 +243,6 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     first = min(speeds, key=lambda pace: abs(math.log(until / pace / UNHURRIED)))
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
 
-
-STRIP = (2000, 1000)
-"""Width and height of the angles over time in units of their SVG."""
 
 EDGE = 0.03
 """Part of a scale at either end without a number: it would touch those of the other scale."""
@@ -318,7 +296,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     low, high = float(angles.min()), float(angles.max())
     margin = 0.06 * (high - low) if high - low > geometry.LEAST else 1.0
     low, high = low - margin, high + margin
-    width, height = STRIP
+    width, height = 2000, 1000  # in units of the SVG
 
     def rise(angle: float) -> float:
         return round(height * (high - angle) / (high - low), 1)
@@ -375,16 +353,14 @@ def workbench_of(flown: Flight) -> Workbench:
     names = [(Part.NUTATION, "nutation"), (Part.SHIFT, "momentum shift")]
     if body.goal.axis is not None:
         names.append((Part.DISTANCE, "axis error"))
-    rows = [(part.value, name, _bound(limits[part].most) if part in limits else "") for part, name in names]
+    rows = [
+        (part.value, name, f"≤ {most(limits[part].most).removesuffix(' deg')}°" if part in limits else "")
+        for part, name in names
+    ]
     if Part.SPIN in limits:
         rows.append(("spin", "spin error", f"≤ {quantity(limits[Part.SPIN].most, 'rad/s')}"))
     pulses = (f"{number}: {channel_text(pulse, body)}" for number, pulse in enumerate(flown.schedule, start=1))
     return Workbench(tuple(rows), tuple(pulses))
-
-
-def _bound(angle: float) -> str:
-    """An upper bound given in rad, with the sign of degrees."""
-    return f"≤ {most(angle).removesuffix(' deg')}°"
 
 
 def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: float) -> dict[str, Any]:
@@ -404,7 +380,20 @@ def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: fl
         "start": {"omega": body.omega0[:2].tolist(), "spin": start.spin, "turn": start.quaternion.tolist()},
         "framed": body.attitude is not None,
         "axes": None if body.inertia.aligned else body.inertia.axes.tolist(),
-        "pulses": [_pulse(body, pulse, channels.index(pulse.channel)) for pulse in flown.schedule],
+        "pulses": [
+            {
+                "t": pulse.t,
+                "on": pulse.on_time,
+                "channel": pulse.channel,
+                "row": channels.index(pulse.channel),
+                "text": channel_text(pulse, body),
+                "impulse": pulse.impulse.tolist(),
+                "torque": None if pulse.torque is None else pulse.torque.tolist(),
+                "least": 0.0 if channel is None else channel.min_on_time,
+                "most": None if channel is None or math.isinf(channel.max_on_time) else channel.max_on_time,
+            }
+            for pulse, channel in ((pulse, channel_of(body, pulse)) for pulse in flown.schedule)
+        ],
         "limits": {
             "earliest": limits.earliest,
             "horizon": body.horizon,
@@ -417,33 +406,8 @@ def workbench_data(flown: Flight, track: Track, pole: Room, sky: Room, until: fl
         "spin": body.goal.spin,
         "frame": EDGES,
         "plane": geometry.sky_plane(flown, track.momentum[0]).tolist(),
-        "pole": _room(pole),
-        "sky": _room(sky),
-        "step": _step(until),
+        "pole": [*pole[0].tolist(), pole[1]],
+        "sky": [*sky[0].tolist(), sky[1]],
+        # Of times changed by hand, s: the decade of a two-thousandth of the time shown.
+        "step": 10.0 ** math.floor(math.log10(until / 2000.0)),
     }
-
-
-def _pulse(body: Spacecraft, pulse: Pulse, row: int) -> dict[str, Any]:
-    channel = channel_of(body, pulse)
-    longest = math.inf if channel is None else channel.max_on_time
-    return {
-        "t": pulse.t,
-        "on": pulse.on_time,
-        "channel": pulse.channel,
-        "row": row,
-        "text": channel_text(pulse, body),
-        "impulse": pulse.impulse.tolist(),
-        "torque": None if pulse.torque is None else pulse.torque.tolist(),
-        "least": 0.0 if channel is None else channel.min_on_time,
-        "most": None if math.isinf(longest) else longest,
-    }
-
-
-def _room(room: Room) -> list[float]:
-    middle, half = room
-    return [*np.asarray(middle, dtype=float).tolist(), half]
-
-
-def _step(until: float) -> float:
-    """Steps of times changed by hand, s: the decade of a two-thousandth of the time shown."""
-    return float(10.0 ** math.floor(math.log10(until / 2000.0)))

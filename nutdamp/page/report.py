@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
-import pkgutil
 import platform
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from importlib.util import find_spec
 from itertools import cycle
 from pathlib import Path
@@ -101,8 +101,8 @@ def page_html(page: Page) -> str:
     """The whole file. All text of a spacecraft file is escaped; the policy in its head allows no other script."""
     moves = any(block.kind == "moving" for block in page.motion)
     style, script = (
-        "\n".join(map(_part, (name, *views * moves)))
-        for name, views in (("page.css", ["view.css"]), ("page.js", ["motion.js", "bench.js", "view.js"]))
+        "\n".join(files("nutdamp.page").joinpath(name).read_text("utf-8").strip() for name in (first, *views * moves))
+        for first, views in (("page.css", ["view.css"]), ("page.js", ["motion.js", "bench.js", "view.js"]))
     )
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return _templates().get_template("page.html").render(page=page, style=style, script=script, digest=digest)
@@ -128,13 +128,6 @@ def _templates() -> Environment:
     )
     environment.filters.update(labelled=_labelled, css=_css, whole=_whole)
     return environment
-
-
-def _part(name: str) -> str:
-    data = pkgutil.get_data("nutdamp", f"page/{name}")
-    if data is None:
-        raise FileNotFoundError(f"nutdamp/page/{name} is not installed")
-    return data.decode("utf-8").strip()
 
 
 WHOLE = re.compile(r"((?<!\S)--?[a-z][\w-]*|[<≤≥] \d\S*(?: deg)?)")
@@ -189,7 +182,6 @@ class Report:
 
 def made_of(compared: Comparison, repeat: Repeat, control: Control, traded: Sequence[Front] = ()) -> Report:
     """The report, not yet written. Raises MissingExtra without the extra plot."""
-
     chosen = compared.recommended
     page = report_page(compared, repeat, traded=traded, control=control)
     return Report(compared, None if chosen is None else compared.results(chosen), page, page_html(page))
@@ -230,19 +222,14 @@ def repeated(command: str, source: Source) -> Repeat:
 
 
 def report_page(
-    compared: Comparison,
-    repeat: Repeat,
-    *,
-    traded: Sequence[Front] = (),
-    control: Control = UNCONTROLLED,
+    compared: Comparison, repeat: Repeat, *, traded: Sequence[Front] = (), control: Control = UNCONTROLLED
 ) -> Page:
     """The page; raises MissingExtra without matplotlib. ``traded``: fronts of time against cost."""
     body, decided = compared.spacecraft, decide(compared)
-    dispersed = None if decided is None else compared.results(decided.plan)
     headline = glance.headline(compared, decided)
     lead = headline.spans[0].end
     remarks = glance.notes(compared, decided)
-    notes = [*map(text, (note for note in remarks if severity(note) != WARNING))]
+    notes = [text(note) for note in remarks if severity(note) != WARNING]
     with work.steps(2.0) as task:  # pictures, and the flights of the verification
         page = Page(
             title=control.title or _title(body),
@@ -266,20 +253,20 @@ def report_page(
                 motion=(moving_of(decided.plan), Beside(flight_pictures(decided.plan), still=True)),
             )
         task.reach(1.0)
-        sections = _sections(compared, decided, dispersed, repeat, page, traded, notes[glance.NOTES :])
+        sections = _sections(compared, decided, repeat, page, traded, notes[glance.NOTES :])
         return replace(page, sections=tuple(sections))
 
 
 def _sections(
     compared: Comparison,
     decided: Decision | None,
-    dispersed: Results | None,
     repeat: Repeat,
     page: Page,
     traded: Sequence[Front],
     more_notes: Sequence[str],
 ) -> Iterator[PageSection]:
     """Sections below the first screen."""
+    dispersed = None if decided is None else compared.results(decided.plan)
     if decided is not None and dispersed is not None:
         yield PageSection("dispersion", "Dispersion", tuple(_dispersion(decided.plan, dispersed)))
     yield PageSection("schemes", "Schemes compared", tuple(_schemes(compared, more_notes)))
@@ -297,7 +284,6 @@ def _sections(
 
 
 def _title(body: Spacecraft) -> str:
-    """Title of the page: the task."""
     turn = "" if body.goal.axis is None else f", turn by {math.degrees(body.to_turn):.4g}°"
     return f"{body.name} · damp {math.degrees(body.tilt):.4g}° nutation{turn}"
 
@@ -338,8 +324,7 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
     from nutdamp.views.dispersion import cone_lines, dispersion_screen, requirement_lines
 
     lines = [Prose(plain(line)) for line in (*requirement_lines(dispersed), *cone_lines(dispersed))]
-    if note := dispersed.study.lightening_error:
-        lines.append(Prose(f"Note: {note}."))
+    lines += [Prose(f"Note: {note}.")] if (note := dispersed.study.lightening_error) else []
     yield from lines
     yield Beside(dispersion_pictures(dispersed, chosen.scheme))
     screen = dispersion_screen(dispersed, scheme=chosen.scheme, worst=5)
@@ -351,18 +336,14 @@ def _dispersion(chosen: Plan, dispersed: Results) -> Iterator[Block]:
 def _schemes(compared: Comparison, more_notes: Sequence[str]) -> Iterator[Block]:
     """The comparison with the reason of the recommendation, and remarks that have no room on the first screen."""
     yield Prose(sentence(joined(reasons(compared))))
-    table = scheme_table(compared, compared.recommended)
-    yield sheet(table, dots=DOTS)
     chosen = compared.recommended
-    own = [
-        (plan.scheme, note)
-        for plan in compared.plans
-        if plan.feasible and plan is not chosen
-        for note in map(text, plan_notes(plan))
-    ]
-    rows = (*(("", note) for note in more_notes), *own)
+    yield sheet(scheme_table(compared, chosen), dots=DOTS)
+    rows = [("", note) for note in more_notes]
+    for plan in compared.plans:
+        if plan.feasible and plan is not chosen:
+            rows += [(plan.scheme, text(note)) for note in plan_notes(plan)]
     if rows:
-        yield Details("Notes on the schemes", (Points(rows),))
+        yield Details("Notes on the schemes", (Points(tuple(rows)),))
 
 
 def _trade(compared: Comparison, traded: Sequence[Front]) -> Iterator[Block]:
@@ -380,9 +361,8 @@ def _verification(chosen: Plan) -> Iterator[Block]:
     yield Prose(f"{verdict(verified)} {conservation(verified)}")
     missing = tuple((method.name, f"not flown; {method.missing}") for method in verified.methods if method.missing)
     flights = sheet_of("Maximum differences from the flown motion", methods_table(verified))
-    blocks: list[Block] = [flights, *[Points(missing)] * bool(missing), sheet_of(BUDGET, budget_table(body, verified))]
-    blocks.append(Prose(BUDGET_NOTE))
-    yield Details("Independent flights and error budget", tuple(blocks))
+    budget = sheet_of(BUDGET, budget_table(body, verified)), Prose(BUDGET_NOTE)
+    yield Details("Independent flights and error budget", (flights, *[Points(missing)] * bool(missing), *budget))
 
 
 def _background(
@@ -465,7 +445,7 @@ def flight_pictures(plan: Plan) -> tuple[Picture, ...]:
 def trade_picture(compared: Comparison, fronts: Sequence[Front]) -> Picture:
     """Time against cost, with the recommended plan among the schedules of the fronts; raises MissingExtra."""
     draw = partial(studies.trade_figure, compared.spacecraft, fronts, compared.recommended)
-    return _picture("trade", draw(narrow=False), draw(narrow=True))
+    return _picture("trade", draw(), draw(narrow=True))
 
 
 def dispersion_pictures(dispersed: Results, scheme: str) -> tuple[Picture, ...]:

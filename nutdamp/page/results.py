@@ -30,14 +30,18 @@ if TYPE_CHECKING:
     from nutdamp.planning.robust import RobustComparison
 
 
-_TABLED = ("csv", "table", "figure", "line", "html")
+_TABLED = ("csv", "table", "figure")
 """Subjects of results with rows."""
 
 VIEWS = {
     "object.save": "page.results:save",
     "object.write": "page.results:write",
     "Spacecraft.data": "views.decisions:spacecraft_json",
-    **{f"Spacecraft.{what}": f"page.results:spacecraft_{what}" for what in ("line", "html")},
+    **{
+        f"{kind}.{what}": f"page.results:{what}"
+        for kind in ("Spacecraft", "Plan", "Comparison", "Flight")
+        for what in ("line", "html")
+    },
     "Plan.data": "views.decisions:plan_json",
     "Plan.sentences": "page.results:plan_sentences",
     "Plan.reason": "planning.decision:infeasibility",
@@ -48,9 +52,9 @@ VIEWS = {
     **{f"Comparison.{what}": f"page.results:comparison_{what}" for what in _TABLED},
     "RobustComparison.data": "page.results:robust_data",
     **{f"Flight.{what}": f"page.results:flight_{what}" for what in _TABLED},
-    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in ("csv", "table", "figure")},
+    **{f"Simulation.{what}": f"page.results:simulation_{what}" for what in _TABLED},
     "Simulation.data": "views.simulation:simulation_json",
-    **{f"Simulation.{what}": f"page.results:flight_{what} shown" for what in ("line", "html")},
+    **{f"Simulation.{what}": f"page.results:{what} shown" for what in ("line", "html")},
     "Trade.data": "views.trade:trade_json spacecraft fronts",
     "Trade.csv": "views.trade:trade_csv fronts",
     "Trade.figure": "figures.studies:trade_figure spacecraft fronts",
@@ -197,93 +201,65 @@ def _drawn(name: str, flight: Flight, track: Track) -> Figure:
         raise BadRequest(f"there is no figure {name!r}; expected one of {', '.join(overview.DRAWN)}") from None
 
 
-def spacecraft_line(spacecraft: Spacecraft) -> str:
-    """Summary of a spacecraft in one line."""
-    inertia = spacecraft.inertia
-    return (
-        f"<Spacecraft {spacecraft.name}: {inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(spacecraft.nutation)}>"
-    )
+def line(result: Spacecraft | Plan | Flight | Comparison) -> str:
+    """Summary of a result in one line."""
+    if isinstance(result, Spacecraft):
+        inertia = result.inertia
+        shape = f"{inertia.shape}, a = {inertia.a:.4g}, nutation {degrees(result.nutation)}"
+        return f"<Spacecraft {result.name}: {shape}>"
+    if isinstance(result, Comparison):
+        chosen = result.recommended
+        verdict = result.reason if chosen is None else f"recommended {chosen.scheme}, {result.reason}"
+        return f"<Comparison of {', '.join(plan.scheme for plan in result)}: {verdict}>"
+    if isinstance(result, Flight):
+        left = result.residual
+        ended = f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
+        return f"<Flight of {_summary(result)}: {ended}>"
+    if result.flown is None:
+        return f"<Plan {result.scheme}: infeasible, {result.why}>"
+    ended = f"{len(result)} pulses until {result.end:.4g} s, nutation left {degrees(result.flown.nutation)}"
+    return f"<Plan {result.scheme}: {ended}>"
 
 
-def plan_line(plan: Plan) -> str:
-    """Summary of a plan in one line."""
-    left = plan.flown
-    if left is None:
-        return f"<Plan {plan.scheme}: infeasible, {plan.why}>"
-    return f"<Plan {plan.scheme}: {len(plan)} pulses until {plan.end:.4g} s, nutation left {degrees(left.nutation)}>"
-
-
-def flight_line(flight: Flight) -> str:
-    """Summary of a flight in one line."""
-    left = flight.residual
-    ended = f"nutation left {degrees(left.nutation)}, momentum shift {degrees(left.momentum_shift)}"
-    return f"<Flight of {_summary(flight)}: {ended}>"
-
-
-def comparison_line(compared: Comparison) -> str:
-    """Summary of a comparison in one line."""
-    chosen = compared.recommended
-    verdict = compared.reason if chosen is None else f"recommended {chosen.scheme}, {compared.reason}"
-    return f"<Comparison of {', '.join(plan.scheme for plan in compared)}: {verdict}>"
-
-
-def spacecraft_html(spacecraft: Spacecraft) -> str | None:
-    """HTML table of a spacecraft for notebooks; None without the extra plot."""
-    from nutdamp.page.document import facts_of
-    from nutdamp.views.spacecraft import derived_table
-
-    return _block(facts_of(spacecraft.name, derived_table(spacecraft)))
-
-
-def plan_html(plan: Plan) -> str | None:
-    """HTML table of a plan for notebooks; None without the extra plot."""
-    from nutdamp.page.document import Prose, sheet
-
-    if not plan.feasible:
-        return _block(Prose(repr(plan)[1:-1]))
-    return _beside(_block(sheet(pulse_table(plan.flight, scheme=plan.scheme))), plan)
-
-
-def flight_html(flight: Flight) -> str | None:
-    """HTML table of a flight for notebooks; None without the extra plot."""
-    from nutdamp.page.document import FactList
-
-    names = ("nutation", "body_cone", "space_cone", "momentum_shift")
-    rows = tuple((name.replace("_", " "), degrees(getattr(flight.residual, name))) for name in names)
-    return _beside(_block(FactList(f"{flight.spacecraft.name}: {_summary(flight)}", rows)), flight)
-
-
-def comparison_html(compared: Comparison) -> str | None:
-    """HTML table of a comparison for notebooks; None without the extra plot."""
-    from nutdamp.page.document import sheet
-
-    table = scheme_table(compared, compared.recommended)
-    return _beside(_block(sheet(table)), compared.recommended)
-
-
-def _beside(table: str | None, result: Plan | Flight | None) -> str | None:
-    """A table with the picture of the motion beside it, or below where there is no room."""
+def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
+    """HTML table of a result for notebooks, with the picture of its motion; None without the extra plot."""
     from nutdamp.figures.image import svg
+    from nutdamp.page.report import block_html
 
-    if table is None or result is None:
+    try:
+        table = block_html(_block(result))
+    except MissingExtra:
+        return None
+    moves = result.recommended if isinstance(result, Comparison) else result
+    if moves is None or isinstance(moves, Spacecraft) or (isinstance(moves, Plan) and not moves.feasible):
         return table
     try:
-        picture = svg(result.figure("motion"))
+        picture = svg(moves.figure("motion"))
     except MissingExtra:
         return table
+    # The picture is beside the table, or below where there is no room.
     return (
         '<div style="display: flex; flex-wrap: wrap; gap: 1.5rem; align-items: flex-start">'
         f'<div>{table}</div><div style="flex: 1 1 26rem; max-width: 44rem">{picture}</div></div>'
     )
 
 
-def _block(content: Block) -> str | None:
-    from nutdamp.page.report import block_html
+def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
+    """The table of a result."""
+    from nutdamp.page.document import FactList, Prose, facts_of, sheet
+    from nutdamp.views.spacecraft import derived_table
 
-    try:
-        return block_html(content)
-    except MissingExtra:
-        return None
+    if isinstance(result, Spacecraft):
+        return facts_of(result.name, derived_table(result))
+    if isinstance(result, Comparison):
+        return sheet(scheme_table(result, result.recommended))
+    if isinstance(result, Flight):
+        names = ("nutation", "body_cone", "space_cone", "momentum_shift")
+        rows = tuple((name.replace("_", " "), degrees(getattr(result.residual, name))) for name in names)
+        return FactList(f"{result.spacecraft.name}: {_summary(result)}", rows)
+    if not result.feasible:
+        return Prose(repr(result)[1:-1])
+    return sheet(pulse_table(result.flight, scheme=result.scheme))
 
 
 def _summary(flight: Flight) -> str:

@@ -46,7 +46,7 @@ def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role:
     figure = Figure((3.0, 2.0), layout="constrained")
     axes = figure.subplots()
     for number in range(30):
-        labels.add(axes, f"label {number}", np.full(2, 0.5), role=role)
+        labels.add(axes, f"label {number}", np.full(2, 0.5), INK, role=role)
     labels.settle(figure)
     assert all(one.get_visible() for one in axes.texts) == complete
 

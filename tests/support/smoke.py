@@ -71,7 +71,7 @@ plan broken.yaml; 2
 plan --colour red; 2
 plan smoke.yaml --scheme half-cone; 2
 plan smoke.yaml --scheme two-pulse --set limits.horizon=1ms; 3
-simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion --show
+simulate smoke.yaml --scheme two-pulse --csv track.csv --json track.json --plot motion.svg --figure motion
 simulate smoke.yaml --schedule pulses.csv --flown
 simulate smoke.yaml --scheme none --until 10s --plot history.pdf --figure history
 trade --points 1 --csv trade.csv --json trade.json --plot trade.png --schedules folder

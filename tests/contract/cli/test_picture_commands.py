@@ -1,4 +1,4 @@
-"""Pictures by command: --plot, --figure and --show, films by animate, and pages by report."""
+"""Pictures by command: --plot and --figure, films by animate, and pages by report."""
 
 from __future__ import annotations
 
@@ -80,18 +80,6 @@ def test_standard_output_takes_the_picture_alone() -> None:
     assert ended.stdout.endswith(b"IEND\xaeB`\x82")
 
 
-@pytest.mark.parametrize("columns", [80, 140])
-def test_show_draws_below_the_tables(run: Run, columns: int) -> None:
-    command = ("simulate", "--scheme", "two-pulse")
-    plain, shown = (run(*command, *more, columns=columns).stdout for more in ((), ("--show",)))
-    assert shown.startswith(plain)
-    drawn = shown.removeprefix(plain).splitlines()
-    assert all(len(line) <= columns for line in drawn)
-    assert max(len(line.rstrip()) for line in drawn) > 0.9 * columns
-    assert any("⠁" <= sign <= "⣿" for line in drawn for sign in line)
-    assert "\x1b" not in shown
-
-
 def test_a_film_is_written_whole_and_ends_soon_after_the_last_pulse(run: Run, tmp_path: Path) -> None:
     """7.434 s, a quarter of that, in half a second of film: 5 frames for 3.5 turns of the nutation."""
     ended = run("animate", "--scheme", "two-pulse", "-o", "film.gif", *FILM)
@@ -148,12 +136,6 @@ def test_what_is_not_installed_is_exit_1_with_the_cure_before_the_work(
     assert "pip install 'nutdamp[plot]'" in ended.stderr
     assert "Traceback" not in ended.stderr
     assert (ended.stdout, names(tmp_path)) == ("", [])
-
-
-@pytest.mark.deep
-def test_the_terminal_drawing_needs_no_matplotlib(tmp_path: Path) -> None:
-    code = LACKING.format(package="matplotlib", words=["simulate", "--scheme", "two-pulse", "--show"])
-    assert "Axis track" in python(tmp_path, code).stdout
 
 
 # --- report -----------------------------------------------------------------------------------------------------------

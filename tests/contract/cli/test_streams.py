@@ -92,7 +92,7 @@ def test_no_blanks_fill_up_lines_in_a_pipe(run: Run) -> None:
 @pytest.mark.parametrize(
     ("command", "shown"),
     [
-        deep("simulate --scheme two-pulse --show --csv big.csv --json small.json", "pole curve"),
+        deep("simulate --scheme two-pulse --csv big.csv --json small.json", "momentum shift"),
         deep("disperse --scheme two-pulse --samples 2000 --csv big.csv --json small.json", "main causes of nutation"),
         weekly("plan --plot big.svg --json small.json", "recommended"),
         weekly("trade --points 1 --plot big.png --json small.json", "cheapest: "),
@@ -226,7 +226,7 @@ dispersions: {A: {normal: 1 %}, thrust: {normal: 2 %}}
 
 @spread(
     "command",
-    ["check", "plan --scheme one-pulse", "simulate --scheme one-pulse --show", "disperse --scheme one-pulse --case 1",
+    ["check", "plan --scheme one-pulse", "simulate --scheme one-pulse", "disperse --scheme one-pulse --case 1",
      "verify", "plan --robust --scheme one-pulse", "trade --points 1", "disperse --samples 100"],
     quick=4,
 )  # fmt: skip

@@ -12,6 +12,7 @@ from support import reference
 from support.builders import cross, spinner
 from support.golden import check_text
 
+import nutdamp
 from nutdamp.figures import geometry
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track
@@ -229,3 +230,28 @@ def test_a_hull_is_that_of_scipy() -> None:
     line = np.column_stack([np.linspace(0.0, 1.0, 9), np.linspace(0.0, 2.0, 9)])
     assert np.ptp(geometry.hull(line), axis=0) == pytest.approx([1.0, 2.0])
     assert geometry.hull(np.zeros((4, 2))).shape == (1, 2)
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.0, 1e-7), (-3e5, 4.1e5), (38.99, 41.01), (-1e-9, 2e-9)])
+@pytest.mark.parametrize("most", [2, 5, 9])
+def test_ticks_are_round_and_few(low: float, high: float, most: int) -> None:
+    found = geometry.ticks(low, high, most)
+    assert 1 <= len(found) <= most + 1
+    assert all(low - 1e-9 * (high - low) <= value <= high + 1e-9 * (high - low) for value in found)
+    steps = np.diff(found)
+    if len(steps):
+        mantissa = steps[0] / 10.0 ** math.floor(math.log10(steps[0]) + 1e-9)
+        assert steps == pytest.approx(steps[0])
+        assert min(abs(mantissa - round_) for round_ in (1.0, 2.0, 5.0, 10.0)) < 1e-6
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_pole_curve_says_where_its_axes_are_not_those_of_the_file(turned: bool) -> None:
+    tensor = [[100.0, 1.0, 0.0], [1.0, 120.0, 0.0], [0.0, 0.0, 80.0]] if turned else np.diag([100.0, 120.0, 80.0])
+    state = {"spin": 3.0, "nutation": "5 deg"}
+    body = nutdamp.load({"name": "turned", "inertia": {"tensor": np.asarray(tensor).tolist()}, "state": state})
+    assert geometry.pole_note(propagation.flown(body, Schedule(), 1.0)) == ", principal axes" * turned
+
+
+def test_the_pole_curve_says_that_the_spin_is_reversed() -> None:
+    assert geometry.pole_note(flown(BODIES["oblate, reversed"])[0]) == ", spin about −3"
