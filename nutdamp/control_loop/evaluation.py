@@ -13,7 +13,7 @@ import numpy as np
 
 from nutdamp.common import results, work
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
-from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
+from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.dynamics import Dynamics, Path, Push
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
@@ -27,7 +27,6 @@ from nutdamp.spacecraft.requirements import Left
 
 AGREE = 1e-6
 """s; firings that begin and last alike to this are the same."""
-
 
 EVALUATIONS = 1_000_000
 """Evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over."""
@@ -134,20 +133,14 @@ LOOP = "loop"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
-    """Pulses fired by a loop in a ``run``; its flight is the one in which it fired them, to the end of the run.
+    """Pulses fired by a loop in a ``flown_run``; its flight is that in which it fired them, to the end of the run.
 
-    ``known`` is the spacecraft as the law knows it, where that is not the truth.
+    ``known`` is the spacecraft as the law knows it.
     With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
     """
 
-    run: LoopRun | None = None
-    known: Spacecraft | None = None
-
-    @property
-    def flown_run(self) -> LoopRun:
-        """Run of the loop."""
-        assert self.run is not None
-        return self.run
+    flown_run: LoopRun = field(kw_only=True)
+    known: Spacecraft = field(kw_only=True)
 
     @cached_property
     def flight(self) -> Flight:
@@ -189,16 +182,12 @@ class LoopPlan(Plan):
     @cached_property
     def margins(self) -> tuple[Margin, ...]:
         """Stability margin of each channel at the start threshold."""
-        return margins(self._known, self._known.loop or self.flown_run.loop)
+        return margins(self.known, requirements.expect_loop(self.known))
 
     @cached_property
     def band(self) -> Band:
         """Dead band of the nutation by design."""
-        return dead_band(self._known, self._known.loop or self.flown_run.loop)
-
-    @property
-    def _known(self) -> Spacecraft:
-        return self.known or self.spacecraft
+        return dead_band(self.known, requirements.expect_loop(self.known))
 
 
 def loop_of(
@@ -209,12 +198,10 @@ def loop_of(
     Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
     """
     loop = requirements.expect_loop(spacecraft)
-    late = feeding(spacecraft, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
+    expect_in_time(spacecraft, loop)
     if case is None:
         run = fly(spacecraft, loop, until, seed=seed)
-        return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, run=run)
+        return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)
     from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
 
     study = loop_study(spacecraft, until, seed=seed)
@@ -223,4 +210,4 @@ def loop_of(
     run = fly(
         dispersed.truth, dispersed.truth.loop, study.until, seed=dispersed.key, law=study.law, scatter=dispersed.scatter
     )
-    return LoopPlan(dispersed.truth, LOOP, run.schedule, from_file=True, run=run, known=spacecraft)
+    return LoopPlan(dispersed.truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)

@@ -16,7 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.controller import GRID, SAMPLED, Coast, Course, Fired, Joined, Pilot, Scatter, Seen, Watch
+from nutdamp.control_loop.controller import (
+    GRID,
+    LONGEST,
+    SAMPLED,
+    Coast,
+    Course,
+    Fired,
+    Joined,
+    Pilot,
+    Scatter,
+    Seen,
+    Watch,
+)
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
@@ -122,7 +134,7 @@ def fly(
     """
     end = until_default(spacecraft, loop) if until is None else until
     key = seed if isinstance(seed, tuple) else (seed,)
-    return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
+    return Alone(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
 
 
 def largest_since(run: LoopRun) -> tuple[float, float]:
@@ -139,15 +151,10 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
 
 
 class Alone:
-    """Single flight in progress, stretch by stretch."""
+    """Flight in progress of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
 
-    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, key: tuple[int, ...]) -> None:
-        self.pilot, self.signal, self.dynamics, self.key = pilot, signal, dynamics, key
-        self.legs: list[Leg] = []
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         spacecraft: Spacecraft,
         loop: Loop,
         until: float,
@@ -155,17 +162,17 @@ class Alone:
         law: Law,
         scatter: Scatter | None = None,
         dynamics: Dynamics | None = None,
-    ) -> Alone:
-        """Flight of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
-        moves = dynamics or make_dynamics(spacecraft)
-        free = make_dynamics(spacecraft).free  # the body's, so that any integrator flies the same decisions
-        pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
-        return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
+    ) -> None:
+        own = make_dynamics(spacecraft)
+        self.dynamics, self.key, self.signal = dynamics or own, key, Signal(spacecraft, loop.sensor, key)
+        # Free as the body is: so that any integrator flies the same decisions.
+        self.pilot = Pilot(spacecraft, loop, until, law, free=own.free, scatter=scatter)
+        self.legs: list[Leg] = []
 
     def fly(self) -> LoopRun:
         """Coast and fire until the end, or until something is wrong."""
         pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
-        coast = self._coast(state, now)
+        coast = Coast(pilot.law, self.signal, self.dynamics, state, now)
         while (seen := coast.look(pilot.until, active=pilot.active)) is not None:
             step = pilot.step(coast, seen)
             if step is Course.OVER:
@@ -176,22 +183,33 @@ class Alone:
                 begin = self._coasted(coast, state, now, step.thrust[0])
                 pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
                 state, now = self._fire(step, begin), step.thrust[1]
-                coast = self._coast(state, now)
+                coast = Coast(pilot.law, self.signal, self.dynamics, state, now)
         self._coasted(coast, state, now, max(pilot.until, now))
-        return self._run(state)
+        schedule = Schedule(tuple(firing.pulse for firing in pilot.fired))
+        legs, spans = tuple(self.legs), tuple(pulse.thrust for pulse in schedule)
+        return LoopRun(
+            pilot.truth,
+            pilot.loop,
+            pilot.until,
+            self.key,
+            tuple(pilot.fired),
+            pilot.ending[0],
+            pilot.ending[1] or None,
+            tuple(pilot.quiet),
+            pilot.lost,
+            pilot.looked_at,
+            Flight(pilot.truth, schedule, legs, state, self.dynamics.moments, spans, until=pilot.until),
+        )
 
     def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
         """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be seen, as it was."""
+        path: Path = Joined(coast.parts)
         if coast.parts and not self.dynamics.free:
-            there, path = coast.at(end), Joined(coast.parts)
-            self._leg(start, end, path)
-            return there
-        arc, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
-        self._leg(start, end, arc)
+            there = coast.at(end)
+        else:
+            path, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+        self._leg(start, end, path)
         return there
-
-    def _coast(self, state: SpinState, since: float) -> Coast:
-        return Coast(self.pilot.law, self.signal, self.dynamics, state, since)
 
     def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
         """Motion through the thrust of a pulse, from its beginning to its end."""
@@ -205,27 +223,6 @@ class Alone:
     def _leg(self, start: float, end: float, path: Path, *, firing: bool = False, last: bool = False) -> None:
         done = len(self.pilot.fired) - firing
         self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
-
-    def _run(self, settled: SpinState) -> LoopRun:
-        """Run that ends its firings with the motion ``settled``."""
-        pilot = self.pilot
-        schedule = Schedule(tuple(firing.pulse for firing in pilot.fired))
-        spans = tuple(pulse.thrust for pulse in schedule)
-        moments = self.dynamics.moments
-        flight = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
-        return LoopRun(
-            pilot.truth,
-            pilot.loop,
-            pilot.until,
-            self.key,
-            tuple(pilot.fired),
-            pilot.ending[0],
-            pilot.ending[1] or None,
-            tuple(pilot.quiet),
-            pilot.lost,
-            pilot.looked_at,
-            flight,
-        )
 
 
 TOGETHER = 1 << 16
@@ -304,26 +301,16 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
     return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
 
 
-def fly_together(
-    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
-) -> FlownLoops:
-    """Loops of ``cases``, flown to ``until`` s; ``watch`` is called with the number of finished ones.
-
-    Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
-    """
-    return _Fleet(law, cases, until).fly(watch)
-
-
 def fly_alone(
     law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
 ) -> FlownLoops:
-    """`fly_together`, each loop by itself, for any disturbance and sensor."""
+    """Loops as of a `Fleet`, each flown by itself, for any disturbance and sensor."""
     count = len(cases)
     rates, quaternion = np.empty((3, count)), np.empty((4, count))
     quiet, largest, pilots = np.full(count, math.nan), np.empty(count), []
     aspects = np.empty((len(law.spacecraft.keep), 2, count))
     for row, case in enumerate(cases):
-        alone = Alone.of(case.truth, case.truth.loop or law.loop, until, case.key, law, case.scatter)
+        alone = Alone(case.truth, case.truth.loop or law.loop, until, case.key, law, case.scatter)
         run = alone.fly()
         pilots.append(alone.pilot)
         end = run.flight.motion(np.array([run.flight.legs[-1].end]))
@@ -341,15 +328,17 @@ def fly_alone(
     return FlownLoops(cases, pilots, rates, quaternion, quiet, largest, aspects)
 
 
-class _Fleet:
-    """Flights in the making."""
+class Fleet:
+    """Loops of ``cases`` flown together to ``until`` s.
+
+    Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
+    """
 
     def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
         self.law, self.cases, self.until = law, cases, until
-        loops = [case.truth.loop for case in cases]
         self.pilots = [
-            Pilot(case.truth, loop or law.loop, until, law, free=True, scatter=case.scatter)
-            for case, loop in zip(cases, loops, strict=True)
+            Pilot(case.truth, case.truth.loop or law.loop, until, law, free=True, scatter=case.scatter)
+            for case in cases
         ]
         sensors = [pilot.loop.sensor for pilot in self.pilots]
         columns = 1 if law.loop.sensor.kind == ACCELEROMETER else 2
@@ -369,8 +358,8 @@ class _Fleet:
         self.settled = np.full(len(cases), math.inf)
         self.quiet, self.largest = np.full(len(cases), math.nan), np.full(len(cases), -math.inf)
 
-    def fly(self, watch: Callable[[int], None]) -> FlownLoops:
-        """Fly all loops to their ends."""
+    def fly(self, watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
+        """Fly all loops to their ends; ``watch`` is called with the number of finished ones."""
         groups, over = [self._begun(np.arange(len(self.pilots)))], 0
         while groups:
             groups, fired, later = self._round(groups)
@@ -455,7 +444,7 @@ class _Fleet:
         sizes = np.abs(self.law.seen(omega[np.arange(len(rows)), ends])).tolist()
         decided: Vector = times + self.delays[rows, None]
         group.numbers[:] += count
-        watch.reach = watch.doubled
+        watch.reach = min(2 * watch.reach, LONGEST)
         for place, (end, size) in enumerate(zip(counts.tolist(), sizes, strict=True)):
             at = (place, slice(0, end))
             seen = Seen(times[at], decided[at], z[at], best[at], spin[at], nutation[at], fires[:, *at], size)

@@ -82,6 +82,13 @@ def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
     return next((margin for margin in all_margins if not margin.damps), None)
 
 
+def expect_in_time(spacecraft: Spacecraft, loop: Loop) -> None:
+    """Raise Infeasible where firings would feed the nutation by how late they come."""
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
+
+
 def too_late(margin: Margin) -> str:
     """Message on a channel of a loop that does not damp."""
     degrees = np.degrees(margin.late)
@@ -146,22 +153,20 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     is more than the stop threshold, firings end there, the noise counted in the size and in both parts of the firing.
     """
     law, spin = Law(spacecraft, loop), spacecraft.spin
-    estimator = Estimator(law, loop.sensor, 0.0)
+    doubts = Estimator(law, loop.sensor, 0.0).doubts
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
-    noise = estimator.offset + estimator.doubt / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
-    noise /= abs(loop.sensor.scale)
-    steps = [abs(actuator.kick) * _shortest(spacecraft, actuator) for actuator in law.actuators]
+    noise = doubts.noise / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
+    noise = (doubts.bias + doubts.steps + noise) / abs(loop.sensor.scale)
+    steps = []
+    for actuator in law.actuators:
+        least = effective_on_time(actuator.channel, shortest_on_time(spacecraft, actuator.channel))
+        steps.append(abs(actuator.kick) * max(actuator.shortest, least))
     stop = law.size(loop.stop, spin) / abs(loop.sensor.scale)
     floor = 0.5 * max(steps)
     most = stop + noise if floor <= stop else floor + 3.0 * noise
     grown = math.exp(min(max(law.growth, 0.0) * loop.sensor.delay, math.log(NEVER)))
     angles = [float(law.nutation(size, spin)) for size in (most * grown, noise, max(steps))]
     return Band(*angles)
-
-
-def _shortest(spacecraft: Spacecraft, actuator: Actuator) -> float:
-    least = shortest_on_time(spacecraft, actuator.channel)
-    return max(actuator.shortest, effective_on_time(actuator.channel, least))
 
 
 FORGOTTEN = 12.0
@@ -307,7 +312,6 @@ PHASES = 16
 CURVED = 12.0
 """Sigmas within which a size is so small that noise across it counts."""
 
-
 DEGREES = 240
 """Terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger."""
 
@@ -386,6 +390,4 @@ def expect_damping(body: Spacecraft, loop: Loop) -> None:
     turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
     if turned:
         raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
-    late = feeding(body, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
+    expect_in_time(body, loop)

@@ -39,11 +39,7 @@ class Checkpoints:
     """Ranges of the first cases of a ``study``."""
 
     def __init__(self, study: Study) -> None:
-        self.study = study
-        drawn, _ = study.source().block(0)
-        self._draws: Draws = {
-            name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()
-        }
+        self.study, self._draws = study, study.draws_of_all(np.arange(CASES))
 
     @cached_property
     def _initial(self) -> DispersedCases:

@@ -197,17 +197,7 @@ class Exact:
     """All values, in the order of the cases."""
 
     def __init__(self, values: Array) -> None:
-        self.values = values
-
-    @property
-    def minimum(self) -> float:
-        """Smallest value."""
-        return float(self.values.min())
-
-    @property
-    def maximum(self) -> float:
-        """Largest value."""
-        return float(self.values.max())
+        self.values, self.minimum, self.maximum = values, float(values.min()), float(values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
         """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`."""
@@ -380,33 +370,29 @@ def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> Fi
 
 def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
     """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun pulses."""
-    inputs = model.inputs.drawn
-    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
-    draws: dict[str, Array | float] = {}
-    for index, entry in enumerate(inputs):
-        draw = np.full(2 * len(inputs), entry.size if entry.kind == "bias" else 0.0)
-        draw[2 * index : 2 * index + 2] += steps[index], -steps[index]
-        draws[entry.name] = draw
-    out = np.empty((ROWS, 2 * len(inputs)))
-    if inputs:
-        vectors(model, fly(model.cases(draws)), out)
-    return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
+    steps = np.array([SHARE * abs(entry.size) for entry in model.inputs.drawn])
+    out = _varied(model, fly, np.stack([steps, -steps], axis=1))
+    return FirstOrder(model.inputs.drawn, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
 
 
 def first_order(model: DispersedModel) -> FirstOrder:
     """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
-    inputs = model.inputs.drawn
-    jacobian = np.zeros((ROWS, len(inputs)))
-    if inputs:
-        steps = np.array([STEP * abs(entry.size) for entry in inputs])
-        draws: dict[str, NDArray[np.complex128]] = {}
-        for index, entry in enumerate(inputs):
-            draws[entry.name] = np.full(len(inputs), entry.size if entry.kind == "bias" else 0.0, dtype=complex)
-            draws[entry.name][index] += 1j * steps[index]
-        out = np.empty((ROWS, len(inputs)), dtype=complex)
-        vectors(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
-        jacobian = out.imag / steps
-    return FirstOrder(inputs, jacobian, _mixing(model))
+    steps = np.array([STEP * abs(entry.size) for entry in model.inputs.drawn])
+    out = _varied(model, ClosedForm(model), 1j * steps[:, None])
+    return FirstOrder(model.inputs.drawn, out.imag / steps, _mixing(model))
+
+
+def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]) -> NDArray[Any]:
+    """Outcome (10, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
+    draws: dict[str, NDArray[Any]] = {}
+    for index, entry in enumerate(model.inputs.drawn):
+        draw = np.full(steps.shape, entry.size if entry.kind == "bias" else 0.0, dtype=steps.dtype)
+        draw[index] += steps[index]
+        draws[entry.name] = draw.ravel()
+    out = np.empty((ROWS, steps.size), dtype=steps.dtype)
+    if draws:
+        vectors(model, fly(model.cases(draws)), out)
+    return out
 
 
 def _mixing(model: DispersedModel) -> Array | None:
