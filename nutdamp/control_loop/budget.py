@@ -1,10 +1,8 @@
 """Propellant and pulses a year that hold the nutation against energy dissipation, and how long the tank lasts.
 
-They are those of the limit cycle of the loop from event to event. Coasts are in closed form, firings by the law itself.
-Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ; noise decides in
-which sample a threshold is first reached. Only the few samples in which a channel may come to fire are worked out one
-by one. Many cycles are followed side by side, from random phases, until their mean is known. tan θ = tan θ0 e^{κt}
-tells by when damping must begin.
+They are those of the limit cycle of the loop from event to event: between two, z grows as e^{(κ - iω)t}, so that the
+time from one size to another is ln(s1/s0)/κ; noise decides in which sample a threshold is first reached, and only the
+few samples in which a channel may come to fire are worked out one by one. Many cycles are followed side by side.
 """
 
 from __future__ import annotations
@@ -221,7 +219,6 @@ class Map:
         return self.seen.drawn(self.rng, rows, len(self.seen.weights))
 
     def _waits(self, seen: ComplexArray) -> Vector:
-        """`Law.waits` of all channels, (channels, ...)."""
         return self.watch.waits(seen, np.full(seen.shape, self.spin))
 
     def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
@@ -272,15 +269,13 @@ class Map:
         samples[samples < self.memory] = 0
         useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
         samples[useless] = self._until(self.helps, size[useless])
-        for row in rows[useless].tolist():
-            self._rest(at, row)
+        self._rest(at, rows[useless])
         if self.down is not None:
             event = self.down.size(size, self.rng.exponential(size=len(rows)))
             quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
             samples[quiet] = self._until(event[quiet], size[quiet])
             at.active[rows[quiet]] = False
-            for row in rows[quiet & ~useless].tolist():
-                self._rest(at, row)
+            self._rest(at, rows[quiet & ~useless])
         moved = samples > 0
         self._goes(at, rows[moved], samples[moved])
 
@@ -309,9 +304,9 @@ class Map:
         passes = np.ones(len(rows), dtype=bool)
         for index in np.flatnonzero(fires.any(axis=(0, 2))).tolist():
             passes[index] = not self._fires(at, int(rows[index]), seen[index], fires[:, index])
-        for row in rows[passes & (firsts < count)].tolist():
-            at.active[row] = False
-            self._rest(at, row)
+        resting = rows[passes & (firsts < count)]
+        at.active[resting] = False
+        self._rest(at, resting)
         places, going = np.flatnonzero(passes), rows[passes]
         passed = np.minimum(firsts[places] + 1, count)
         at.z[going] *= np.exp(self.turn * step * passed)
@@ -392,13 +387,14 @@ class Map:
             self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
         return self.shapes[key]
 
-    def _rest(self, at: Chains, row: int) -> None:
-        """Record the sums of a finished cycle, if anything was fired in it."""
-        sums = at.sums[row]
-        if sums.largest > 0.0:
-            sums = sums._replace(cycles=sums.cycles + 1.0)
-            at.cycles[row].append(sums)
-            at.sums[row] = sums._replace(largest=0.0)
+    def _rest(self, at: Chains, rows: Rows) -> None:
+        """Record the sums of finished cycles, if anything was fired in them."""
+        for row in rows.tolist():
+            sums = at.sums[row]
+            if sums.largest > 0.0:
+                sums = sums._replace(cycles=sums.cycles + 1.0)
+                at.cycles[row].append(sums)
+                at.sums[row] = sums._replace(largest=0.0)
 
     def _summed(self, firings: Iterable[list[Sums]], cycles: Sequence[list[Sums]]) -> Cycle:
         """Mean of all chains, between the first and the last counted cycle, or firing."""

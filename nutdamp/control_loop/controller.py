@@ -18,7 +18,6 @@ from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 from nutdamp.spacecraft.tolerances import Tolerance
@@ -301,13 +300,25 @@ class Scatter:
 
 
 def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
-    """A deviation."""
     if tolerance is None:
         return 0.0
     first, second = random.random(2)
     normal = float(random.standard_normal())
     unit = {"normal": normal, "uniform": 2.0 * first - 1.0, "triangular": first + second - 1.0, "bias": 1.0}
     return tolerance.size * float(unit[tolerance.kind])
+
+
+class Case(NamedTuple):
+    """Loop to be flown: the true spacecraft with its loop, the ``key`` of its noise, and the errors of firings.
+
+    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one. ``tilt`` rad is by how much
+    the attitude at t = 0 is off, about the body axes 1 and 2.
+    """
+
+    truth: Spacecraft
+    key: tuple[int, ...]
+    scatter: Scatter | None = None
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 class Course(Enum):
@@ -320,17 +331,17 @@ class Course(Enum):
 class Pilot:
     """Controller of one loop: from samples of its coasts, stretch by stretch, to firings.
 
-    The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
+    The ``law`` has the loop as it is known on board; that of the ``case``, with sensor and faults, is as it is.
     ``free``: coasts are those of a symmetric body without torque from outside.
     """
 
-    def __init__(
-        self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
-    ) -> None:
+    def __init__(self, law: Law, case: Case, until: float, *, free: bool) -> None:
+        truth = case.truth
         if shed(truth) is not None:
             problem = "a loop flies with constant moments of inertia; leave this out"
             raise Unsuitable(("tank", "inertia_per_kg"), problem)
-        self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
+        self.law, self.truth, self.loop, self.scatter = law, truth, truth.loop or law.loop, case.scatter
+        self.until, self.free = until, free
         self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
@@ -503,6 +514,5 @@ class Pilot:
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:
-    """Index of the first true entry from ``row`` on."""
     offset = int(np.argmax(mask[row:]))
     return row + offset if mask[row + offset] else None

@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.controller import Scatter
+from nutdamp.control_loop.controller import Case, Scatter
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.simulation import Case, Fleet, FlownLoops, expects_alone, fly_alone, until_default
+from nutdamp.control_loop.simulation import Fleet, FlownLoops, expects_alone, fly_alone, until_default
 from nutdamp.control_loop.stability import Band, dead_band, expect_in_time
 from nutdamp.errors import BadRequest
-from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.cases import DispersedModel, cold_of, cones_used, rotated, tank_of, triple
 from nutdamp.montecarlo.inputs import BLOCK, BY_VALVE, Draws, Inputs, independent, some_of, with_sensor
 from nutdamp.montecarlo.propagated import carried
 from nutdamp.montecarlo.statistics import Exact, angle, cases_to_show
-from nutdamp.montecarlo.study import Counted, Dispersed, Drawn
+from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
@@ -50,17 +50,6 @@ class LoopModel(DispersedModel):
         self.inputs = with_sensor(self.spacecraft, Inputs(kept, self.inputs.unused), "the loop does not fire")
         each = {entry.tolerance: entry for entry in drawn if entry.tolerance in OF_FIRINGS}
         self.of_firings = tuple(entry._replace(name=name) for name, entry in each.items())
-
-    def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """True where a case is possible: body, a sensor that sees something and no signal before its time."""
-        good: Any = super().physical(draws)
-        delay = self.law.loop.sensor.delay
-        for name, draw in draws.items():
-            if name == "sensor delay":
-                good = good & (delay + draw >= 0.0)
-            elif name.startswith(("sensor scale", "sensor noise")):
-                good = good & (draw > -1.0)
-        return good  # type: ignore[no-any-return]
 
     def loops(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
         """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for all."""
@@ -88,18 +77,14 @@ class LoopModel(DispersedModel):
             key = (seed, number + 1)
             truth = replace(
                 body,
-                inertia=Inertia((moments[row][0], moments[row][1], moments[row][2]), body.inertia.axes, wheels[row]),
+                inertia=Inertia(triple(moments[row]), body.inertia.axes, wheels[row]),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
                 channels=self._channels(draw, {name: torque[row] for name, torque in torques.items()}),
                 loop=replace(loop, sensor=_sensor(loop.sensor, draw)),
+                cold=cold_of(body, draw),
+                tank=tank_of(body, draw),
             )
-            if "cold" in draw and body.cold is not None:
-                truth = replace(truth, cold=replace(body.cold, first=max(body.cold.first + draw["cold"], 0.0)))
-            if "cold_pulses" in draw and truth.cold is not None:
-                truth = replace(truth, cold=replace(truth.cold, pulses=truth.cold.pulses + draw["cold_pulses"]))
-            if any(name.startswith("tank ") for name in draw):
-                truth = replace(truth, tank=tank_of(body, draw))
             scatter = Scatter(key, *each_firing, draw.get("timing offset", 0.0))
             cases.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
         return cases
@@ -167,7 +152,6 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
-    """Sensor of a case."""
     axes = [""] if sensor.kind == ACCELEROMETER else [" 1", " 2"]
     scales = [sensor.scale * (1.0 + draw.get(f"sensor scale{axis}", 0.0)) for axis in axes]
     biases = [sensor.bias + draw.get(f"sensor bias{axis}", 0.0) for axis in axes]
@@ -217,34 +201,17 @@ FEW = 100
 """Least number of settled cases for sensitivities."""
 
 
-CollectLoops = Callable[[int, Array, list[Ending], Array], None]
-"""Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
-least and largest angle (m, 2, n) rad to the direction of each cone."""
+class LoopStudy(DrawnCases):
+    """Loop of a ``spacecraft`` flown to ``until`` s in dispersed cases; its ``law`` on board knows the file.
 
+    ``alone`` is why the cases fly one by one, which takes longer; empty where they fly together.
+    """
 
-@dataclass(frozen=True, eq=False)
-class LoopStudy(Drawn):
-    """Loop of a ``spacecraft`` flown to ``until`` s in dispersed cases."""
+    model: LoopModel
 
-    spacecraft: Spacecraft
-    until: float
-    seed: int
-
-    @cached_property
-    def law(self) -> Law:
-        """Law on board, which knows the file."""
-        assert self.spacecraft.loop is not None
-        return Law(self.spacecraft, self.spacecraft.loop)
-
-    @cached_property
-    def model(self) -> LoopModel:
-        """Dispersed model."""
-        return LoopModel(self.law)
-
-    @cached_property
-    def alone(self) -> str:
-        """Reason why the cases fly one by one, which takes longer; empty where they fly together."""
-        return expects_alone(self.law, self.spacecraft)
+    def __init__(self, spacecraft: Spacecraft, loop: Loop, until: float, seed: int) -> None:
+        self.spacecraft, self.until, self.seed, self.law = spacecraft, until, seed, Law(spacecraft, loop)
+        self.model, self.alone = LoopModel(self.law), expects_alone(self.law, spacecraft)
 
     @cached_property
     def band(self) -> Band:
@@ -267,7 +234,6 @@ class LoopStudy(Drawn):
 
     @cached_property
     def _nominal_flown(self) -> FlownLoops:
-        """File itself, with the noise of the seed, flown as a case."""
         return self.fly([Case(self.spacecraft, (self.seed,))])
 
     @property
@@ -314,11 +280,8 @@ class LoopStudy(Drawn):
         out[3] = angle(start, triple(np.array(momentum)))
         out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
-        used = [
-            [math.nan if firing.pulse.propellant is None else firing.pulse.propellant for firing in p.fired]
-            for p in pilots
-        ]
-        out[6] = [math.fsum(consumption) for consumption in used]
+        used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
+        out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
         shares = list(cones_used(body.keep, flown.aspects))
@@ -335,7 +298,7 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
     loop = requirements.expect_loop(spacecraft)
     expect_dispersions(spacecraft.dispersions)
     expect_in_time(spacecraft, loop)
-    return LoopStudy(spacecraft, until_default(spacecraft, loop) if until is None else until, seed)
+    return LoopStudy(spacecraft, loop, until_default(spacecraft, loop) if until is None else until, seed)
 
 
 @dataclass(eq=False)
@@ -427,12 +390,13 @@ def run(
     *,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
-    collect: CollectLoops | None = None,
+    collect: Callable[[int, Array, list[Ending], Array], None] | None = None,
 ) -> LoopResults:
     """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
-    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order. When ``stopped``
-    says so, the portions done so far are kept.
+    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order: the number (from 0)
+    of the first case, outputs (8, n), why they were flown no further, and angles (m, 2, n) rad to the cones. When
+    ``stopped`` says so, the portions done so far are kept.
     """
     study = results.study
     source, block = study.source(), -1

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from nutdamp.common import results, work
+from nutdamp.control_loop.controller import Case
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
 from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
 from nutdamp.errors import BadRequest, Infeasible
@@ -199,15 +200,12 @@ def loop_of(
     """
     loop = requirements.expect_loop(spacecraft)
     expect_in_time(spacecraft, loop)
-    if case is None:
-        run = fly(spacecraft, loop, until, seed=seed)
-        return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)
-    from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
+    flown, law = Case(spacecraft, (seed,)), None
+    if case is not None:
+        from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
 
-    study = loop_study(spacecraft, until, seed=seed)
-    dispersed = study.case(case)
-    assert dispersed.truth.loop is not None
-    run = fly(
-        dispersed.truth, dispersed.truth.loop, study.until, seed=dispersed.key, law=study.law, scatter=dispersed.scatter
-    )
-    return LoopPlan(dispersed.truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)
+        study = loop_study(spacecraft, until, seed=seed)
+        flown, law, until = study.case(case), study.law, study.until
+    truth = flown.truth
+    run = fly(truth, truth.loop or loop, until, seed=flown.key, law=law, scatter=flown.scatter)
+    return LoopPlan(truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)

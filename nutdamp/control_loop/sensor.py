@@ -66,8 +66,8 @@ def is_blind(moments: Sequence[float], position: Vector, axis: Vector) -> bool:
 class Noise:
     """Normal numbers by sample number, independent of the order of access; ``key`` is seed and case."""
 
-    def __init__(self, key: tuple[int, ...], columns: int) -> None:
-        self.key, self.columns = key, columns
+    def __init__(self, key: tuple[int, ...], sensor: Sensor) -> None:
+        self.key, self.columns = key, 1 if sensor.kind == ACCELEROMETER else 2
         self._blocks: dict[int, Vector] = {}
 
     def of(self, first: int, count: int) -> Vector:
@@ -109,8 +109,7 @@ class Signal:
 
     def __init__(self, spacecraft: Spacecraft, sensor: Sensor, key: tuple[int, ...]) -> None:
         self.sensor, self.moments = sensor, spacecraft.inertia.moments
-        columns = 1 if sensor.kind == ACCELEROMETER else 2
-        self.noise = Noise(key, columns)
+        self.noise = Noise(key, sensor)
 
     def shown(self, rates: Vector) -> Vector:
         """Signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3) of free motion."""

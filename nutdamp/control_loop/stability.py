@@ -32,25 +32,13 @@ NEVER = 1e3
 """Growth e^{κT} from which on further growth does not matter."""
 
 
-class Cause(NamedTuple):
-    """Causes that reverse firings of a channel: the sensor, or that the channel is ``backwards``."""
-
-    sensor: bool
-    backwards: bool
-
-    @property
-    def turned(self) -> bool:
-        """True if a firing feeds the nutation: two errors cancel."""
-        return self.sensor != self.backwards
-
-
 @dataclass(frozen=True, slots=True)
 class Margin:
     """Channel at a ``nutation`` (rad): its largest delay ``late`` (rad), and the share (``gain``) that this leaves.
 
     It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
-    later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
-    not counted in these figures.
+    later still; negative where it comes too late, minus infinity where no firing damps. ``turned``: the sensor or the
+    channel, not both, is reversed in the file: firings feed the nutation, which is not counted in these figures.
     """
 
     channel: str
@@ -60,7 +48,7 @@ class Margin:
     gain: float
     growth: float
     delay: float
-    cause: Cause
+    turned: bool
 
     @property
     def damps(self) -> bool:
@@ -113,9 +101,9 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
         sampling = 0.0 if loop.sensor.rate is None else 1.0 / loop.sensor.rate
         late = abs(lag(law, loop.sensor, spin)) + rate * (firing.lead + sampling)
     most = _most_late(pull, growth)
-    cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
+    turned = (loop.sensor.scale < 0.0) != (actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause)
+    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned)
 
 
 def _most_late(pull: float, growth: float) -> float:
@@ -387,7 +375,7 @@ def exceeds(limit: float, shown: Vector) -> Vector:
 
 def expect_damping(body: Spacecraft, loop: Loop) -> None:
     """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
-    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
+    turned = [margin.channel for margin in margins(body, loop) if margin.turned]
     if turned:
         raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
     expect_in_time(body, loop)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from nutdamp.physics import attitude
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
-from nutdamp.physics.thruster import Tank, possible, spread
+from nutdamp.physics.thruster import Cold, Tank, possible, spread
 from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
@@ -117,13 +117,7 @@ def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
 
 def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
     """Matrix times vector, elementwise over cases."""
-    rows = []
-    for row in matrix.tolist():
-        total: Cases = 0.0
-        for entry, part in zip(row, vector, strict=True):
-            total = plus(total, part if entry == 1.0 else times(entry, part))
-        rows.append(total)
-    return triple(rows)
+    return triple(reduce(plus, map(times, row, vector)) for row in matrix.tolist())
 
 
 def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
@@ -136,6 +130,12 @@ def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
     )
 
 
+def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
+    """Cold nozzles of the cases."""
+    cold, first, pulses = body.cold, draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
+    return cold and replace(cold, first=plus(cold.first, first), pulses=plus(cold.pulses, pulses))
+
+
 def supplied(
     body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
 ) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
@@ -146,17 +146,14 @@ def supplied(
     in the tank that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what
     they take.
     """
-    cold, tank = body.cold, tank_of(body, draws)
+    tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
     planned = [pulse.propellant or 0.0 for pulse in schedule]
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
         spent = tuple(used * flow for used, flow in zip(planned, flows, strict=True))
         return levels, spent if known else None, 0.0
-    if cold is not None:
-        off = draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
-        cold = replace(cold, first=plus(cold.first, off[0]), pulses=plus(cold.pulses, off[1]))
-    nominal, case = Supply(body), Supply(replace(body, cold=cold, tank=tank))
+    nominal, case = Supply(body), Supply(replace(body, cold=cold_of(body, draws), tank=tank))
     channels = {channel.name: channel for channel in body.channels}
     higher: Cases = 1.0  # the file gives the thrust at its own pressure
     if tank is not None and body.tank is not None:
@@ -180,8 +177,11 @@ def supplied(
 DISC = 1e-12
 """Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
 
-NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg")
+NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "sensor_delay")
 """Tolerances of quantities that are never negative: draws that make them so are repeated."""
+
+POSITIVE = ("sensor_scale", "sensor_noise")
+"""Tolerances of quantities that are not zero either."""
 
 ROUNDING = 1e-9
 """A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
@@ -307,12 +307,14 @@ class DispersedModel:
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """True where a case is possible: moments of a rigid body, positive thrust."""
+        """True where a case is possible: moments of a rigid body, positive thrust, a sensor that sees something."""
         moments = self._moments(draws)
         good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
             if entry.tolerance in NOT_NEGATIVE and entry.name in draws:
                 good = good & (entry.nominal + draws[entry.name] >= 0.0)
+            elif entry.tolerance in POSITIVE and entry.name in draws:
+                good = good & (entry.nominal + draws[entry.name] > 0.0)
         tank = tank_of(self.spacecraft, draws)
         if tank is not None and any(name.startswith("tank ") for name in draws):
             good = good & possible(tank)
@@ -497,7 +499,6 @@ class DispersedModel:
 
 
 def _possible(first: Cases, second: Cases, third: Cases) -> Any:
-    """True where moments are those of a rigid body."""
     slack = 1.0 + DISC
     good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
     return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)

@@ -1,16 +1,12 @@
 """Dispersed inputs of a study: selection, correlation, random draws.
 
-The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `DispersedInput`;
-a tolerance without effect becomes an `Unused` with its reason.
-
 Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
 correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
 ones theirs is (6/π) asin(ρ/2).
 
-Draws do not depend on the number of threads or cases. Cases come in fixed blocks of `BLOCK`. Every input has a stream
-of its own in every block: the counter-based Philox generator with the seed and the input's name in the key, the block
-in the counter. So case 1234 is the same in a study of any size, and a tolerance that is tightened or dropped leaves
-the draws of all others as they were. Correlated inputs mix the streams of their group.
+Every input has a stream of its own in every block of `BLOCK` cases: the counter-based Philox generator with the seed
+and the input's name in the key, the block in the counter. So case 1234 is the same in a study of any size and with any
+number of threads, and a tolerance that is tightened or dropped leaves the draws of all others as they were.
 """
 
 from __future__ import annotations
@@ -408,7 +404,6 @@ def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> flo
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    """Quadrature nodes of the standard normal distribution."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     return nodes, weights / math.sqrt(2.0 * math.pi)
 

@@ -1,13 +1,11 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-Flights have the true tensor and the disturbances; command blocks fire in each case from the Sun pulses of its own
-nutating body. The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Between pulses a symmetric
-body is free, and two facts make the arcs cheap. Seen in the frame that turns with the nutation, by the phase aα with
-α = ∫ω3 dt, the angular momentum does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that
-frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector,
-and a coast turns a quaternion; no angle is taken before the end. Energy dissipation draws H away from axis 3 in that
-frame, along an arc that `energy_sink` knows. The closed form takes no absolute value and compares nothing: the same
-code runs on complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
+The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Seen in the frame that turns with the
+nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse
+part is AΩ = Aω0 + Σ J e^{iaα}. And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0)
+Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3
+in that frame, along an arc that `energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on
+complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -302,10 +300,10 @@ def fly(
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    ``nominal``: `seen_nominally`. A pulse that is due while the one before is on begins as that ends. Returns rates
-    (3, n) rad/s and quaternions (4, n) at the end of the last pulse; starts (k, n) s of the pulses; whether they fire
-    (k, n), which needs the sensor to have seen the Sun up to then in the same turns as in the nominal flight: another
-    count of Sun pulses is another plan; when the last pulse ends (n,), s.
+    ``nominal``: `RealWidths.seen_nominally`. A pulse that is due while the one before is on begins as that ends.
+    Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last pulse; starts (k, n) s of the pulses;
+    whether they fire (k, n), which needs the sensor to have seen the Sun up to then in the same turns as in the nominal
+    flight: another count of Sun pulses is another plan; when the last pulse ends (n,), s.
     """
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None
@@ -351,17 +349,6 @@ def fly(
     return rates, quaternion, starts, seen, over
 
 
-def seen_nominally(model: DispersedModel) -> list[bool]:
-    """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
-    sensor, blocks = model.spacecraft.sun_sensor, model.schedule.blocks
-    if sensor is not None and sensor.sees_all:
-        return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
-    try:
-        return fire(model.spacecraft, model.schedule.blocks)[1]
-    except Infeasible:
-        return [False]
-
-
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
     """Torques of thrusters through valves of their own, together, between successive corners of their thrust."""
     torques = [np.array([part(component) for component in each.torque]) * seen for each in thrust]
@@ -398,8 +385,15 @@ class RealWidths:
         return make_dynamics(self.model.spacecraft)
 
     @cached_property
-    def _seen(self) -> list[bool]:
-        return seen_nominally(self.model)
+    def seen_nominally(self) -> list[bool]:
+        """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
+        body, blocks = self.model.spacecraft, self.model.schedule.blocks
+        if body.sun_sensor is not None and body.sun_sensor.sees_all:
+            return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
+        try:
+            return fire(body, blocks)[1]
+        except Infeasible:
+            return [False]
 
     @cached_property
     def effort(self) -> float:
@@ -418,7 +412,8 @@ class RealWidths:
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
         propellant, bodies = cases.propellant, self._bodies(moments, cases.wheel)
         if self.model.schedule.blocks:
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, _upright(count), cases, self._seen, watch)
+            seen_nominally, upright = self.seen_nominally, _upright(count)
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, seen_nominally, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:

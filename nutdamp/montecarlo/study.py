@@ -164,16 +164,13 @@ CONFIDENCE = 0.95
 WORTH_SAYING = math.radians(1e-4)
 """rad by which cases of falling moments must err for that to be said."""
 
-Collect = Callable[[int, Array], None]
-"""Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
-
 
 def threads_here() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Drawn:
+class DrawnCases:
     """Cases of a ``model`` drawn from a ``seed``. They count from 0 here; people see them count from 1."""
 
     model: Any
@@ -201,7 +198,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, eq=False)
-class Study(Drawn):
+class Study(DrawnCases):
     """Study: cases of ``model`` drawn from ``seed``."""
 
     model: DispersedModel
@@ -396,12 +393,13 @@ def run(
     threads: int = 1,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
-    collect: Collect | None = None,
+    collect: Callable[[int, Array], None] | None = None,
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given their outputs in order.
+    the first ones, are kept. ``collect`` is given the number (from 0) of the first of some cases, and their
+    `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)

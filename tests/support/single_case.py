@@ -28,7 +28,8 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
     moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
     bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
-    _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, propagated.seen_nominally(model))
+    nominal = propagated.RealWidths(model).seen_nominally
+    _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, nominal)
     pulses = zip(cases.impulses, fires, strict=True)
     impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
     return replace(cases, starts=tuple(starts), impulses=impulses)

@@ -13,11 +13,11 @@ from support.builders import spinner
 from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
-from nutdamp.control_loop.controller import Scatter
+from nutdamp.control_loop.controller import Case, Scatter
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, gain
-from nutdamp.control_loop.simulation import Case, Fleet, LoopRun, expects_alone, fly
-from nutdamp.control_loop.stability import Cause, Margin, feeding
+from nutdamp.control_loop.simulation import Fleet, LoopRun, expects_alone, fly
+from nutdamp.control_loop.stability import Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
@@ -172,7 +172,7 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
 
 
 def test_rounding_is_no_share_that_a_firing_leaves() -> None:
-    margin = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, Cause(sensor=False, backwards=False))
+    margin = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, turned=False)
     assert margin_table((margin,)).cells("screen")[0][2] == "0"
 
 
