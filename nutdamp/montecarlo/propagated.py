@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
-from nutdamp.flight.dynamics import Dynamics, make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,
@@ -371,18 +371,14 @@ CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
 """Units of work: of a case and of each of its pulses, of a step of a numerical coast, of an observation of its axis."""
 
 
-@dataclass(frozen=True, eq=False)
 class RealWidths:
     """Flies cases of ``model`` by Euler's equations, see `nutdamp.physics.batch`.
 
     Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
     """
 
-    model: DispersedModel
-
-    @cached_property
-    def _dynamics(self) -> Dynamics:
-        return make_dynamics(self.model.spacecraft)
+    def __init__(self, model: DispersedModel) -> None:
+        self.model, self._dynamics = model, make_dynamics(model.spacecraft)
 
     @cached_property
     def seen_nominally(self) -> list[bool]:
