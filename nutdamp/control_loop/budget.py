@@ -1,16 +1,14 @@
 """Propellant and pulses a year that hold the nutation against energy dissipation, and how long the tank lasts.
 
-They are those of the limit cycle of the loop from event to event. Coasts are in closed form, firings by the law itself.
-Between two events z grows as e^{(κ - iω)t}, so that the time from one size to another is ln(s1/s0)/κ; noise decides in
-which sample a threshold is first reached. Only the few samples in which a channel may come to fire are worked out one
-by one. Many cycles are followed side by side, from random phases, until their mean is known. tan θ = tan θ0 e^{κt}
-tells by when damping must begin.
+They are those of the limit cycle of the loop from event to event: between two, z grows as e^{(κ - iω)t}, so that the
+time from one size to another is ln(s1/s0)/κ; noise decides in which sample a threshold is first reached, and only the
+few samples in which a channel may come to fire are worked out one by one. Many cycles are followed side by side.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -87,10 +85,6 @@ class Chains:
     firings: list[list[Sums]]
     cycles: list[list[Sums]]
 
-    def some(self, rows: list[int]) -> Chains:
-        """Sums of some of the chains."""
-        return replace(self, firings=[self.firings[row] for row in rows], cycles=[self.cycles[row] for row in rows])
-
 
 CHAINS, CYCLES, SETTLING = 64, 16, 2
 """Cycles followed side by side, counted cycles of each, and cycles before those."""
@@ -162,7 +156,7 @@ class Map:
         """Limit cycle; raises Infeasible where the loop does not hold the nutation."""
         at = self._begin(chains)
         self._follow(at, SETTLING + cycles, FIRINGS)
-        return self._summed(at)
+        return self._summed(at.firings, at.cycles)
 
     def attractors(self, chains: int = CHAINS, *, z: complex | None = None) -> tuple[Cycle, ...]:
         """Limit cycles that chains converge to, by their number: with pauses, and without.
@@ -178,8 +172,11 @@ class Map:
         at.sums = [total._replace(pulses=0.0, cycles=0.0) for total in at.sums]
         at.firings, at.cycles = [[] for _ in at.sums], [[] for _ in at.sums]
         self._follow(at, SETTLING + CYCLES, FIRINGS)
-        parts = [[row for row, cycle in enumerate(at.cycles) if bool(cycle) is pauses] for pauses in (True, False)]
-        return tuple(self._summed(at.some(part)) for part in sorted(parts, key=len, reverse=True) if part)
+        pausing: list[list[tuple[list[Sums], list[Sums]]]] = [[], []]
+        for firings, cycles in zip(at.firings, at.cycles, strict=True):
+            pausing[not cycles].append((firings, cycles))
+        parts = sorted(pausing, key=len, reverse=True)
+        return tuple(self._summed(*zip(*part, strict=True)) for part in parts if part)
 
     def _follow(self, at: Chains, cycles: int, firings: int) -> None:
         """Follow every chain until it has paused more than ``cycles`` times, or fired ``firings`` times."""
@@ -222,7 +219,6 @@ class Map:
         return self.seen.drawn(self.rng, rows, len(self.seen.weights))
 
     def _waits(self, seen: ComplexArray) -> Vector:
-        """`Law.waits` of all channels, (channels, ...)."""
         return self.watch.waits(seen, np.full(seen.shape, self.spin))
 
     def _goes(self, at: Chains, rows: Rows, samples: Rows) -> None:
@@ -273,15 +269,13 @@ class Map:
         samples[samples < self.memory] = 0
         useless = idle & (size < self.helps)  # the smallest pulse would leave more than there is
         samples[useless] = self._until(self.helps, size[useless])
-        for row in rows[useless].tolist():
-            self._rest(at, row)
+        self._rest(at, rows[useless])
         if self.down is not None:
             event = self.down.size(size, self.rng.exponential(size=len(rows)))
             quiet = event < size * np.exp(self.turn.real * self.seen.step * samples)
             samples[quiet] = self._until(event[quiet], size[quiet])
             at.active[rows[quiet]] = False
-            for row in rows[quiet & ~useless].tolist():
-                self._rest(at, row)
+            self._rest(at, rows[quiet & ~useless])
         moved = samples > 0
         self._goes(at, rows[moved], samples[moved])
 
@@ -310,9 +304,9 @@ class Map:
         passes = np.ones(len(rows), dtype=bool)
         for index in np.flatnonzero(fires.any(axis=(0, 2))).tolist():
             passes[index] = not self._fires(at, int(rows[index]), seen[index], fires[:, index])
-        for row in rows[passes & (firsts < count)].tolist():
-            at.active[row] = False
-            self._rest(at, row)
+        resting = rows[passes & (firsts < count)]
+        at.active[resting] = False
+        self._rest(at, resting)
         places, going = np.flatnonzero(passes), rows[passes]
         passed = np.minimum(firsts[places] + 1, count)
         at.z[going] *= np.exp(self.turn * step * passed)
@@ -364,17 +358,17 @@ class Map:
             raise Infeasible(TOO_FAST)
         acts = actuator.kick * level * pulse.on_time * self._shape(actuator, pulse)
         after = (before * np.exp(self.turn * (pulse.t - time)) + acts) * np.exp(self.turn * (ends - pulse.t))
-        spin = actuator.spin_rate * level * pulse.on_time - self._slowed(sums.last, size)
-        spent = math.nan if given.propellant is None else given.propellant
-        at.sums[row] = Sums(
-            pulse.t,
-            sums.pulses + 1.0,
-            sums.impulse + given.magnitude,
-            sums.propellant + spent,
-            sums.spin + spin,
-            sums.cycles,
-            max(sums.largest, size),
-            abs(after),
+        # Dissipation takes spin as |z| grows at the same H: cos θ goes with ω3.
+        grown, least = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (size, sums.last))
+        slowed = float(self.law.inertia.equivalent(self.spin)) * (1.0 - grown / least)
+        at.sums[row] = sums._replace(
+            time=pulse.t,
+            pulses=sums.pulses + 1.0,
+            impulse=sums.impulse + given.magnitude,
+            propellant=sums.propellant + (math.nan if given.propellant is None else given.propellant),
+            spin=sums.spin + (actuator.spin_rate * level * pulse.on_time - slowed),
+            largest=max(sums.largest, size),
+            last=abs(after),
         )
         at.firings[row].append(at.sums[row]._replace(largest=size))
         at.ready[row] = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
@@ -382,11 +376,6 @@ class Map:
         at.z[row], at.number[row] = after * np.exp(self.turn * (number * self.seen.step - ends)), number
         at.white[row], at.carried[:, row] = self._drawn(1)[0], math.nan
         at.fresh[row] = at.active[row] = True
-
-    def _slowed(self, last: float, size: float) -> float:
-        """Spin that dissipation takes as |z| grows at the same H, rad/s: cos θ goes with ω3."""
-        before, after = (math.cos(float(self.law.nutation(angle, self.spin))) for angle in (last, size))
-        return float(self.law.inertia.equivalent(self.spin)) * (1.0 - after / before)
 
     def _shape(self, actuator: Actuator, pulse: Pulse) -> complex:
         """Factor on the effect of a pulse on z by its width, with the growth in it."""
@@ -398,20 +387,21 @@ class Map:
             self.shapes[key] = shape_factor(rate, slope, moved, 0.0, self.law.growth)
         return self.shapes[key]
 
-    def _rest(self, at: Chains, row: int) -> None:
-        """Record the sums of a finished cycle, if anything was fired in it."""
-        sums = at.sums[row]
-        if sums.largest > 0.0:
-            sums = sums._replace(cycles=sums.cycles + 1.0)
-            at.cycles[row].append(sums)
-            at.sums[row] = sums._replace(largest=0.0)
+    def _rest(self, at: Chains, rows: Rows) -> None:
+        """Record the sums of finished cycles, if anything was fired in them."""
+        for row in rows.tolist():
+            sums = at.sums[row]
+            if sums.largest > 0.0:
+                sums = sums._replace(cycles=sums.cycles + 1.0)
+                at.cycles[row].append(sums)
+                at.sums[row] = sums._replace(largest=0.0)
 
-    def _summed(self, at: Chains) -> Cycle:
+    def _summed(self, firings: Iterable[list[Sums]], cycles: Sequence[list[Sums]]) -> Cycle:
         """Mean of all chains, between the first and the last counted cycle, or firing."""
-        if all(len(cycle) >= SETTLING + FEW for cycle in at.cycles):
-            counted = [cycle[SETTLING:] for cycle in at.cycles]
+        if all(len(cycle) >= SETTLING + FEW for cycle in cycles):
+            counted = [cycle[SETTLING:] for cycle in cycles]
         else:
-            counted = [firing[len(firing) // 4 :] for firing in at.firings]
+            counted = [firing[len(firing) // 4 :] for firing in firings]
             places = [[part[place].largest for place in (0, len(part) // 2, -1)] for part in counted]
             sizes = np.array(places).mean(axis=0)
             if sizes[2] > sizes[1] * RISING > sizes[0] * RISING**2:

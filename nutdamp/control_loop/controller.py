@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,9 @@ from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
+from nutdamp.spacecraft.tolerances import Tolerance
 
 GRID = 64
 """Moments per nutation period at which a continuous signal is examined for a firing in between."""
@@ -84,11 +84,6 @@ class Watch:
         """Time from decision to start of a firing, s: until the next sample, where the law predicts."""
         return self.estimator.step if self.law.loop.predict else 0.0
 
-    @property
-    def doubled(self) -> int:
-        """Samples of the look after the next, at most."""
-        return min(2 * self.reach, LONGEST)
-
     def first(self, since: Any) -> Any:
         """Number of the first sample of a coast from ``since`` s on."""
         assert self.sensor.rate is not None
@@ -125,13 +120,8 @@ class Watch:
         subset._waits = None if self._waits is None else self._waits[:, cases]
         return subset
 
-    def first_firing(self, seen: Seen, row: int, channels: list[int]) -> Decided | None:
-        """First firing of the ``channels``, decided at ``row``."""
-        fired = [self._firing(seen, row, self.law.actuators[index]) for index in channels]
-        decided = [firing for firing in fired if firing is not None]
-        return min(decided, key=lambda candidate: candidate.start) if decided else None
-
-    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
+    def firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
+        """Firing of a channel decided at ``row``, if it would help."""
         now = float(seen.now[row])
         firing = self.law.firing(actuator, complex(seen.z[row]), float(seen.spin[row]))
         if firing is None:
@@ -202,7 +192,7 @@ class Coast(Watch):
             times = np.asarray(numbers * self.estimator.step, dtype=np.float64)
             self._number, end = last + 1, max(float(times[-1]), begins)
         self._go_to(end)
-        self.reach = self.doubled
+        self.reach = min(2 * self.reach, LONGEST)
         rates, _ = self._motion(times)
         values = self.signal.shown(rates)
         if numbers is not None:
@@ -241,24 +231,22 @@ class Coast(Watch):
         coast.parts = self.parts
         return coast
 
-    def _firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
+    def firing(self, seen: Seen, row: int, actuator: Actuator) -> Decided | None:
+        """As of any `Watch`; by a continuous signal at the end of its wait, which falls by 1 s a second (Newton)."""
         if self.sensor.rate is not None:
-            return super()._firing(seen, row, actuator)
-        now, step = float(seen.now[row]), self.law.period / GRID
-        return self._refined(row, now - 2.0 * step, now + step, now, actuator)
-
-    def _refined(self, row: int, low: float, high: float, now: float, actuator: Actuator) -> Decided | None:
-        """End of the wait of a continuous signal, by Newton's steps: it falls by 1 s a second."""
-        low = max(low, self.estimator.since + self.signal.sensor.delay)
+            return super().firing(seen, row, actuator)
+        now, step, delay = float(seen.now[row]), self.law.period / GRID, self.signal.sensor.delay
+        low, high = max(now - 2.0 * step, self.estimator.since + delay), now + step
         firing = None
         for _ in range(REFINED):
-            firing = self._wait_at(now, actuator)
+            time = np.array([now - delay])
+            rates, _ = self._motion(time)
+            z = self.estimator.feed(time, self.signal.shown(rates), rates[:, 2])
+            z = self.estimator.on_board(z, rates[:, 2])
+            firing = self.law.firing(actuator, complex(z[0]), float(rates[0, 2]))
             if firing is None:
                 return None
-            if firing.wait > 0.0:
-                low = now
-            else:
-                high = now
+            low, high = (now, high) if firing.wait > 0.0 else (low, now)
             following = now + firing.wait
             following = following if low <= following <= high else 0.5 * (low + high)
             if abs(following - now) <= 2.0 * math.ulp(now):
@@ -266,12 +254,6 @@ class Coast(Watch):
             now = following
         assert firing is not None
         return Decided(row, now, now, actuator, firing)
-
-    def _wait_at(self, now: float, actuator: Actuator) -> Firing | None:
-        time = now - self.signal.sensor.delay
-        rates, _ = self._motion(np.array([time]))
-        z = self.estimator.feed(np.array([time]), self.signal.shown(rates), rates[:, 2])
-        return self.law.firing(actuator, complex(self.estimator.on_board(z, rates[:, 2])[0]), float(rates[0, 2]))
 
 
 MOST_FIRINGS = 10_000
@@ -282,6 +264,9 @@ NO_NOISE = 8.0
 
 WAVES = 40.0
 """Time constants of the low-pass filter after which it has forgotten its start."""
+
+TAG = 1
+"""Ends the key of the random numbers of a firing: those of the noise are keyed by block alone."""
 
 
 class Fired(NamedTuple):
@@ -296,12 +281,44 @@ class Fired(NamedTuple):
     true_nutation: float
 
 
-class Scatter(Protocol):
-    """Errors of single firings: a factor on the thrust, and a delay in s."""
+@dataclass(frozen=True)
+class Scatter:
+    """Errors of single firings of a case, drawn by the ``key`` of the case; ``late`` s is common to all."""
+
+    key: tuple[int, ...]
+    thrust: Tolerance | None
+    timing: Tolerance | None
+    late: float = 0.0
 
     def of(self, number: int) -> tuple[float, float]:
-        """Errors of the firing ``number``, from 0."""
-        ...
+        """Thrust factor of the firing ``number``, from 0, and its delay in s."""
+        if self.thrust is None and self.timing is None:
+            return 1.0, self.late
+        random = np.random.default_rng((*self.key, number, TAG))
+        thrust, timing = (_drawn(random, part) for part in (self.thrust, self.timing))
+        return max(1.0 + thrust, 0.0), self.late + timing
+
+
+def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
+    if tolerance is None:
+        return 0.0
+    first, second = random.random(2)
+    normal = float(random.standard_normal())
+    unit = {"normal": normal, "uniform": 2.0 * first - 1.0, "triangular": first + second - 1.0, "bias": 1.0}
+    return tolerance.size * float(unit[tolerance.kind])
+
+
+class Case(NamedTuple):
+    """Loop to be flown: the true spacecraft with its loop, the ``key`` of its noise, and the errors of firings.
+
+    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one. ``tilt`` rad is by how much
+    the attitude at t = 0 is off, about the body axes 1 and 2.
+    """
+
+    truth: Spacecraft
+    key: tuple[int, ...]
+    scatter: Scatter | None = None
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 class Course(Enum):
@@ -314,17 +331,17 @@ class Course(Enum):
 class Pilot:
     """Controller of one loop: from samples of its coasts, stretch by stretch, to firings.
 
-    The ``law`` has the loop as it is known on board; ``loop``, with sensor and faults, and ``truth`` are as they are.
+    The ``law`` has the loop as it is known on board; that of the ``case``, with sensor and faults, is as it is.
     ``free``: coasts are those of a symmetric body without torque from outside.
     """
 
-    def __init__(
-        self, truth: Spacecraft, loop: Loop, until: float, law: Law, *, free: bool, scatter: Scatter | None = None
-    ) -> None:
+    def __init__(self, law: Law, case: Case, until: float, *, free: bool) -> None:
+        truth = case.truth
         if shed(truth) is not None:
             problem = "a loop flies with constant moments of inertia; leave this out"
             raise Unsuitable(("tank", "inertia_per_kg"), problem)
-        self.truth, self.loop, self.until, self.law, self.free, self.scatter = truth, loop, until, law, free, scatter
+        self.law, self.truth, self.loop, self.scatter = law, truth, truth.loop or law.loop, case.scatter
+        self.until, self.free = until, free
         self.diagnosis = Diagnosis(law.period, law.growth, math.tan(float(law.nutation(1.0, truth.spin))))
         self.most = min(MOST_FIRINGS, truth.limits.max_pulses or MOST_FIRINGS)
         self.channels = {channel.name: channel for channel in truth.channels}
@@ -351,7 +368,8 @@ class Pilot:
             return Course.OVER
         if self._found is not None:
             return self._pulse(self._found) or Course.OVER
-        self._forget()
+        if self._pending is None:
+            self._seen = self._seen[-3:]  # the last period is among them
         later = None if self.active or self._pending is not None else self._idle_until(seen)
         if later is None:
             return Course.ON
@@ -397,18 +415,6 @@ class Pilot:
         self._seen = []
         self.ready = pulse.over + max(self.law.loop.min_interval, self.truth.limits.gap)
 
-    def _forget(self) -> None:
-        """Discard samples older than a period, or than a firing that is not judged yet."""
-        if self._pending is None:
-            last = self._seen[-1][0]
-            edge = last[-1] - self.law.period
-            if last[0] <= edge:
-                row = int(np.searchsorted(last, edge))
-                times, best, spin = self._seen[-1]
-                self._seen = [(times[row:].copy(), best[row:].copy(), spin[row:].copy())]
-            else:
-                self._seen = self._seen[-3:]
-
     def _glimpse(self, centre: float, row: int, *, last: bool) -> Glimpse | None:
         """Samples of this coast up to a ``row`` of the last stretch: of the ``last`` period, or of the first."""
         times, best, spin = (
@@ -438,7 +444,7 @@ class Pilot:
             fire = _first(np.asarray(fires.any(axis=0)), row)
             if downs is not None and (fire is None or downs <= fire):
                 self.active, row = False, downs + 1
-                self.diagnosis.rest()
+                self.diagnosis.first = None
                 self.quiet.append(float(seen.now[downs]))
                 continue
             if fire is None:
@@ -449,14 +455,11 @@ class Pilot:
             if decision is not None:
                 return decision
             row = fire + 1
-        if count and (self._pending is None or seen.times[-1] >= self._known(coast)):
+        last = self.until - self.loop.sensor.delay - coast.estimator.step
+        enough = min(float(coast.estimator.first) + self.law.period, last)  # of the coast, to judge a firing by it
+        if self._pending is None or seen.times[-1] >= enough:
             self._faulty(coast, seen, count - 1)
         return None
-
-    def _known(self, coast: Watch) -> float:
-        """Time of the sample, s, at which the coast after a firing suffices to judge it."""
-        last = self.until - self.loop.sensor.delay - coast.estimator.step
-        return min(float(coast.estimator.first) + self.law.period, last)
 
     def _faulty(self, coast: Watch, seen: Seen, row: int) -> bool:
         """Judge the last firing by the samples since, up to a ``row``; True if the loop has to stop."""
@@ -469,19 +472,19 @@ class Pilot:
                 verdict = self.diagnosis.judge(pulse.channel, now, before, after, firing.acts, coast.estimator.doubts)
                 if verdict is not None:
                     self.ending = verdict
-        if self._pending is None and not self.ending[0].fault:
-            overdue = self.diagnosis.overdue(float(seen.now[row]))
-            if overdue is not None:
-                self.ending = overdue
+        suspect, overdue = self.diagnosis.suspect, bool(seen.now[row] > self.diagnosis.deadline)
+        if overdue and suspect is not None and self._pending is None and not self.ending[0].fault:
+            self.ending = Ending.UNCLEAR, suspect  # no other channel has fired in time to tell which it is
         return self.ending[0].fault
 
     def _allowed(self, coast: Watch, seen: Seen, row: int, channels: list[int]) -> Decided | None:
         """Firing at a row, on a tick, if the limits allow it."""
-        usable = [index for index in channels if self.law.actuators[index].channel.name != self.diagnosis.suspect]
-        decision = coast.first_firing(seen, row, usable)
-        if decision is None:
+        actuators = [self.law.actuators[index] for index in channels]
+        fired = [coast.firing(seen, row, each) for each in actuators if each.channel.name != self.diagnosis.suspect]
+        decided = [decision for decision in fired if decision is not None]
+        if not decided:
             return None
-        windows = self.law.windows
+        decision, windows = min(decided, key=lambda candidate: candidate.start), self.law.windows
         start = windows.nearest_tick(decision.start)
         start = windows.tick_after(decision.start) if start < decision.now else start
         return decision._replace(start=start) if windows.allows(start, decision.firing.lasts, self.ready) else None
@@ -506,11 +509,10 @@ class Pilot:
         """Largest overestimate of |z| by the sensor: rad/s, and a factor."""
         law, sensor = self.law, self.loop.sensor
         estimator = Estimator(law, sensor, 0.0)
-        over = estimator.overestimate(self.truth, law.size(law.loop.start, self.truth.spin))
-        return estimator.offset + NO_NOISE * estimator.doubt, over * max(map(abs, sensor.scales))
+        over, doubts = estimator.overestimate(self.truth, law.size(law.loop.start, self.truth.spin)), estimator.doubts
+        return doubts.bias + doubts.steps + NO_NOISE * doubts.noise, over * max(map(abs, sensor.scales))
 
 
 def _first(mask: NDArray[np.bool_], row: int) -> int | None:
-    """Index of the first true entry from ``row`` on."""
     offset = int(np.argmax(mask[row:]))
     return row + offset if mask[row + offset] else None

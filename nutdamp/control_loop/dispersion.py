@@ -11,197 +11,95 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.control_loop.controller import Case, Scatter
 from nutdamp.control_loop.law import Ending, Law
-from nutdamp.control_loop.simulation import Case, FlownLoops, expects_alone, fly_alone, fly_together, until_default
-from nutdamp.control_loop.stability import Band, dead_band, feeding, too_late
-from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.montecarlo.cases import DispersedModel, cones_used, rotated, tank_of, triple
-from nutdamp.montecarlo.inputs import (
-    BLOCK,
-    BY_VALVE,
-    SCHEDULE_IDLE,
-    DispersedInput,
-    Draws,
-    DrawSource,
-    Group,
-    Inputs,
-    independent,
-    list_inputs,
-    of_sensor,
-)
+from nutdamp.control_loop.simulation import Fleet, FlownLoops, expects_alone, fly_alone, until_default
+from nutdamp.control_loop.stability import Band, dead_band, expect_in_time
+from nutdamp.errors import BadRequest
+from nutdamp.montecarlo.cases import DispersedModel, cold_of, cones_used, rotated, tank_of, triple
+from nutdamp.montecarlo.inputs import BLOCK, BY_VALVE, Draws, Inputs, independent, some_of, with_sensor
 from nutdamp.montecarlo.propagated import carried
-from nutdamp.montecarlo.statistics import Exact, Worst, angle, cases_to_show
-from nutdamp.montecarlo.study import KEPT_WORST, Counted, Dispersed
+from nutdamp.montecarlo.statistics import Exact, angle, cases_to_show
+from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Sensor, Thruster
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.spacecraft.tolerances import Tolerance, expect_dispersions
+from nutdamp.spacecraft.tolerances import expect_dispersions
 
 OF_FIRINGS = ("thrust_per_pulse", "timing")
 """Tolerances that each firing draws anew."""
 
-TAG = 1
-"""Ends the key of the random numbers of a firing: those of the noise are keyed by block alone."""
 
-
-@dataclass(frozen=True)
-class Off:
-    """Errors of single firings of a case, drawn by the ``key`` of the case; ``late`` s is common to all."""
-
-    key: tuple[int, ...]
-    thrust: Tolerance | None
-    timing: Tolerance | None
-    late: float = 0.0
-
-    def of(self, number: int) -> tuple[float, float]:
-        """Thrust factor of the firing ``number``, from 0, and its delay in s."""
-        if self.thrust is None and self.timing is None:
-            return 1.0, self.late
-        random = np.random.default_rng((*self.key, number, TAG))
-        thrust, timing = (_drawn(random, part) for part in (self.thrust, self.timing))
-        return max(1.0 + thrust, 0.0), self.late + timing
-
-
-def _drawn(random: np.random.Generator, tolerance: Tolerance | None) -> float:
-    """A deviation."""
-    if tolerance is None:
-        return 0.0
-    first, second = random.random(2)
-    normal = float(random.standard_normal())
-    unit = {"normal": normal, "uniform": 2.0 * first - 1.0, "triangular": first + second - 1.0, "bias": 1.0}
-    return tolerance.size * float(unit[tolerance.kind])
-
-
-@dataclass(frozen=True, eq=False)
-class LoopModel:
+class LoopModel(DispersedModel):
     """Spacecraft as known to its ``law`` on board, ready to be dispersed; ``of_firings``: inputs drawn per firing."""
 
-    law: Law
-    inputs: Inputs = field(init=False)
-    of_firings: tuple[DispersedInput, ...] = field(init=False)
-    _body: DispersedModel = field(init=False)
+    def __init__(self, law: Law) -> None:
+        pulses = [channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0) for actuator in law.actuators]
+        super().__init__(law.spacecraft, Schedule(tuple(pulses)))
+        self.law, drawn = law, self.inputs.drawn
+        kept = tuple(entry for entry in drawn if entry.tolerance not in OF_FIRINGS)
+        self.inputs = with_sensor(self.spacecraft, Inputs(kept, self.inputs.unused), "the loop does not fire")
+        each = {entry.tolerance: entry for entry in drawn if entry.tolerance in OF_FIRINGS}
+        self.of_firings = tuple(entry._replace(name=name) for name, entry in each.items())
 
-    def __post_init__(self) -> None:
-        body = self.law.spacecraft
-        fired = Schedule(
-            tuple(channel_pulse(actuator.channel, 0.0, actuator.shortest or 1.0) for actuator in self.law.actuators)
-        )
-        object.__setattr__(self, "_body", DispersedModel(body, fired))
-        drawn, unused = list_inputs(body, fired)
-        sensor, idle = of_sensor(body)
-        kept = [entry for entry in drawn if entry.tolerance not in OF_FIRINGS]
-        rest = [entry for entry in unused if not entry.name.startswith("sensor ")]
-        idle = (
-            tuple(
-                entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "the loop does not fire")) for entry in rest
-            )
-            + idle
-        )
-        object.__setattr__(self, "inputs", Inputs((*kept, *sensor), idle))
-        each = {
-            entry.tolerance: entry._replace(name=entry.tolerance) for entry in drawn if entry.tolerance in OF_FIRINGS
-        }
-        object.__setattr__(self, "of_firings", tuple(each.values()))
-
-    @property
-    def spacecraft(self) -> Spacecraft:
-        """Spacecraft as known to the law."""
-        return self.law.spacecraft
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        """Inputs that are correlated."""
-        return self._body.groups
-
-    @property
-    def target(self) -> Vector:
-        """Target of H, a unit vector (3,) in the estimated body axes at t = 0."""
-        return self._body.target
-
-    @property
-    def scattered(self) -> tuple[Tolerance | None, Tolerance | None]:
-        """Inputs drawn per firing: thrust, time."""
-        requested = self.law.spacecraft.dispersions
-        return (None, None) if requested is None else (requested.thrust_per_pulse, requested.timing)
-
-    def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """True where a case is possible: body, a sensor that sees something and no signal before its time."""
-        good: Any = self._body.physical(draws)
-        delay = self.law.loop.sensor.delay
-        for name, draw in draws.items():
-            if name == "sensor delay":
-                good = good & (delay + draw >= 0.0)
-            elif name.startswith(("sensor scale", "sensor noise")):
-                good = good & (draw > -1.0)
-        return good  # type: ignore[no-any-return]
-
-    def cases(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
+    def loops(self, draws: Draws, numbers: NDArray[np.intp], seed: int) -> list[Case]:
         """Cases of a study with these ``numbers``, from 0, and their ``draws``, (n,) or one for all."""
-        count = len(numbers)
-        body = self.law.spacecraft
+        body, loop, given, count = self.spacecraft, self.law.loop, self.spacecraft.dispersions, len(numbers)
         draws = _at_pressure(body, draws)
-        whole = {name: np.broadcast_to(draw, count) for name, draw in draws.items()}
-        model = self._body.cases(draws)
-        moments = np.array([np.broadcast_to(moment, count) for moment in model.moments]).T.tolist()
-        rates = np.array([np.broadcast_to(component, count) for component in model.omega0]).T
-        wheels = np.broadcast_to(model.wheel, count).tolist()
-        tilts = np.array([np.broadcast_to(component, count) for component in model.tilt]).T
+
+        def rows(*parts: Any) -> Vector:
+            return np.array([np.broadcast_to(part, count) for part in parts]).T
+
+        model = self.cases(draws)
+        moments, wheels = rows(*model.moments).tolist(), rows(model.wheel)[:, 0].tolist()
+        rates, tilts = rows(*model.omega0), rows(*model.tilt)
         attitudes = None if body.attitude is None else self._attitudes(tilts)
         torques = {
-            thruster.name: self._torques(thruster, draws, count)
+            thruster.name: rows(*self.thruster_torque(thruster, draws))
+            * (1.0 + rows(draws.get(f"thrust {thruster.name}", 0.0)))
             for channel in body.channels
             for thruster in channel.thrusters
         }
+        each_firing = (None, None) if given is None else (given.thrust_per_pulse, given.timing)
+        whole = {name: rows(draw)[:, 0].tolist() for name, draw in draws.items()}
         cases = []
         for row, number in enumerate(numbers.tolist()):
-            draw = {name: float(values[row]) for name, values in whole.items()}
+            draw = {name: values[row] for name, values in whole.items()}
             key = (seed, number + 1)
             truth = replace(
                 body,
-                inertia=Inertia((moments[row][0], moments[row][1], moments[row][2]), body.inertia.axes, wheels[row]),
+                inertia=Inertia(triple(moments[row]), body.inertia.axes, wheels[row]),
                 omega0=rates[row],
                 attitude=None if attitudes is None else Attitude(attitudes[row]),
                 channels=self._channels(draw, {name: torque[row] for name, torque in torques.items()}),
-                loop=replace(self.law.loop, sensor=_sensor(self.law.loop.sensor, draw)),
+                loop=replace(loop, sensor=_sensor(loop.sensor, draw)),
+                cold=cold_of(body, draw),
+                tank=tank_of(body, draw),
             )
-            if "cold" in draw and body.cold is not None:
-                truth = replace(truth, cold=replace(body.cold, first=max(body.cold.first + draw["cold"], 0.0)))
-            if "cold_pulses" in draw and truth.cold is not None:
-                truth = replace(truth, cold=replace(truth.cold, pulses=truth.cold.pulses + draw["cold_pulses"]))
-            if any(name.startswith("tank ") for name in draw):
-                truth = replace(truth, tank=tank_of(body, draw))
-            off = Off(key, *self.scattered, draw.get("timing offset", 0.0))
-            scatter = None if off == Off(key, None, None) else off
+            scatter = Scatter(key, *each_firing, draw.get("timing offset", 0.0))
             cases.append(Case(truth, key, scatter, (float(tilts[row, 0]), float(tilts[row, 1]))))
         return cases
 
     def _attitudes(self, tilts: Vector) -> Vector:
         """Attitudes (n, 4) of the file's axes, where that of the principal axes is turned by ``tilts`` (n, 2) rad."""
-        body, angles = self.law.spacecraft, np.hypot(*tilts.T)
+        body, angles = self.spacecraft, np.hypot(*tilts.T)
         turns = np.zeros((len(tilts), 4))
         turns[:, 0], turns[:, 1:3] = np.cos(0.5 * angles), (0.5 * np.sinc(0.5 * angles / math.pi))[:, None] * tilts
         turned = attitude.multiply(body.initial.quaternion, turns)
         return attitude.multiply(turned, attitude.from_matrix(body.inertia.axes.T))
 
-    def _torques(self, thruster: Thruster, draws: Draws, count: int) -> Vector:
-        """Torques (n, 3) N m at the thrust of each case."""
-        torque = np.array(
-            [np.broadcast_to(component, count) for component in self._body.thruster_torque(thruster, draws)]
-        ).T
-        return np.asarray(torque * (1.0 + np.broadcast_to(draws.get(f"thrust {thruster.name}", 0.0), count))[:, None])
-
     def _channels(self, draw: dict[str, float], torques: dict[str, Vector]) -> tuple[Channel, ...]:
         """Channels of a case; undispersed ones are those of the file."""
-        body = self.law.spacecraft
+        body = self.spacecraft
         names = {name.split()[1] for name in draw if name.split()[0] in OF_THRUSTERS}
         if any(name.startswith("center of mass ") for name in draw):
             names = {thruster.name for channel in body.channels for thruster in channel.thrusters}
@@ -211,11 +109,14 @@ class LoopModel:
                 channels.append(channel)
                 continue
             valve = _valve(channel, draw)
-            thrusters = tuple(
-                replace(thruster, torque=torques[thruster.name], valve=valve, **_thrust(thruster, draw))
-                for thruster in channel.thrusters
-            )
-            channels.append(replace(channel, thrusters=thrusters))
+            thrusters = []
+            for thruster in channel.thrusters:
+                factor = 1.0 + draw.get(f"thrust {thruster.name}", 0.0)
+                force = None if thruster.force is None else factor * thruster.force
+                thrust = None if thruster.thrust is None else factor * thruster.thrust
+                torque = torques[thruster.name]
+                thrusters.append(replace(thruster, torque=torque, valve=valve, force=force, thrust=thrust))
+            channels.append(replace(channel, thrusters=tuple(thrusters)))
         return tuple(channels)
 
 
@@ -231,12 +132,6 @@ def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
     higher = (tank.pressure / body.tank.pressure) ** tank.exponent
     names = {f"thrust {thruster.name}" for channel in body.channels for thruster in channel.thrusters}
     return {**draws, **{name: (1.0 + draws.get(name, 0.0)) * higher - 1.0 for name in names}}
-
-
-def _thrust(thruster: Thruster, draw: dict[str, float]) -> dict[str, Any]:
-    factor = 1.0 + draw.get(f"thrust {thruster.name}", 0.0)
-    force, thrust = thruster.force, thruster.thrust
-    return {"force": None if force is None else factor * force, "thrust": None if thrust is None else factor * thrust}
 
 
 def _valve(channel: Channel, draw: dict[str, float]) -> Any:
@@ -257,7 +152,6 @@ def _valve(channel: Channel, draw: dict[str, float]) -> Any:
 
 
 def _sensor(sensor: Sensor, draw: dict[str, float]) -> Sensor:
-    """Sensor of a case."""
     axes = [""] if sensor.kind == ACCELEROMETER else [" 1", " 2"]
     scales = [sensor.scale * (1.0 + draw.get(f"sensor scale{axis}", 0.0)) for axis in axes]
     biases = [sensor.bias + draw.get(f"sensor bias{axis}", 0.0) for axis in axes]
@@ -307,62 +201,26 @@ FEW = 100
 """Least number of settled cases for sensitivities."""
 
 
-CollectLoops = Callable[[int, Array, list[Ending], Array], None]
-"""Takes the number (from 0) of the first of some cases, their outputs (8, n), why they were flown no further, and the
-least and largest angle (m, 2, n) rad to the direction of each cone."""
+class LoopStudy(DrawnCases):
+    """Loop of a ``spacecraft`` flown to ``until`` s in dispersed cases; its ``law`` on board knows the file.
 
+    ``alone`` is why the cases fly one by one, which takes longer; empty where they fly together.
+    """
 
-@dataclass(frozen=True, eq=False)
-class LoopStudy:
-    """Loop of a ``spacecraft`` flown to ``until`` s in cases drawn from ``seed``; they count from 0 here."""
+    model: LoopModel
 
-    spacecraft: Spacecraft
-    until: float
-    seed: int
-
-    @cached_property
-    def law(self) -> Law:
-        """Law on board, which knows the file."""
-        assert self.spacecraft.loop is not None
-        return Law(self.spacecraft, self.spacecraft.loop)
-
-    @cached_property
-    def model(self) -> LoopModel:
-        """Dispersed model."""
-        return LoopModel(self.law)
-
-    @cached_property
-    def alone(self) -> str:
-        """Reason why the cases fly one by one, which takes longer; empty where they fly together."""
-        return expects_alone(self.law, self.spacecraft)
+    def __init__(self, spacecraft: Spacecraft, loop: Loop, until: float, seed: int) -> None:
+        self.spacecraft, self.until, self.seed, self.law = spacecraft, until, seed, Law(spacecraft, loop)
+        self.model, self.alone = LoopModel(self.law), expects_alone(self.law, spacecraft)
 
     @cached_property
     def band(self) -> Band:
         """Nutation that the loop is designed to leave."""
         return dead_band(self.spacecraft, self.law.loop)
 
-    def source(self) -> DrawSource:
-        """Source of the draws."""
-        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
-
-    def draws_of(self, case: int) -> dict[str, float]:
-        """Deviations of one case, by input."""
-        return {name: float(draw[0]) for name, draw in self.draws_from(case, 1).items()}
-
-    def draws_from(self, first: int, count: int) -> dict[str, Array]:
-        """Deviations (count,) of cases from ``first`` on, by input."""
-        drawn: dict[str, list[Array]] = {entry.name: [] for entry in self.model.inputs.drawn}
-        source = self.source()
-        for block in range(first // BLOCK, math.ceil((first + count) / BLOCK)):
-            draws, _ = source.block(block)
-            rows = slice(max(first - block * BLOCK, 0), min(first + count - block * BLOCK, BLOCK))
-            for name, parts in drawn.items():
-                parts.append(np.array(np.broadcast_to(draws[name], BLOCK)[rows]))
-        return {name: np.concatenate(parts) for name, parts in drawn.items()}
-
     def case(self, number: int) -> Case:
         """Case of a number."""
-        return self.model.cases(self.draws_of(number), np.array([number]), self.seed)[0]
+        return self.model.loops(self.draws_of(number), np.array([number]), self.seed)[0]
 
     @cached_property
     def nominal(self) -> Array:
@@ -376,12 +234,7 @@ class LoopStudy:
 
     @cached_property
     def _nominal_flown(self) -> FlownLoops:
-        return self.fly(self.nominal_case)
-
-    @property
-    def nominal_case(self) -> list[Case]:
-        """File itself, with the noise of the seed, as a case."""
-        return [Case(self.spacecraft, (self.seed,))]
+        return self.fly([Case(self.spacecraft, (self.seed,))])
 
     @property
     def enough(self) -> int:
@@ -392,9 +245,9 @@ class LoopStudy:
     def expect_affordable(self, samples: int) -> int:
         """Number of samples of so many cases, by the nominal one; raises BadRequest where there are too many."""
         looked = self._nominal_flown.pilots[0].looked_at
-        price = looked * samples * (ALONE if self.alone else 1)
-        if price > MOST_SAMPLES:
-            most = max(MOST_SAMPLES // (looked * (ALONE if self.alone else 1)), 1)
+        price = looked * (ALONE if self.alone else 1)
+        if price * samples > MOST_SAMPLES:
+            most = max(MOST_SAMPLES // price, 1)
             raise BadRequest(
                 f"{samples} cases look at about {looked * samples:.2g} samples: too many; "
                 f"at most {most} --samples, or an earlier --until"
@@ -404,13 +257,15 @@ class LoopStudy:
     def price_alone(self, samples: int) -> str:
         """Time of so many cases one by one, in words, by that of the nominal one on this machine."""
         begin = time.perf_counter()
-        self.fly(self.nominal_case)
+        self.fly([Case(self.spacecraft, (self.seed,))])
         seconds = samples * (time.perf_counter() - begin)
         return f"about {math.ceil(seconds)} s" if seconds < 120.0 else f"about {seconds / 60.0:.0f} min"
 
     def fly(self, cases: list[Case], watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
         """Fly the loops of ``cases``."""
-        return (fly_alone if self.alone else fly_together)(self.law, cases, self.until, watch)
+        if self.alone:
+            return fly_alone(self.law, cases, self.until, watch)
+        return Fleet(self.law, cases, self.until).fly(watch)
 
     def measured(self, flown: FlownLoops) -> tuple[Array, Array]:
         """Outputs (8, n) of loops, and their severity (n,): infinite where a loop does not settle, or was stopped."""
@@ -425,11 +280,8 @@ class LoopStudy:
         out[3] = angle(start, triple(np.array(momentum)))
         out[4] = angle(triple(self.model.target.tolist()), rotated(momentum, (tilts[0], tilts[1])))
         out[5] = flown.rates[2] - before[2]
-        used = [
-            [math.nan if firing.pulse.propellant is None else firing.pulse.propellant for firing in p.fired]
-            for p in pilots
-        ]
-        out[6] = [math.fsum(consumption) for consumption in used]
+        used = [[firing.pulse.propellant for firing in pilot.fired] for pilot in pilots]
+        out[6] = [math.fsum(math.nan if kg is None else kg for kg in pulses) for pulses in used]
         out[7] = [len(pilot.fired) for pilot in pilots]
         aim = out[3] if body.goal.axis is None else out[4]
         shares = list(cones_used(body.keep, flown.aspects))
@@ -445,15 +297,13 @@ def loop_study(spacecraft: Spacecraft, until: float | None = None, *, seed: int 
     """
     loop = requirements.expect_loop(spacecraft)
     expect_dispersions(spacecraft.dispersions)
-    late = feeding(spacecraft, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
-    return LoopStudy(spacecraft, until_default(spacecraft, loop) if until is None else until, seed)
+    expect_in_time(spacecraft, loop)
+    return LoopStudy(spacecraft, loop, until_default(spacecraft, loop) if until is None else until, seed)
 
 
 @dataclass(eq=False)
 class LoopResults(Counted):
-    """Results of a study so far: the cases from 0 to ``done``.
+    """Results of a study of a loop.
 
     Those that comply settle too. ``values`` are the outputs (8, requested), ``lost`` (done,) the cases that see no end,
     or were stopped; ``stops`` is why loops were flown no further. ``angles`` (m, 2, requested) rad are the least and
@@ -461,31 +311,15 @@ class LoopResults(Counted):
     """
 
     study: LoopStudy
-    requested: int
-    done: int = 0
-    redrawn: int = 0
-    met: int = 0
     stops: Counter[Ending] = field(default_factory=Counter)
-    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     values: Array = field(init=False)
     angles: Array = field(init=False)
     lost: NDArray[np.bool_] = field(init=False, default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.values = np.empty((len(OUTPUTS), self.requested))
         self.angles = np.empty((len(self.study.spacecraft.keep), 2, self.requested))
-
-    @property
-    def broken(self) -> NDArray[np.int64]:
-        """Number of cases that break each cone, (m,)."""
-        used = cones_used(self.study.spacecraft.keep, self.angles[:, :, : self.done])
-        return np.asarray(np.count_nonzero(used > 1.0, axis=1))
-
-    @property
-    def aspects(self) -> Array:
-        """Least and largest angle (m, 2) rad of all cases, by cone."""
-        seen = self.angles[:, :, : self.done]
-        return np.stack([seen[:, 0].min(axis=1), seen[:, 1].max(axis=1)], axis=1)
 
     def of(self, output: str) -> Array:
         """Known values of an output, (m,)."""
@@ -514,13 +348,11 @@ class LoopResults(Counted):
 
     def take(self, values: Array, severity: Array, angles: Array, stops: list[Ending]) -> None:
         """Counts further cases: `LoopStudy.measured`, ``angles`` (m, 2, n), and why they were flown no further."""
-        first, last = self.done, self.done + values.shape[1]
-        self.values[:, first:last], self.angles[:, :, first:last] = values, angles
-        self.met += int(np.count_nonzero(severity <= 1.0))
+        rows = slice(self.done, self.done + values.shape[1])
+        self.values[:, rows], self.angles[:, :, rows] = values, angles
         self.stops.update(stops)
         self.lost = np.concatenate([self.lost, np.isinf(severity)])
-        self.worst.add(first, severity)
-        self.done = last
+        self.count(severity, angles, severity <= 1.0)
 
     def shares(self, output: str) -> dict[str, float]:
         """Share of each input in the variance of an output over the cases that settle: its squared correlation.
@@ -529,11 +361,13 @@ class LoopResults(Counted):
         inputs that are correlated each has what it adds to those before it.
         """
         rows = np.flatnonzero(~self.lost & ~np.isnan(self.values[OUTPUTS.index(output), : self.done]))
-        inputs = [entry for entry in self.study.model.inputs.drawn if entry.sigma > 0.0]
+        model = self.study.model
+        inputs = [entry for entry in model.inputs.drawn if entry.sigma > 0.0]
         values = self.values[OUTPUTS.index(output)][rows]
         if len(rows) < FEW or np.ptp(values) <= 1e-12 * np.abs(values).max():
             return {}
-        drawn = independent(self.study.draws_from(0, self.done), inputs, self.study.model.groups)
+        draws = self.study.draws_of_all(np.arange(self.done))
+        drawn = independent({entry.name: np.asarray(draws[entry.name]) for entry in inputs}, inputs, model.groups)
         chance = 1.0 / (len(rows) - 1)
         squares = {entry.name: float(np.corrcoef(drawn[entry.name][rows], values)[0, 1] ** 2) for entry in inputs}
         return {name: max((square - chance) / (1.0 - chance), 0.0) for name, square in squares.items()}
@@ -556,12 +390,13 @@ def run(
     *,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
-    collect: CollectLoops | None = None,
+    collect: Callable[[int, Array, list[Ending], Array], None] | None = None,
 ) -> LoopResults:
     """Fly the cases that ``results`` is to have, a portion after the other; returns ``results``.
 
-    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order. When ``stopped``
-    says so, the portions done so far are kept.
+    ``watch`` is called now and then with how many are done, ``collect`` with the portions in order: the number (from 0)
+    of the first case, outputs (8, n), why they were flown no further, and angles (m, 2, n) rad to the cones. When
+    ``stopped`` says so, the portions done so far are kept.
     """
     study = results.study
     source, block = study.source(), -1
@@ -573,11 +408,10 @@ def run(
             draws, again = source.block(block)
             results.redrawn += int(np.count_nonzero(again < results.requested - block * BLOCK))
         last = min(results.requested, first + PORTION, (block + 1) * BLOCK)
-        rows = slice(first - block * BLOCK, last - block * BLOCK)
-        part = {name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()}
-        cases = study.model.cases(part, np.arange(first, last), study.seed)
+        part = some_of(draws, slice(first - block * BLOCK, last - block * BLOCK))
+        cases = study.model.loops(part, np.arange(first, last), study.seed)
         try:
-            flown = study.fly(cases, lambda over, first=first: _seen(watch, stopped, first + over))  # type: ignore[misc]
+            flown = study.fly(cases, partial(_seen, watch, stopped, first))
         except _Interrupted:
             break
         values, severity = study.measured(flown)
@@ -593,7 +427,7 @@ class _Interrupted(Exception):
     """A portion is left unfinished."""
 
 
-def _seen(watch: Callable[[int], None], stopped: Callable[[], bool], done: int) -> None:
-    watch(done)
+def _seen(watch: Callable[[int], None], stopped: Callable[[], bool], first: int, over: int) -> None:
+    watch(first + over)
     if stopped():
         raise _Interrupted

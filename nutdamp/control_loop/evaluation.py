@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from nutdamp.common import results, work
+from nutdamp.control_loop.controller import Case
 from nutdamp.control_loop.simulation import SEED, LoopRun, fly, largest_since
-from nutdamp.control_loop.stability import Band, Margin, dead_band, feeding, margins, too_late
+from nutdamp.control_loop.stability import Band, Margin, dead_band, expect_in_time, margins
 from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.flight.dynamics import Dynamics, Path, Push
 from nutdamp.flight.end_state import Aspect, aspects, left_by, seen_at
@@ -27,7 +28,6 @@ from nutdamp.spacecraft.requirements import Left
 
 AGREE = 1e-6
 """s; firings that begin and last alike to this are the same."""
-
 
 EVALUATIONS = 1_000_000
 """Evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over."""
@@ -134,20 +134,14 @@ LOOP = "loop"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopPlan(Plan):
-    """Pulses fired by a loop in a ``run``; its flight is the one in which it fired them, to the end of the run.
+    """Pulses fired by a loop in a ``flown_run``; its flight is that in which it fired them, to the end of the run.
 
-    ``known`` is the spacecraft as the law knows it, where that is not the truth.
+    ``known`` is the spacecraft as the law knows it.
     With growing nutation the same pulses fired again without looking would not do the same: errors of rounding grow.
     """
 
-    run: LoopRun | None = None
-    known: Spacecraft | None = None
-
-    @property
-    def flown_run(self) -> LoopRun:
-        """Run of the loop."""
-        assert self.run is not None
-        return self.run
+    flown_run: LoopRun = field(kw_only=True)
+    known: Spacecraft = field(kw_only=True)
 
     @cached_property
     def flight(self) -> Flight:
@@ -189,16 +183,12 @@ class LoopPlan(Plan):
     @cached_property
     def margins(self) -> tuple[Margin, ...]:
         """Stability margin of each channel at the start threshold."""
-        return margins(self._known, self._known.loop or self.flown_run.loop)
+        return margins(self.known, requirements.expect_loop(self.known))
 
     @cached_property
     def band(self) -> Band:
         """Dead band of the nutation by design."""
-        return dead_band(self._known, self._known.loop or self.flown_run.loop)
-
-    @property
-    def _known(self) -> Spacecraft:
-        return self.known or self.spacecraft
+        return dead_band(self.known, requirements.expect_loop(self.known))
 
 
 def loop_of(
@@ -209,18 +199,13 @@ def loop_of(
     Raises Infeasible where no law can work, and where its firings would feed the nutation by how late they come.
     """
     loop = requirements.expect_loop(spacecraft)
-    late = feeding(spacecraft, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
-    if case is None:
-        run = fly(spacecraft, loop, until, seed=seed)
-        return LoopPlan(spacecraft, LOOP, run.schedule, from_file=True, run=run)
-    from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
+    expect_in_time(spacecraft, loop)
+    flown, law = Case(spacecraft, (seed,)), None
+    if case is not None:
+        from nutdamp.control_loop.dispersion import loop_study  # most flights are none of a study
 
-    study = loop_study(spacecraft, until, seed=seed)
-    dispersed = study.case(case)
-    assert dispersed.truth.loop is not None
-    run = fly(
-        dispersed.truth, dispersed.truth.loop, study.until, seed=dispersed.key, law=study.law, scatter=dispersed.scatter
-    )
-    return LoopPlan(dispersed.truth, LOOP, run.schedule, from_file=True, run=run, known=spacecraft)
+        study = loop_study(spacecraft, until, seed=seed)
+        flown, law, until = study.case(case), study.law, study.until
+    truth = flown.truth
+    run = fly(truth, truth.loop or loop, until, seed=flown.key, law=law, scatter=flown.scatter)
+    return LoopPlan(truth, LOOP, run.schedule, from_file=True, flown_run=run, known=spacecraft)

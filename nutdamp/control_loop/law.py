@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,6 @@ from nutdamp.schemes.sequential import at_hand
 from nutdamp.spacecraft.constraints import Windows, effective_on_time, effective_on_times, longest_useful, usable
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop
 from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
-
-if TYPE_CHECKING:
-    from nutdamp.physics.thruster import Valve
-
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -57,7 +53,8 @@ class Firing(NamedTuple):
 class Actuator:
     """Channel as the law sees it: ``kick`` rad/s² is the change of z per second, ``spin_rate`` rad/s² that of ω3.
 
-    Its pulses last from ``shortest`` to ``longest`` s; ``leads`` are those of its valve: see `_leads`.
+    Its pulses last from ``shortest`` to ``longest`` s. ``leads`` through a valve: effective on-times (n,) s between
+    these, and the lead of the commands to their centres.
     """
 
     channel: Channel
@@ -94,7 +91,10 @@ class Law:
             longest = effective_on_time(channel, self.loop.on_time)
         if self.loop.law == BANG:
             shortest = longest
-        leads = _leads(channel.valve, shortest, longest)
+        leads, valve = None, channel.valve
+        if valve is not None:
+            on_times = np.linspace(shortest, longest, LEADS)
+            leads = on_times, np.array([valve.thrust(valve.on_time_for(each)).centroid for each in on_times.tolist()])
         return Actuator(channel, complex(self.seen(kick)), channel.axial / third, shortest, longest, leads)
 
     def seen(self, omega: Any) -> Any:
@@ -119,7 +119,6 @@ class Law:
         rate, slope = float(self.rate(spin)), self.slope * actuator.spin_rate
         needed = response.on_time_for(abs(z), abs(actuator.kick), rate, slope, actuator.longest)
         on_time = actuator.longest if needed is None else max(needed, actuator.shortest)
-        lead, lasts = 0.5 * on_time, on_time
         if actuator.channel.valve is None:
             on_time = lasts = self.windows.on_time(on_time, actuator.shortest, actuator.longest)
             lead = 0.5 * on_time
@@ -153,14 +152,6 @@ class Law:
         if self.loop.predict:
             wait = wait - (0.5 * on_time if actuator.leads is None else np.interp(on_time, *actuator.leads))
         return np.where((acts > 0.0) & (acts < 2.0 * size), wait, math.nan)
-
-
-def _leads(valve: Valve | None, shortest: float, longest: float) -> tuple[Array, Array] | None:
-    """Effective on-times (n,) s from ``shortest`` to ``longest``, and the lead of the commands to their centres."""
-    if valve is None:
-        return None
-    on_times = np.linspace(shortest, longest, LEADS)
-    return on_times, np.array([valve.thrust(valve.on_time_for(on_time)).centroid for on_time in on_times.tolist()])
 
 
 def _gauge(inertia: Inertia, spin: float) -> tuple[float, float]:
@@ -411,24 +402,15 @@ class Diagnosis:
         most += SIGMAS * (change.sigma + doubt.noise) + 2.0 * (doubt.steps + doubt.bias)
         return (Ending.FED, channel) if abs(change.after) > most else None
 
-    def rest(self) -> None:
-        """Reset at rest: the growth of the nutation counts from here."""
-        self.first = None
-
-    def overdue(self, now: float) -> tuple[Ending, str] | None:
-        """True if no other channel has fired in time to tell which of the two is faulty."""
-        return None if self.suspect is None or now <= self.deadline else (Ending.UNCLEAR, self.suspect)
-
 
 def known_to(spacecraft: Spacecraft) -> tuple[float, float]:
     """Relative errors of nutation rate and sensor scale, two sigma of the dispersions."""
     given, inertia = spacecraft.dispersions, spacecraft.inertia
     if given is None:
         return 0.0, 0.0
-    axial, along = spacecraft.axial, inertia.C * spacecraft.spin
     parts = (
-        (given.A, inertia.A, axial),
-        (given.C, inertia.C, along),
+        (given.A, inertia.A, spacecraft.axial),
+        (given.C, inertia.C, inertia.C * spacecraft.spin),
         (given.wheel_momentum, inertia.wheel, inertia.wheel),
     )
     changes = [

@@ -20,7 +20,7 @@ import cmath
 import copy
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +66,8 @@ def is_blind(moments: Sequence[float], position: Vector, axis: Vector) -> bool:
 class Noise:
     """Normal numbers by sample number, independent of the order of access; ``key`` is seed and case."""
 
-    def __init__(self, key: tuple[int, ...], columns: int) -> None:
-        self.key, self.columns = key, columns
+    def __init__(self, key: tuple[int, ...], sensor: Sensor) -> None:
+        self.key, self.columns = key, 1 if sensor.kind == ACCELEROMETER else 2
         self._blocks: dict[int, Vector] = {}
 
     def of(self, first: int, count: int) -> Vector:
@@ -105,21 +105,16 @@ def felt(sensor: Sensor, moments: Any, rates: Any, torque: Any = None) -> tuple[
 
 
 class Signal:
-    """Samples of a sensor on a true ``spacecraft``, with the noise of a ``seed`` (and a case)."""
+    """Samples of a sensor on a true ``spacecraft``, with the noise of a ``key``: seed, and case if any."""
 
-    def __init__(self, spacecraft: Spacecraft, sensor: Sensor, seed: int | tuple[int, ...]) -> None:
-        self.sensor = sensor
-        self.moments, self.mass = spacecraft.inertia.moments, spacecraft.mass
-        columns = 1 if sensor.kind == ACCELEROMETER else 2
-        self.noise = Noise(seed if isinstance(seed, tuple) else (seed,), columns)
+    def __init__(self, spacecraft: Spacecraft, sensor: Sensor, key: tuple[int, ...]) -> None:
+        self.sensor, self.moments = sensor, spacecraft.inertia.moments
+        self.noise = Noise(key, sensor)
 
-    def shown(self, rates: Vector, torque: Vector | None = None, force: Vector | None = None) -> Vector:
-        """Signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3)."""
-        sensor = self.sensor
-        values = np.column_stack(felt(sensor, self.moments, rates.T, torque))
-        if force is not None and self.mass is not None and sensor.kind == ACCELEROMETER:
-            values = values + force @ sensor.axis / self.mass
-        return np.asarray(sensor.scales * values + sensor.biases)
+    def shown(self, rates: Vector) -> Vector:
+        """Signal without noise and steps, (n, 2) rad/s or (n, 1) m/s², at body ``rates`` (n, 3) of free motion."""
+        values = np.column_stack(felt(self.sensor, self.moments, rates.T))
+        return np.asarray(self.sensor.scales * values + self.sensor.biases)
 
     def sampled(self, numbers: NDArray[np.int64], shown: Vector) -> Vector:
         """Samples by their ``numbers`` (n,), one after the other from 0 at t = 0: ``shown`` with noise and steps."""
@@ -144,17 +139,17 @@ class Estimator:
         self.law, self.sensor = law, sensor
         self.since = since + max(law.loop.settle, SETTLED * sensor.low_pass)
         self.step = 0.0 if sensor.rate is None else 1.0 / sensor.rate
+        self._memory = math.exp(-self.step / sensor.low_pass) if sensor.low_pass > 0.0 else 0.0  # from sample to sample
         self._filtered: Vector | None = None
-        self._kept: _Kept | None = None
-        self._fit: _Fit | None = None
+        self._kept: tuple[Any, ...] = ()  # last samples of the coast: times, values, number of usable ones
+        self._fit: tuple[Any, ...] = ()  # see `_fit`
 
     def some(self, cases: NDArray[Any]) -> Estimator:
         """Subset of the cases."""
         subset = copy.copy(self)
         subset.since = self.since[cases]
         subset._filtered = None if self._filtered is None else self._filtered[cases]
-        subset._kept = None if self._kept is None else _Kept(*(part[cases] for part in self._kept))
-        subset._fit = None if self._fit is None else _Fit(self._fit.rate[cases], self._fit.weights[cases])
+        subset._kept, subset._fit = (tuple(part[cases] for part in parts) for parts in (self._kept, self._fit))
         return subset
 
     @property
@@ -196,11 +191,6 @@ class Estimator:
         fresh = 1.0 - self._memory
         return np.asarray(z * (1.0 - self._memory * np.exp(1j * self.law.rate(spin) * self.step)) / fresh)
 
-    @property
-    def _memory(self) -> float:
-        """Share of the filter value kept from sample to sample."""
-        return math.exp(-self.step / self.sensor.low_pass)
-
     def _low_pass(self, values: Vector) -> Vector:
         """Low-pass filter y = βy' + (1 - β)x over the samples; restarted with the first one after a firing."""
         count = values.shape[-2]
@@ -227,24 +217,21 @@ class Estimator:
         """
         if not times.shape[-1]:
             return np.empty(times.shape, dtype=complex)
-        if self._fit is None:
-            self._fit = _fit(np.asarray(self.law.rate(spin[..., :1])), self.step, self.window)
-        fresh, size, rate = times.shape[-1], self.window, self._fit.rate
+        self._fit = self._fit or _fit(np.asarray(self.law.rate(spin[..., :1])), self.step, self.window)
+        (rate, weights), fresh, size = self._fit, times.shape[-1], self.window
         used = np.cumsum(times >= self.since, axis=-1)
-        if self._kept is not None:
-            used = used + self._kept.used
-            times, values = (
-                np.concatenate(both, axis=-1) for both in ((self._kept.times, times), (self._kept.values, values))
-            )
-        self._kept = _Kept(times[..., -size:], values[..., -size:], used[..., -1:])
+        if self._kept:
+            earlier, seen, before = self._kept
+            used = used + before
+            times, values = np.concatenate([earlier, times], axis=-1), np.concatenate([seen, values], axis=-1)
+        self._kept = times[..., -size:], values[..., -size:], used[..., -1:]
         turns = np.exp(-1j * rate * (times - times[..., :1]))
         sums = [_windows(values, size, fresh)]
-        for power in (1, 2) if self._fit.weights.shape[-1] == 5 else (1,):
+        for power in (1, 2) if weights.shape[-1] == 5 else (1,):
             turned = turns if power == 1 else turns * turns
             # The sum over the window of v e^{-iφ}, with φ from its last sample.
             both = _windows(values * turned, size, fresh) * turned[..., -fresh:].conj()
             sums += [both.real, -both.imag]
-        weights = self._fit.weights
         sine = sum(total * weights[..., place, None] for place, total in enumerate(sums))
         estimate = sine / (np.conj(self.seen_gain) * spin)
         return np.asarray(np.where(used >= size, estimate, math.nan))
@@ -254,23 +241,6 @@ class Estimator:
         """Gain of the accelerometer for z, over ω3."""
         first, second = gain(self.law.inertia.moments, self.sensor.position, self.sensor.axis)
         return complex(first / self.law.gauge[0], second / self.law.gauge[1])
-
-    @property
-    def doubt(self) -> float:
-        """One sigma of an estimate of |z|, rad/s, by the noise of the sensor."""
-        lasts = (1.0 - self._memory) / (1.0 + self._memory) if self.sensor.low_pass > 0.0 else 1.0
-        return self._white * (1.0 if self.sensor.kind == ACCELEROMETER else self._lift * math.sqrt(lasts))
-
-    @property
-    def _white(self) -> float:
-        if self.sensor.kind == ACCELEROMETER:
-            return 2.0 * self.sensor.noise * self._lift / (math.sqrt(self.window) * self._least_gain)
-        return self.sensor.noise * math.sqrt(2.0) * max(self.law.gauge)
-
-    @property
-    def offset(self) -> float:
-        """Largest common error of |z| in all estimates, rad/s: by bias and steps of the sensor."""
-        return self._bias + self._steps
 
     def overestimate(self, truth: Spacecraft, size: float) -> float:
         """Largest factor of an estimate on a true |z| of up to ``size`` rad/s of a symmetric body; see `FITTED`."""
@@ -285,58 +255,32 @@ class Estimator:
 
     @property
     def doubts(self) -> Doubt:
-        """Uncertainties for a `Diagnosis`."""
-        least = self.doubt if self.sensor.kind == ACCELEROMETER else 0.0
-        off = known_to(self.law.spacecraft)
-        return Doubt(self.doubt, self._white, least, self._lift, self._bias, self._steps, *off)
-
-    @property
-    def _lift(self) -> float:
-        """Factor of `best` on a constant, and on noise at most: it inverts the filter for z."""
-        if self.sensor.low_pass == 0.0:
-            return 1.0
-        return max(abs(complex(self.best(1.0, self.law.spacecraft.spin))), 1.0)
-
-    @property
-    def _bias(self) -> float:
-        if self.sensor.kind == ACCELEROMETER:
-            return 0.0
-        return math.hypot(*self.sensor.biases) * self._lift * max(self.law.gauge)
-
-    @property
-    def _steps(self) -> float:
-        if self.sensor.kind == ACCELEROMETER:
-            return self.sensor.quantisation * self._lift / self._least_gain
-        return self.sensor.quantisation / math.sqrt(2.0) * self._lift * max(self.law.gauge)
-
-    @property
-    def _least_gain(self) -> float:
-        return abs(self.seen_gain) * abs(self.law.spacecraft.spin)
+        """Uncertainties of the estimates."""
+        sensor, body, memory = self.sensor, self.law.spacecraft, self._memory
+        off = known_to(body)
+        lift = max(abs(complex(self.best(1.0, body.spin))), 1.0)  # of a constant, as `best` inverts the filter for z
+        if sensor.kind == ACCELEROMETER:
+            least = abs(self.seen_gain) * abs(body.spin)
+            noise = 2.0 * sensor.noise * lift / (math.sqrt(self.window) * least)
+            return Doubt(noise, noise, noise, lift, 0.0, sensor.quantisation * lift / least, *off)
+        widest = max(self.law.gauge)
+        white = sensor.noise * math.sqrt(2.0) * widest
+        noise = white * (lift * math.sqrt((1.0 - memory) / (1.0 + memory)))
+        steps = sensor.quantisation / math.sqrt(2.0) * lift * widest
+        return Doubt(noise, white, 0.0, lift, math.hypot(*sensor.biases) * lift * widest, steps, *off)
 
 
-class _Kept(NamedTuple):
-    """Last samples of a coast, and the number of usable ones."""
+def _fit(rate: Vector, step: float, size: int) -> tuple[Vector, ComplexArray]:
+    """Least-squares fit of an offset and sines of a ``rate`` (rad/s) to ``size`` even samples.
 
-    times: Vector
-    values: Vector
-    used: Vector
-
-
-class _Fit(NamedTuple):
-    """Nutation ``rate`` rad/s of a fit, and the ``weights`` of its sums: 1, cos φ, sin φ, cos 2φ, sin 2φ."""
-
-    rate: Vector
-    weights: ComplexArray
-
-
-def _fit(rate: Vector, step: float, size: int) -> _Fit:
-    """Least-squares fit of an offset and sines to ``size`` even samples, as weights of their sums."""
+    Returns the rate and the weights of their sums: 1, cos φ, sin φ, cos 2φ, sin 2φ.
+    """
     angle = rate[..., None] * (step * np.arange(1.0 - size, 1.0))[:, None]
     powers = np.arange(1.0, 3.0 if size >= HARMONIC else 2.0)
     turns = np.stack([np.cos(angle * powers), np.sin(angle * powers)], axis=-1)
     basis = np.concatenate([np.ones(angle.shape), turns.reshape(*angle.shape[:-1], -1)], axis=-1)
     inverse = np.linalg.inv(np.swapaxes(basis, -1, -2) @ basis)
-    return _Fit(rate, inverse[..., 1, :] + 1j * inverse[..., 2, :])
+    return rate, inverse[..., 1, :] + 1j * inverse[..., 2, :]
 
 
 def _windows(values: Any, size: int, fresh: int) -> Any:

@@ -1,8 +1,7 @@
 """Simulation of closed loops: one event by event, and many in batches, each with its own body, sensor and noise.
 
-Coasts are in closed form, decisions by samples, pulses with their real widths. In a batch each loop decides by its own
-`Pilot`, the same that flies alone. Coasts and their samples, closed forms of a symmetric body, are computed together
-for all loops that have looked as often since they last fired.
+In a batch each loop decides by its own `Pilot`, the same that flies alone; coasts and their samples, closed forms of a
+symmetric body, are computed together for all loops that have looked as often since they last fired.
 """
 
 from __future__ import annotations
@@ -10,13 +9,25 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.control_loop.controller import GRID, SAMPLED, Coast, Course, Fired, Joined, Pilot, Scatter, Seen, Watch
+from nutdamp.control_loop.controller import (
+    GRID,
+    LONGEST,
+    SAMPLED,
+    Case,
+    Coast,
+    Course,
+    Joined,
+    Pilot,
+    Scatter,
+    Seen,
+    Watch,
+)
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Noise, Signal, felt, stepped
 from nutdamp.control_loop.stability import dead_band
@@ -28,7 +39,7 @@ from nutdamp.montecarlo.cases import watch_over
 from nutdamp.physics import attitude, batch, energy_sink, taylor
 from nutdamp.physics.taylor import Forcing
 from nutdamp.physics.triaxial import arc_cones
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop
+from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -48,46 +59,69 @@ ROWS = 2000
 """Even moments at which the largest nutation of a run is looked for."""
 
 
-@dataclass(frozen=True, eq=False)
 class LoopRun:
-    """Loop flown to ``until`` s: its firings, the reason of its end, and the channel to blame.
+    """Loop of a ``case`` flown to ``until`` s: its firings, the reason of its end, and the ``channel`` to blame.
 
-    ``key``: seed of the noise, and the number of the dispersed case from 1 where it is one.
-    ``quiet``: the times (s) from which it saw no more than the stop threshold, until the next start; ``lost``: see
-    `Pilot`.
+    ``seed`` of the noise; ``case``: number of the dispersed case, from 1, or None. ``quiet``: the times
+    (s) from which it saw no more than the stop threshold, until the next start, ``settled`` the first of them, None
+    where it never was down to it; ``lost``: see `Pilot`.
     """
 
-    spacecraft: Spacecraft
-    loop: Loop
-    until: float
-    key: tuple[int, ...]
-    fired: tuple[Fired, ...]
-    stop: Ending
-    channel: str | None
-    quiet: tuple[float, ...]
-    lost: bool
-    looked_at: int
-    flight: Flight
+    def __init__(self, law: Law, case: Case, until: float, dynamics: Dynamics | None = None) -> None:
+        own = make_dynamics(case.truth)
+        # Free as the body is: so that any integrator flies the same decisions.
+        pilot = self.pilot = Pilot(law, case, until, free=own.free)
+        self.dynamics, self.loop, self.until = dynamics or own, pilot.loop, until
+        self.key, self.seed, self.case = case.key, case.key[0], case.key[1] if len(case.key) > 1 else None
+        self.legs: list[Leg] = []
+        last = self._fly(Signal(case.truth, self.loop.sensor, case.key))
+        self.fired, self.quiet = tuple(pilot.fired), tuple(pilot.quiet)
+        self.settled = self.quiet[0] if self.quiet else None
+        self.stop, self.channel = pilot.ending[0], pilot.ending[1] or None
+        self.lost, self.looked_at = pilot.lost, pilot.looked_at
+        self.schedule = Schedule(tuple(firing.pulse for firing in self.fired))
+        legs, spans = tuple(self.legs), tuple(pulse.thrust for pulse in self.schedule)
+        self.flight = Flight(case.truth, self.schedule, legs, last, self.dynamics.moments, spans, until=until)
 
-    @property
-    def schedule(self) -> Schedule:
-        """Fired pulses."""
-        return self.flight.schedule
+    def _fly(self, signal: Signal) -> SpinState:
+        """Coast and fire until the end, or until something is wrong; returns the state after the last firing."""
+        pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
+        coast = Coast(pilot.law, signal, self.dynamics, state, now)
+        while (seen := coast.look(self.until, active=pilot.active)) is not None:
+            step = pilot.step(coast, seen)
+            if step is Course.OVER:
+                break
+            if isinstance(step, float):
+                coast = coast.later(step)
+            elif isinstance(step, Pulse):
+                begin = self._coasted(coast, state, now, step.thrust[0])
+                pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
+                state, now = self._fire(step, begin), step.thrust[1]
+                coast = Coast(pilot.law, signal, self.dynamics, state, now)
+        self._coasted(coast, state, now, max(self.until, now))
+        return state
 
-    @property
-    def seed(self) -> int:
-        """Seed of the noise."""
-        return self.key[0]
+    def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
+        """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be seen, as it was."""
+        path: Path = Joined(coast.parts)
+        if coast.parts and not self.dynamics.free:
+            there = coast.at(end)
+        else:
+            path, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
+        self._leg(start, end, path)
+        return there
 
-    @property
-    def case(self) -> int | None:
-        """Number of the dispersed case, from 1; None for the file itself."""
-        return self.key[1] if len(self.key) > 1 else None
+    def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
+        for start, end in itertools.pairwise(sorted(set(pulse.edges))):
+            push = pulse.push(start, end)
+            torque, slope = ([], None) if push is None else ([push[0]], push[1])
+            path, state = self.dynamics.path(state, start, end, torque, slope, most=taylor.MOST_STEPS)
+            self._leg(start, end, path, firing=True, last=end == pulse.thrust[1])
+        return state
 
-    @property
-    def settled(self) -> float | None:
-        """Time at which the loop was first down to the stop threshold, s; None where it never was."""
-        return self.quiet[0] if self.quiet else None
+    def _leg(self, start: float, end: float, path: Path, *, firing: bool = False, last: bool = False) -> None:
+        done = len(self.pilot.fired) - firing
+        self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
 
 
 def until_default(spacecraft: Spacecraft, loop: Loop) -> float:
@@ -122,12 +156,13 @@ def fly(
     """
     end = until_default(spacecraft, loop) if until is None else until
     key = seed if isinstance(seed, tuple) else (seed,)
-    return Alone.of(spacecraft, loop, end, key, law or Law(spacecraft, loop), scatter, dynamics).fly()
+    case = Case(spacecraft if spacecraft.loop is loop else replace(spacecraft, loop=loop), key, scatter)
+    return LoopRun(law or Law(spacecraft, loop), case, end, dynamics)
 
 
 def largest_since(run: LoopRun) -> tuple[float, float]:
     """Largest nutation since a loop first settled, rad, and its time, s; at the end where it never did."""
-    flight, body = run.flight, run.spacecraft
+    flight, body = run.flight, run.flight.spacecraft
     if run.settled is None:
         rates = flight.motion(np.array([run.until]))[0][0]
         return arc_cones(flight.moments, rates, body.sense, body.inertia.wheel).nutation, run.until
@@ -138,112 +173,10 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
     return float(track.nutation[row]), float(track.t[row])
 
 
-class Alone:
-    """Single flight in progress, stretch by stretch."""
-
-    def __init__(self, pilot: Pilot, signal: Signal, dynamics: Dynamics, key: tuple[int, ...]) -> None:
-        self.pilot, self.signal, self.dynamics, self.key = pilot, signal, dynamics, key
-        self.legs: list[Leg] = []
-
-    @classmethod
-    def of(
-        cls,
-        spacecraft: Spacecraft,
-        loop: Loop,
-        until: float,
-        key: tuple[int, ...],
-        law: Law,
-        scatter: Scatter | None = None,
-        dynamics: Dynamics | None = None,
-    ) -> Alone:
-        """Flight of a ``spacecraft`` and its ``loop`` as they are in truth; see `fly`."""
-        moves = dynamics or make_dynamics(spacecraft)
-        free = make_dynamics(spacecraft).free  # the body's, so that any integrator flies the same decisions
-        pilot = Pilot(spacecraft, loop, until, law, free=free, scatter=scatter)
-        return cls(pilot, Signal(spacecraft, loop.sensor, key), moves, key)
-
-    def fly(self) -> LoopRun:
-        """Coast and fire until the end, or until something is wrong."""
-        pilot, state, now = self.pilot, self.pilot.truth.initial, 0.0
-        coast = self._coast(state, now)
-        while (seen := coast.look(pilot.until, active=pilot.active)) is not None:
-            step = pilot.step(coast, seen)
-            if step is Course.OVER:
-                break
-            if isinstance(step, float):
-                coast = coast.later(step)
-            elif isinstance(step, Pulse):
-                begin = self._coasted(coast, state, now, step.thrust[0])
-                pilot.take(step, abs(complex(pilot.law.seen(begin.omega))), begin.spin)
-                state, now = self._fire(step, begin), step.thrust[1]
-                coast = self._coast(state, now)
-        self._coasted(coast, state, now, max(pilot.until, now))
-        return self._run(state)
-
-    def _coasted(self, coast: Coast, state: SpinState, start: float, end: float) -> SpinState:
-        """Motion at the ``end`` of a coast that began as ``state``; where it was integrated to be seen, as it was."""
-        if coast.parts and not self.dynamics.free:
-            there, path = coast.at(end), Joined(coast.parts)
-            self._leg(start, end, path)
-            return there
-        arc, there = self.dynamics.path(state, start, end, most=taylor.MOST_STEPS)
-        self._leg(start, end, arc)
-        return there
-
-    def _coast(self, state: SpinState, since: float) -> Coast:
-        return Coast(self.pilot.law, self.signal, self.dynamics, state, since)
-
-    def _fire(self, pulse: Pulse, state: SpinState) -> SpinState:
-        """Motion through the thrust of a pulse, from its beginning to its end."""
-        for start, end in itertools.pairwise(sorted(set(pulse.edges))):
-            push = pulse.push(start, end)
-            torque, slope = ([], None) if push is None else ([push[0]], push[1])
-            path, state = self.dynamics.path(state, start, end, torque, slope, most=taylor.MOST_STEPS)
-            self._leg(start, end, path, firing=True, last=end == pulse.thrust[1])
-        return state
-
-    def _leg(self, start: float, end: float, path: Path, *, firing: bool = False, last: bool = False) -> None:
-        done = len(self.pilot.fired) - firing
-        self.legs.append(Leg(start, end, path, done, jump=start == 0.0, completed_at_end=done + last))
-
-    def _run(self, settled: SpinState) -> LoopRun:
-        """Run that ends its firings with the motion ``settled``."""
-        pilot = self.pilot
-        schedule = Schedule(tuple(firing.pulse for firing in pilot.fired))
-        spans = tuple(pulse.thrust for pulse in schedule)
-        moments = self.dynamics.moments
-        flight = Flight(pilot.truth, schedule, tuple(self.legs), settled, moments, spans, until=pilot.until)
-        return LoopRun(
-            pilot.truth,
-            pilot.loop,
-            pilot.until,
-            self.key,
-            tuple(pilot.fired),
-            pilot.ending[0],
-            pilot.ending[1] or None,
-            tuple(pilot.quiet),
-            pilot.lost,
-            pilot.looked_at,
-            flight,
-        )
-
-
 TOGETHER = 1 << 16
 """Samples times cases that are worked out together: few enough that they stay in the cache."""
 
 Rows = NDArray[np.int_]
-
-
-class Case(NamedTuple):
-    """Case of a loop: the true spacecraft with its loop; the ``key`` of its noise, and the errors of firings.
-
-    ``tilt`` rad is by how much the attitude at t = 0 is off, about the body axes 1 and 2.
-    """
-
-    truth: Spacecraft
-    key: tuple[int, ...]
-    scatter: Scatter | None = None
-    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,20 +204,15 @@ class FlownLoops:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Coasts that have been looked at as often: the ``rows`` of their cases, and the ``numbers`` of the next samples.
-
-    ``lanes`` are what the decisions of each are made with.
-    """
+    """Coasts looked at as often: the ``rows`` of their cases, and the ``numbers`` of the next samples."""
 
     rows: Rows
     watch: Watch
     numbers: Rows
-    lanes: list[Watch]
 
     def some(self, places: Any) -> _Group:
         """Subset at some of the places."""
-        lanes = [self.lanes[place] for place in places.tolist()]
-        return _Group(self.rows[places], self.watch.some(places), self.numbers[places], lanes)
+        return _Group(self.rows[places], self.watch.some(places), self.numbers[places])
 
     def parts(self, size: int) -> Iterator[_Group]:
         """Parts of at most ``most`` cases."""
@@ -304,28 +232,17 @@ def expects_alone(law: Law, spacecraft: Spacecraft) -> str:
     return "" if spacecraft.inertia.symmetric else "three different moments of inertia"
 
 
-def fly_together(
-    law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
-) -> FlownLoops:
-    """Loops of ``cases``, flown to ``until`` s; ``watch`` is called with the number of finished ones.
-
-    Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
-    """
-    return _Fleet(law, cases, until).fly(watch)
-
-
 def fly_alone(
     law: Law, cases: Sequence[Case], until: float, watch: Callable[[int], None] = lambda _: None
 ) -> FlownLoops:
-    """`fly_together`, each loop by itself, for any disturbance and sensor."""
+    """Loops as of a `Fleet`, each flown by itself, for any disturbance and sensor."""
     count = len(cases)
     rates, quaternion = np.empty((3, count)), np.empty((4, count))
     quiet, largest, pilots = np.full(count, math.nan), np.empty(count), []
     aspects = np.empty((len(law.spacecraft.keep), 2, count))
     for row, case in enumerate(cases):
-        alone = Alone.of(case.truth, case.truth.loop or law.loop, until, case.key, law, case.scatter)
-        run = alone.fly()
-        pilots.append(alone.pilot)
+        run = LoopRun(law, case, until)
+        pilots.append(run.pilot)
         end = run.flight.motion(np.array([run.flight.legs[-1].end]))
         rates[:, row] = end[0][0]
         quaternion[:, row] = attitude.multiply(attitude.conjugate(case.truth.initial.quaternion), end[1][0])
@@ -341,23 +258,20 @@ def fly_alone(
     return FlownLoops(cases, pilots, rates, quaternion, quiet, largest, aspects)
 
 
-class _Fleet:
-    """Flights in the making."""
+class Fleet:
+    """Loops of ``cases`` flown together to ``until`` s.
+
+    Bodies are symmetric and nothing acts on them but their pulses and dissipation; see `expects_alone`.
+    """
 
     def __init__(self, law: Law, cases: Sequence[Case], until: float) -> None:
         self.law, self.cases, self.until = law, cases, until
-        loops = [case.truth.loop for case in cases]
-        self.pilots = [
-            Pilot(case.truth, loop or law.loop, until, law, free=True, scatter=case.scatter)
-            for case, loop in zip(cases, loops, strict=True)
-        ]
+        self.pilots = [Pilot(law, case, until, free=True) for case in cases]
         sensors = [pilot.loop.sensor for pilot in self.pilots]
-        columns = 1 if law.loop.sensor.kind == ACCELEROMETER else 2
-        self.noises = [Noise(case.key, columns) for case in cases]
-        self.scales, self.biases = (
-            np.array(each) for each in zip(*((s.scales, s.biases) for s in sensors), strict=True)
-        )
-        self.noise, self.delays = (np.array(each) for each in zip(*((s.noise, s.delay) for s in sensors), strict=True))
+        self.noises = [Noise(case.key, law.loop.sensor) for case in cases]
+        self.scales = np.array([sensor.scales for sensor in sensors])
+        self.biases = np.array([sensor.biases for sensor in sensors])
+        self.noise, self.delays = np.array([(sensor.noise, sensor.delay) for sensor in sensors]).T.copy()
         moments = np.array([case.truth.inertia.moments for case in cases]).T
         wheels = np.array([case.truth.inertia.wheel for case in cases])
         self.bodies = batch.Bodies(moments, np.zeros(3), Forcing(growth=law.growth, wheel=wheels))
@@ -369,8 +283,8 @@ class _Fleet:
         self.settled = np.full(len(cases), math.inf)
         self.quiet, self.largest = np.full(len(cases), math.nan), np.full(len(cases), -math.inf)
 
-    def fly(self, watch: Callable[[int], None]) -> FlownLoops:
-        """Fly all loops to their ends."""
+    def fly(self, watch: Callable[[int], None] = lambda _: None) -> FlownLoops:
+        """Fly all loops to their ends; ``watch`` is called with the number of finished ones."""
         groups, over = [self._begun(np.arange(len(self.pilots)))], 0
         while groups:
             groups, fired, later = self._round(groups)
@@ -393,11 +307,8 @@ class _Fleet:
         return FlownLoops(self.cases, self.pilots, *ends, self.watch.angles)
 
     def _begun(self, rows: Rows) -> _Group:
-        """Coasts of cases that begin now."""
-        since = self.now[rows]
-        watch = Watch(self.law, since[:, None])
-        lanes = [Watch(self.law, start) for start in since.tolist()]
-        return _Group(rows, watch, watch.first(since), lanes)
+        watch = Watch(self.law, self.now[rows, None])
+        return _Group(rows, watch, watch.first(self.now[rows]))
 
     def _round(self, groups: Iterable[_Group]) -> tuple[list[_Group], list[tuple[int, Pulse]], list[tuple[int, float]]]:
         """One look at every coast: those that go on, pulses, and times until which nothing is to be seen."""
@@ -409,7 +320,7 @@ class _Fleet:
                 stays = []
                 for place, seen in enumerate(self._look(group)):
                     row = int(group.rows[place])
-                    step = Course.OVER if seen is None else self._decided(self.pilots[row], group.lanes[place], seen)
+                    step = Course.OVER if seen is None else self._decided(row, seen)
                     if self.pilots[row].quiet and math.isinf(self.settled[row]):
                         self.settled[row] = self.pilots[row].quiet[0]
                     if step is Course.ON:
@@ -422,12 +333,12 @@ class _Fleet:
                     going.append(group if len(stays) == len(group.rows) else group.some(np.array(stays)))
         return going, fired, later
 
-    def _decided(self, pilot: Pilot, lane: Watch, seen: Seen) -> Pulse | float | Course:
+    def _decided(self, row: int, seen: Seen) -> Pulse | float | Course:
         """Next action of a loop; one that fires without end is over."""
         try:
-            return pilot.step(lane, seen)
+            return self.pilots[row].step(Watch(self.law, float(self.now[row])), seen)
         except Infeasible:
-            pilot.ending = Ending.FULL, ""
+            self.pilots[row].ending = Ending.FULL, ""
             return Course.OVER
 
     def _look(self, group: _Group) -> Iterator[Seen | None]:
@@ -445,8 +356,7 @@ class _Fleet:
         moments = self.bodies.moments[:, rows, None]
         shown = np.stack(felt(sensor, moments, (omega.real, omega.imag, spin)), axis=-1)
         values = shown * self.scales[rows, None] + self.biases[rows, None]
-        noisy = self.noise[rows] > 0.0
-        if noisy.any():
+        if (self.noise[rows] > 0.0).any():
             drawn = [self.noises[row].of(first, count) for row, first in zip(rows, group.numbers.tolist(), strict=True)]
             values = values + self.noise[rows, None, None] * np.array(drawn)
         active = np.array([self.pilots[row].active for row in rows])
@@ -455,7 +365,7 @@ class _Fleet:
         sizes = np.abs(self.law.seen(omega[np.arange(len(rows)), ends])).tolist()
         decided: Vector = times + self.delays[rows, None]
         group.numbers[:] += count
-        watch.reach = watch.doubled
+        watch.reach = min(2 * watch.reach, LONGEST)
         for place, (end, size) in enumerate(zip(counts.tolist(), sizes, strict=True)):
             at = (place, slice(0, end))
             seen = Seen(times[at], decided[at], z[at], best[at], spin[at], nutation[at], fires[:, *at], size)
@@ -498,7 +408,6 @@ class _Fleet:
         self.rates[:, rows], self.quaternion[:, rows] = here.rates, here.quaternion
 
     def _fire(self, fired: list[tuple[int, Pulse]]) -> None:
-        """Pulses of cases, from the beginning of their thrust to its end."""
         rows = np.array([row for row, _ in fired])
         self._go(rows, np.array([pulse.thrust[0] for _, pulse in fired]))
         sizes = np.abs(self.law.seen(self.rates[0, rows] + 1j * self.rates[1, rows])).tolist()

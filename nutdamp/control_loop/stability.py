@@ -32,25 +32,13 @@ NEVER = 1e3
 """Growth e^{κT} from which on further growth does not matter."""
 
 
-class Cause(NamedTuple):
-    """Causes that reverse firings of a channel: the sensor, or that the channel is ``backwards``."""
-
-    sensor: bool
-    backwards: bool
-
-    @property
-    def turned(self) -> bool:
-        """True if a firing feeds the nutation: two errors cancel."""
-        return self.sensor != self.backwards
-
-
 @dataclass(frozen=True, slots=True)
 class Margin:
     """Channel at a ``nutation`` (rad): its largest delay ``late`` (rad), and the share (``gain``) that this leaves.
 
     It damps while no later than ``latest`` rad. ``growth`` is the factor of a period. ``delay``: s by which it may come
-    later still; negative where it comes too late, minus infinity where no firing damps. ``cause``: faults in the file,
-    not counted in these figures.
+    later still; negative where it comes too late, minus infinity where no firing damps. ``turned``: the sensor or the
+    channel, not both, is reversed in the file: firings feed the nutation, which is not counted in these figures.
     """
 
     channel: str
@@ -60,7 +48,7 @@ class Margin:
     gain: float
     growth: float
     delay: float
-    cause: Cause
+    turned: bool
 
     @property
     def damps(self) -> bool:
@@ -80,6 +68,13 @@ def feeding(spacecraft: Spacecraft, loop: Loop) -> Margin | None:
     angles = [loop.start, spacecraft.nutation] if spacecraft.nutation > loop.start else [loop.start]
     all_margins = (margin for theta in angles for margin in margins(spacecraft, loop, theta))
     return next((margin for margin in all_margins if not margin.damps), None)
+
+
+def expect_in_time(spacecraft: Spacecraft, loop: Loop) -> None:
+    """Raise Infeasible where firings would feed the nutation by how late they come."""
+    late = feeding(spacecraft, loop)
+    if late is not None:
+        raise Infeasible(too_late(late))
 
 
 def too_late(margin: Margin) -> str:
@@ -106,9 +101,9 @@ def _margin(law: Law, actuator: Actuator, theta: float, spin: float) -> Margin:
         sampling = 0.0 if loop.sensor.rate is None else 1.0 / loop.sensor.rate
         late = abs(lag(law, loop.sensor, spin)) + rate * (firing.lead + sampling)
     most = _most_late(pull, growth)
-    cause = Cause(loop.sensor.scale < 0.0, actuator.channel.name in loop.reversed)
+    turned = (loop.sensor.scale < 0.0) != (actuator.channel.name in loop.reversed)
     gain = abs(1.0 - pull * cmath.exp(1j * late))
-    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, cause)
+    return Margin(actuator.channel.name, theta, late, most, gain, growth, (most - late) / rate, turned)
 
 
 def _most_late(pull: float, growth: float) -> float:
@@ -146,22 +141,20 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     is more than the stop threshold, firings end there, the noise counted in the size and in both parts of the firing.
     """
     law, spin = Law(spacecraft, loop), spacecraft.spin
-    estimator = Estimator(law, loop.sensor, 0.0)
+    doubts = Estimator(law, loop.sensor, 0.0).doubts
     looks = 1.0 if loop.sensor.rate is None else max(loop.sensor.rate * law.period, 1.0)
-    noise = estimator.offset + estimator.doubt / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
-    noise /= abs(loop.sensor.scale)
-    steps = [abs(actuator.kick) * _shortest(spacecraft, actuator) for actuator in law.actuators]
+    noise = doubts.noise / math.sqrt(2.0) * math.sqrt(2.0 * math.log(looks / (1.0 - SURELY)))
+    noise = (doubts.bias + doubts.steps + noise) / abs(loop.sensor.scale)
+    steps = []
+    for actuator in law.actuators:
+        least = effective_on_time(actuator.channel, shortest_on_time(spacecraft, actuator.channel))
+        steps.append(abs(actuator.kick) * max(actuator.shortest, least))
     stop = law.size(loop.stop, spin) / abs(loop.sensor.scale)
     floor = 0.5 * max(steps)
     most = stop + noise if floor <= stop else floor + 3.0 * noise
     grown = math.exp(min(max(law.growth, 0.0) * loop.sensor.delay, math.log(NEVER)))
     angles = [float(law.nutation(size, spin)) for size in (most * grown, noise, max(steps))]
     return Band(*angles)
-
-
-def _shortest(spacecraft: Spacecraft, actuator: Actuator) -> float:
-    least = shortest_on_time(spacecraft, actuator.channel)
-    return max(actuator.shortest, effective_on_time(actuator.channel, least))
 
 
 FORGOTTEN = 12.0
@@ -307,7 +300,6 @@ PHASES = 16
 CURVED = 12.0
 """Sigmas within which a size is so small that noise across it counts."""
 
-
 DEGREES = 240
 """Terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger."""
 
@@ -383,9 +375,7 @@ def exceeds(limit: float, shown: Vector) -> Vector:
 
 def expect_damping(body: Spacecraft, loop: Loop) -> None:
     """Raise Infeasible where firings feed the nutation: by faults in the file, or by their delay."""
-    turned = [margin.channel for margin in margins(body, loop) if margin.cause.turned]
+    turned = [margin.channel for margin in margins(body, loop) if margin.turned]
     if turned:
         raise Infeasible(f"firings of {' and '.join(turned)} feed the nutation: wired backwards against the sensor")
-    late = feeding(body, loop)
-    if late is not None:
-        raise Infeasible(too_late(late))
+    expect_in_time(body, loop)

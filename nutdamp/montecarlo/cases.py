@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.flight.dynamics import Supply, shed
-from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, Inputs, groups_of, list_inputs
+from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
 from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
-from nutdamp.physics.thruster import Tank, possible, spread
+from nutdamp.physics.thruster import Cold, Tank, possible, spread
 from nutdamp.spacecraft.equipment import Thruster
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
@@ -71,6 +71,8 @@ def added(first: Sequence[Cases], second: Sequence[Cases]) -> Triple:
 
 def scaled(vector: Sequence[Cases], factor: Cases) -> Triple:
     """A vector times a factor."""
+    if isinstance(factor, float) and factor == 1.0:
+        return triple(vector)
     return triple(times(part, factor) for part in vector)
 
 
@@ -115,13 +117,7 @@ def rotated(vector: Sequence[Cases], tilt: tuple[Cases, Cases]) -> Triple:
 
 def turned(matrix: Vector, vector: Sequence[Cases]) -> Triple:
     """Matrix times vector, elementwise over cases."""
-    rows = []
-    for row in matrix.tolist():
-        total: Cases = 0.0
-        for entry, part in zip(row, vector, strict=True):
-            total = plus(total, part if entry == 1.0 else times(entry, part))
-        rows.append(total)
-    return triple(rows)
+    return triple(reduce(plus, map(times, row, vector)) for row in matrix.tolist())
 
 
 def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
@@ -134,33 +130,30 @@ def tank_of(body: Spacecraft, draws: Draws) -> Tank | None:
     )
 
 
-class Fed(NamedTuple):
-    """Dispersed feed: strength of each pulse over the planned one, and its propellant, kg, None where unknown.
+def cold_of(body: Spacecraft, draws: Draws) -> Cold | None:
+    """Cold nozzles of the cases."""
+    cold, first, pulses = body.cold, draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
+    return cold and replace(cold, first=plus(cold.first, first), pulses=plus(cold.pulses, pulses))
 
-    ``drained``: share of the propellant in the tank that all of them would take, 1 at most where it lasts; 0 without a
-    tank, or where it is not known what they take.
+
+def supplied(
+    body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]
+) -> tuple[list[Cases], tuple[Cases, ...] | None, Cases]:
+    """Strength of each pulse of cases over the planned one, and its propellant, kg, None where unknown.
+
+    It is zero once the tank is empty, and of those that do not fire as planned. ``flows``: what each takes of
+    propellant over what it does as planned, at the same pressure and as warm. The last is the share of the propellant
+    in the tank that all of them would take, 1 at most where it lasts; 0 without a tank, or where it is not known what
+    they take.
     """
-
-    levels: list[Cases]
-    spent: tuple[Cases, ...] | None
-    drained: Cases = 0.0
-
-
-def supplied(body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence[Cases]) -> Fed:
-    """Strength of the pulses of cases: zero once the tank is empty, and of those that do not fire as planned.
-
-    ``flows``: what each takes of propellant over what it does as planned, at the same pressure and as warm.
-    """
-    cold, tank = body.cold, tank_of(body, draws)
+    tank = tank_of(body, draws)
     known = all(pulse.propellant is not None for pulse in schedule)
     planned = [pulse.propellant or 0.0 for pulse in schedule]
     levels: list[Cases] = [1.0] * len(flows)
     if tank is None and not ("cold" in draws or "cold_pulses" in draws):
-        return Fed(levels, tuple(used * flow for used, flow in zip(planned, flows, strict=True)) if known else None)
-    if cold is not None:
-        off = draws.get("cold", 0.0), draws.get("cold_pulses", 0.0)
-        cold = replace(cold, first=plus(cold.first, off[0]), pulses=plus(cold.pulses, off[1]))
-    nominal, case = Supply(body), Supply(replace(body, cold=cold, tank=tank))
+        spent = tuple(used * flow for used, flow in zip(planned, flows, strict=True))
+        return levels, spent if known else None, 0.0
+    nominal, case = Supply(body), Supply(replace(body, cold=cold_of(body, draws), tank=tank))
     channels = {channel.name: channel for channel in body.channels}
     higher: Cases = 1.0  # the file gives the thrust at its own pressure
     if tank is not None and body.tank is not None:
@@ -178,14 +171,17 @@ def supplied(body: Spacecraft, schedule: Schedule, draws: Draws, flows: Sequence
         level, used = case.take(channel, pulse.on_time * flows[number] * higher)
         levels[number], taken[number] = level * higher / (before or 1.0), 0.0 if used is None else used
     drained = 0.0 if tank is None or not known else case.used / tank.propellant
-    return Fed(levels, tuple(taken) if known else None, drained)
+    return levels, tuple(taken) if known else None, drained
 
 
 DISC = 1e-12
 """Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
 
-NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg")
+NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "sensor_delay")
 """Tolerances of quantities that are never negative: draws that make them so are repeated."""
+
+POSITIVE = ("sensor_scale", "sensor_noise")
+"""Tolerances of quantities that are not zero either."""
 
 ROUNDING = 1e-9
 """A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""
@@ -206,7 +202,7 @@ class DispersedCases:
     the rectangle that it counts as, which begins ``leads`` s after the command, its ``impulses`` N m s, and its
     ``thrust`` where a valve is not as the file has it. ``tilt`` is the rotation vector (rad, about body axes 1 and 2)
     by which the attitude at t = 0 is off; ``spent`` the propellant of each pulse, kg, None where that of one is not
-    known; ``drained`` as in `fed.Fed`; ``per_kg`` what each kg takes off the moments, m², None where they stay;
+    known; ``drained`` as of `supplied`; ``per_kg`` what each kg takes off the moments, m², None where they stay;
     ``wheel`` the momentum h of a wheel, N m s.
     """
 
@@ -269,24 +265,15 @@ class _Fired(NamedTuple):
     flow: Cases
 
 
-@dataclass(frozen=True, eq=False)
 class DispersedModel:
     """Spacecraft and schedule, ready to be dispersed."""
 
-    spacecraft: Spacecraft
-    schedule: Schedule
-    inputs: Inputs = field(init=False)
-    _members: dict[str, tuple[Thruster, ...]] = field(init=False)
-    _actuations: tuple[_Actuation, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        body = self.spacecraft
-        members = {channel.name: channel.thrusters for channel in body.channels}
-        if STEERABLE not in members and body.torquer is not None:
-            members[STEERABLE] = ()
-        object.__setattr__(self, "inputs", list_inputs(body, self.schedule))
-        object.__setattr__(self, "_members", members)
-        object.__setattr__(self, "_actuations", tuple(map(self._actuation, self.schedule)))
+    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
+        self.spacecraft, self.schedule, self.inputs = spacecraft, schedule, list_inputs(spacecraft, schedule)
+        self._members = {channel.name: channel.thrusters for channel in spacecraft.channels}
+        if STEERABLE not in self._members and spacecraft.torquer is not None:
+            self._members[STEERABLE] = ()
+        self._actuations = tuple(map(self._actuation, schedule))
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -300,7 +287,10 @@ class DispersedModel:
 
         Through a valve that of the rectangle which has the impulse, the centroid and the spread of the thrust.
         """
-        return tuple(map(_width, self.schedule))
+        return tuple(
+            spread(pulse.command.ramps, pulse.t) if pulse.command and pulse.command.ramps else pulse.on_time
+            for pulse in self.schedule
+        )
 
     @property
     def target(self) -> Vector:
@@ -317,12 +307,14 @@ class DispersedModel:
         return np.asarray(axis / np.linalg.norm(axis), dtype=np.float64)
 
     def physical(self, draws: Draws) -> NDArray[np.bool_] | bool:
-        """True where a case is possible: moments of a rigid body, positive thrust."""
+        """True where a case is possible: moments of a rigid body, positive thrust, a sensor that sees something."""
         moments = self._moments(draws)
         good: Any = _possible(*moments) if "A" in draws or "C" in draws else True
         for entry in self.inputs.drawn:
             if entry.tolerance in NOT_NEGATIVE and entry.name in draws:
                 good = good & (entry.nominal + draws[entry.name] >= 0.0)
+            elif entry.tolerance in POSITIVE and entry.name in draws:
+                good = good & (entry.nominal + draws[entry.name] > 0.0)
         tank = tank_of(self.spacecraft, draws)
         if tank is not None and any(name.startswith("tank ") for name in draws):
             good = good & possible(tank)
@@ -355,10 +347,7 @@ class DispersedModel:
             starts=tuple(response.start for response in fired),
             widths=tuple(response.width for response in fired),
             leads=tuple(response.lead for response in fired),
-            impulses=tuple(
-                response.impulse if isinstance(level, float) and level == 1.0 else scaled(response.impulse, level)
-                for response, level in zip(fired, levels, strict=True)
-            ),
+            impulses=tuple(scaled(response.impulse, level) for response, level in zip(fired, levels, strict=True)),
             thrust=tuple(
                 tuple(Thrusting(each.opened, scaled(each.torque, level)) for each in response.thrust)
                 for response, level in zip(fired, levels, strict=True)
@@ -381,9 +370,12 @@ class DispersedModel:
             lead = actuation.pulse.t - 0.5 * width - start
         longer: dict[str, Cases] = {}
         if opened:
-            parts = {name: each.acts for name, each in opened.items()}
-            longer = {name: acts / actuation.pulse.on_time for name, (acts, _, _) in parts.items()}
-            centroid, width = (sum(part[at] for part in parts.values()) / len(parts) for at in (1, 2))
+            parts = [each.acts for _, each in opened]
+            longer = {
+                thruster.name: acts / actuation.pulse.on_time
+                for (thruster, _), (acts, _, _) in zip(opened, parts, strict=True)
+            }
+            centroid, width = (sum(part[at] for part in parts) / len(parts) for at in (1, 2))
             fall = 0.0 if actuation.pulse.command is None else actuation.pulse.command.fall
             lead = centroid - fall * width / 12.0 - 0.5 * width
         factor = plus(1.0, draws.get(f"thrust pulse {number}", 0.0))
@@ -392,13 +384,17 @@ class DispersedModel:
             impulse = self._steered(actuation.pulse.impulse, mean, draws)
         else:
             impulse = added(scaled(torque, actuation.duration), scaled(actuation.remainder, mean))
-        strength = factor * (actuation.duration / actuation.pulse.on_time) if opened else 0.0
+        thrust = []
+        for thruster, each in opened:
+            strength = factor * (actuation.duration / actuation.pulse.on_time)
+            strength = strength * plus(1.0, draws.get(f"thrust {thruster.name}", 0.0))
+            thrust.append(Thrusting(each, scaled(self.thruster_torque(thruster, draws), strength)))
         return _Fired(
             start=plus(start if nothing(shift) else _not_before(start + shift), lead),
             width=width,
             lead=lead,
-            impulse=impulse if isinstance(factor, float) and factor == 1.0 else scaled(impulse, factor),
-            thrust=tuple(self._thrusting(actuation, name, each, strength, draws) for name, each in opened.items()),
+            impulse=scaled(impulse, factor),
+            thrust=tuple(thrust),
             flow=flow * factor,
         )
 
@@ -425,29 +421,23 @@ class DispersedModel:
             remainder = np.zeros(3)
         return _Actuation(pulse, source, duration, parts_of(remainder))
 
-    def _opened(self, actuation: _Actuation, draws: Draws) -> dict[str, Opened]:
-        """Response of the valves of a pulse, by thruster, where any of them is dispersed."""
+    def _opened(self, actuation: _Actuation, draws: Draws) -> list[tuple[Thruster, Opened]]:
+        """Thrusters of a pulse with the response of their valves, where any of these is dispersed."""
         if actuation.pulse.command is None or actuation.source is None or not actuation.pulse.command.ramps:
-            return {}
+            return []
         from nutdamp.physics.thruster import Measured, Trapezoid  # few spacecraft have any
 
         members, on_time = self._members[actuation.source], actuation.pulse.command.on_time
         if not any(f"{key} {thruster.name}" in draws for thruster in members for key in BY_VALVE):
-            return {}
-        openings = {}
+            return []
+        openings: list[tuple[Thruster, Opened]] = []
         for thruster in members:
             off = [draws.get(f"{key} {thruster.name}", 0.0) for key in BY_VALVE]
             if isinstance(thruster.valve, Trapezoid):
-                openings[thruster.name] = thruster.valve.opened(on_time, *off[:-1])
+                openings.append((thruster, thruster.valve.opened(on_time, *off[:-1])))
             elif isinstance(thruster.valve, Measured):
-                openings[thruster.name] = thruster.valve.opened(on_time, plus(1.0, off[-1]))
+                openings.append((thruster, thruster.valve.opened(on_time, plus(1.0, off[-1]))))
         return openings
-
-    def _thrusting(self, actuation: _Actuation, name: str, opened: Opened, strength: Cases, draws: Draws) -> Thrusting:
-        """Thrust of a thruster whose torque is ``strength`` times that of the file."""
-        (thruster,) = (each for each in self._members[actuation.source or ""] if each.name == name)
-        strength = strength * plus(1.0, draws.get(f"thrust {name}", 0.0))
-        return Thrusting(opened, scaled(self.thruster_torque(thruster, draws), strength))
 
     def _torque(
         self, source: str | None, draws: Draws, longer: Mapping[str, Cases] | None = None
@@ -464,8 +454,7 @@ class DispersedModel:
                 factor * longer.get(thruster.name, 1.0) for factor, thruster in zip(factors, thrusters, strict=True)
             ]
         for thruster, factor in zip(thrusters, factors, strict=True):
-            turned = self.thruster_torque(thruster, draws)
-            torque = added(torque, turned if isinstance(factor, float) and factor == 1.0 else scaled(turned, factor))
+            torque = added(torque, scaled(self.thruster_torque(thruster, draws), factor))
         flows = [thruster.mass_flow or 1.0 for thruster in thrusters]
         flow = sum(weight * factor for weight, factor in zip(flows, factors, strict=True)) / math.fsum(flows)
         return torque, sum(factors) / len(factors), flow
@@ -501,7 +490,7 @@ class DispersedModel:
 
     def _steered(self, impulse: Vector, factor: Cases, draws: Draws) -> Triple:
         """Impulse of the steerable torquer, its axis turned in the 1-2 plane."""
-        x, y, z = scaled(parts_of(impulse), factor) if not isinstance(factor, float) else parts_of(impulse * factor)
+        x, y, z = scaled(parts_of(impulse), factor)
         angle = draws.get(f"direction {STEERABLE}", 0.0)
         if nothing(angle):
             return x, y, z
@@ -510,18 +499,9 @@ class DispersedModel:
 
 
 def _possible(first: Cases, second: Cases, third: Cases) -> Any:
-    """True where moments are those of a rigid body."""
     slack = 1.0 + DISC
     good = (first > 0.0) & (second > 0.0) & (third > 0.0) & (third <= (first + second) * slack)
     return good & (first <= (second + third) * slack) & (second <= (first + third) * slack)
-
-
-def _width(pulse: Pulse) -> float:
-    """Length (s) of the rectangle that a pulse counts as."""
-    if pulse.command is None or not pulse.command.ramps:
-        return pulse.on_time
-
-    return spread(pulse.command.ramps, pulse.t)
 
 
 def _not_before(start: Cases) -> Cases:
@@ -531,15 +511,7 @@ def _not_before(start: Cases) -> Cases:
     return np.where(start.real > 0.0, start, np.where(start.real == 0.0, 0.5j * start.imag, 0.0))
 
 
-Tilt = tuple[Any, Any]
-
-
-def watch_of(model: DispersedModel, cases: DispersedCases) -> AxisWatch:
-    """Observer of the angles from the spin axis to the directions of the cones, in each of the ``cases``."""
-    return watch_over(model.spacecraft, cases.tilt, number_of(cases))
-
-
-def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
+def watch_over(body: Spacecraft, tilt: tuple[Any, Any], count: int) -> AxisWatch:
     """Observer of ``count`` cases of a ``body`` with axes off by a ``tilt``, rad, about its 1 and 2."""
     inertial = [np.zeros(3) if cone.direction is None else cone.direction for cone in body.keep]
     directions = np.array([in_body(body, tilt, count, direction) for direction in inertial])
@@ -547,7 +519,7 @@ def watch_over(body: Spacecraft, tilt: Tilt, count: int) -> AxisWatch:
     return AxisWatch.of(directions.reshape(-1, 3, count), body.sense, momentum)
 
 
-def in_body(body: Spacecraft, tilt: Tilt, count: int, direction: Vector) -> NDArray[np.float64]:
+def in_body(body: Spacecraft, tilt: tuple[Any, Any], count: int, direction: Vector) -> NDArray[np.float64]:
     """An inertial ``direction`` (3,) in the true axes of t = 0 of bodies off by a ``tilt``, (3, n)."""
     x, y, z = attitude.rotate(attitude.conjugate(body.initial.quaternion), direction).tolist()
     return np.array([np.broadcast_to(part, count) for part in rotated((x, y, z), (-tilt[0], -tilt[1]))])

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.montecarlo.cases import DispersedCases
 from nutdamp.montecarlo.inputs import Draws
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import STRIDE, Study, study_of
@@ -39,15 +37,8 @@ class Checkpoints:
     """Ranges of the first cases of a ``study``."""
 
     def __init__(self, study: Study) -> None:
-        self.study = study
-        drawn, _ = study.source().block(0)
-        self._draws: Draws = {
-            name: draw if isinstance(draw, float) else draw[:CASES].copy() for name, draw in drawn.items()
-        }
-
-    @cached_property
-    def _initial(self) -> DispersedCases:
-        return self.study.model.cases(self._draws)
+        self.study, self._draws = study, study.draws_of_all(np.arange(CASES))
+        self._initial = study.model.cases(self._draws)
 
     @property
     def spin(self) -> Range:

@@ -1,16 +1,12 @@
 """Dispersed inputs of a study: selection, correlation, random draws.
 
-The tolerances of the file are matched against the pulses of the schedule. Every drawn quantity is one `DispersedInput`;
-a tolerance without effect becomes an `Unused` with its reason.
-
 Correlated inputs are a Gaussian copula: each input is a monotonic function of a standard normal number, and the
 correlation given is that of these numbers (Nelsen 2006, 5.2): of two normal inputs it is their own, of two uniform
 ones theirs is (6/π) asin(ρ/2).
 
-Draws do not depend on the number of threads or cases. Cases come in fixed blocks of `BLOCK`. Every input has a stream
-of its own in every block: the counter-based Philox generator with the seed and the input's name in the key, the block
-in the counter. So case 1234 is the same in a study of any size, and a tolerance that is tightened or dropped leaves
-the draws of all others as they were. Correlated inputs mix the streams of their group.
+Every input has a stream of its own in every block of `BLOCK` cases: the counter-based Philox generator with the seed
+and the input's name in the key, the block in the counter. So case 1234 is the same in a study of any size and with any
+number of threads, and a tolerance that is tightened or dropped leaves the draws of all others as they were.
 """
 
 from __future__ import annotations
@@ -19,8 +15,8 @@ import hashlib
 import math
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, lru_cache, partial
-from typing import NamedTuple
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,15 +75,21 @@ class Inputs(NamedTuple):
 
 def list_inputs(spacecraft: Spacecraft, schedule: Schedule) -> Inputs:
     """Inputs of a study of ``schedule``; none for a spacecraft without dispersions."""
+    return _listed(_entries(spacecraft, schedule))
+
+
+def _listed(entries: Iterable[DispersedInput | Unused]) -> Inputs:
+    """Inputs and unused tolerances, those too whose size is zero."""
     drawn: list[DispersedInput] = []
     unused: list[Unused] = []
-    for entry in _entries(spacecraft, schedule):
+    for entry in entries:
         if isinstance(entry, Unused):
             unused.append(entry)
-        elif entry.size == 0.0:
-            unused.append(Unused(entry.name, _no_size(entry)))
-        else:
+        elif entry.size != 0.0:
             drawn.append(entry)
+        else:
+            share = entry.tolerance in ("A", "C", "omega0", "wheel_momentum") and entry.nominal == 0.0
+            unused.append(Unused(entry.name, "given in % of a value that is zero" if share else "its size is zero"))
     return Inputs(tuple(drawn), tuple(unused))
 
 
@@ -99,96 +101,83 @@ def reachable(spacecraft: Spacecraft) -> Inputs:
     pulses = [channel_pulse(channel, 0.0, 0.0) for channel in spacecraft.channels]
     if spacecraft.torquer is not None:
         pulses.append(steerable_pulse(spacecraft.torquer, 0.0, 0.0))
-    drawn, unused = list_inputs(spacecraft, Schedule(tuple(pulses)))
-    once = (entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1"))
-    sensor = of_sensor(spacecraft)
-    rest = (entry for entry in unused if not entry.name.startswith("sensor "))
-    return Inputs(
-        (*(entry._replace(name=entry.name.replace(" pulse 1", " of each pulse")) for entry in once), *sensor.drawn),
-        (
-            *(entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, "no channel fires")) for entry in rest),
-            *sensor.unused,
-        ),
-    )
+    drawn, unused = with_sensor(spacecraft, list_inputs(spacecraft, Schedule(tuple(pulses))), "no channel fires")
+    once = [entry for entry in drawn if " pulse " not in entry.name or entry.name.endswith(" pulse 1")]
+    return Inputs(tuple(each._replace(name=each.name.replace(" pulse 1", " of each pulse")) for each in once), unused)
 
 
-def of_sensor(spacecraft: Spacecraft) -> Inputs:
-    """Inputs of the sensor of a loop: bias and scale of each gyro; none for a spacecraft without sensor."""
+def with_sensor(spacecraft: Spacecraft, fired: Inputs, idle: str) -> Inputs:
+    """Inputs of a loop by those of what is ``fired``, and of its sensor; ``idle`` in place of `SCHEDULE_IDLE`."""
+    sensor = _listed(_of_sensor(spacecraft))
+    rest = (entry for entry in fired.unused if not entry.name.startswith("sensor "))
+    unused = (entry._replace(reason=entry.reason.replace(SCHEDULE_IDLE, idle)) for entry in rest)
+    return Inputs((*fired.drawn, *sensor.drawn), (*unused, *sensor.unused))
+
+
+def _of_sensor(spacecraft: Spacecraft) -> Iterator[DispersedInput | Unused]:
+    """Bias and scale of each gyro, noise and delay; none for a spacecraft without sensor."""
     requested, loop = spacecraft.dispersions, spacecraft.loop
     if requested is None or loop is None:
-        return Inputs((), ())
+        return
     sensor = loop.sensor
-    single = sensor.kind == ACCELEROMETER
-    axes, unit = ([""], "m/s²") if single else ([" 1", " 2"], "rad/s")
+    axes, unit = ([""], "m/s²") if sensor.kind == ACCELEROMETER else ([" 1", " 2"], "rad/s")
     known = {
         **{f"sensor bias{axis}": ("sensor_bias", sensor.bias, unit) for axis in axes},
         **{f"sensor scale{axis}": ("sensor_scale", 1.0, "") for axis in axes},
         "sensor noise": ("sensor_noise", 1.0, ""),
         "sensor delay": ("sensor_delay", sensor.delay, "s"),
     }
-    drawn, unused = [], []
     for name, (key, nominal, of) in known.items():
         tolerance: Tolerance | None = getattr(requested, key)
-        if tolerance is None:
-            continue
-        idle = "the sensor has no noise" if key == "sensor_noise" and sensor.noise == 0.0 else ""
-        if idle or tolerance.size == 0.0:
-            unused.append(Unused(name, idle or "its size is zero"))
-        else:
-            drawn.append(_input(name, key, tolerance, nominal, of))
-    return Inputs(tuple(drawn), tuple(unused))
-
-
-def _no_size(entry: DispersedInput) -> str:
-    if entry.tolerance in ("A", "C", "omega0", "wheel_momentum") and entry.nominal == 0.0:
-        return "given in % of a value that is zero"
-    return "its size is zero"
+        if tolerance is not None and key == "sensor_noise" and sensor.noise == 0.0:
+            yield Unused(name, "the sensor has no noise")
+        elif tolerance is not None:
+            yield _input(name, key, tolerance, nominal, of)
 
 
 def _entries(spacecraft: Spacecraft, schedule: Schedule) -> Iterator[DispersedInput | Unused]:
-    requested = spacecraft.dispersions
+    requested, inertia = spacecraft.dispersions, spacecraft.inertia
     if requested is None:
         return
-    moments = (("A", spacecraft.inertia.A, requested.A), ("C", spacecraft.inertia.C, requested.C))
-    rates = spacecraft.inertia.axes @ spacecraft.omega0
-    for name, nominal, tolerance in moments:
+    rates = (inertia.axes @ spacecraft.omega0).tolist()
+    for name, key, tolerance, nominal, unit in (
+        ("A", "A", requested.A, inertia.A, "kg m²"),
+        ("C", "C", requested.C, inertia.C, "kg m²"),
+        ("wheel momentum", "wheel_momentum", requested.wheel_momentum, inertia.wheel, "N m s"),
+        *((f"omega0_{at + 1}", "omega0", requested.omega0[at], rates[at], "rad/s") for at in range(3)),
+    ):
         if tolerance is not None:
-            yield _input(name, name, tolerance, nominal, "kg m²")
-    if requested.wheel_momentum is not None:
-        yield _input("wheel momentum", "wheel_momentum", requested.wheel_momentum, spacecraft.inertia.wheel, "N m s")
-    for number, (tolerance, rate) in enumerate(zip(requested.omega0, rates.tolist(), strict=True), start=1):
-        if tolerance is not None:
-            yield _input(f"omega0_{number}", "omega0", tolerance, rate, "rad/s")
+            yield _input(name, key, tolerance, nominal, unit)
     members = fired(spacecraft, schedule)
-    kinds = [("thrust", _thrust), ("thrust_direction", _direction), ("position", _position)]
-    kinds += [(key, partial(_valve, key)) for key in BY_VALVE]
-    for key, of_thruster in kinds:
+    for key in ("thrust", "thrust_direction", "position", *BY_VALVE):
         for name, tolerance in getattr(requested, key).items():
             if name in members:
-                yield from of_thruster(name, tolerance, members[name])
+                yield from _of_thruster(key, name, tolerance, members[name])
             else:
                 who = "the steerable torquer" if name == STEERABLE else name
                 yield Unused(f"{key.removeprefix('thrust_')} {name}", f"{SCHEDULE_IDLE} {who}")
     if requested.center_of_mass is not None:
         levered = any(thruster is not None and thruster.force is not None for thruster in members.values())
-        for axis in "xyz":
-            name = f"center of mass {axis}"
+        for name in ("center of mass x", "center of mass y", "center of mass z"):
             if levered:
                 yield _input(name, "center_of_mass", requested.center_of_mass, 0.0, "m")
             else:
                 yield Unused(name, KNOWN_BY_TORQUE if members else f"{SCHEDULE_IDLE} any thruster")
     yield from _feed(spacecraft, requested, any(thruster is not None for thruster in members.values()))
-    pulses = range(1, len(schedule) + 1)
-    if requested.thrust_per_pulse is not None:
-        named = [f"thrust pulse {number}" for number in pulses]
-        yield from _of_pulses("thrust_per_pulse", named, requested.thrust_per_pulse, 1.0, "")
-    if requested.timing is not None:
-        yield from _of_pulses("timing", [f"timing pulse {number}" for number in pulses], requested.timing, 0.0, "s")
-    if requested.timing_offset is not None:
-        yield from _of_pulses("timing_offset", ["timing offset"] * bool(pulses), requested.timing_offset, 0.0, "s")
+    numbers = range(1, len(schedule) + 1)
+    for key, names, nominal, unit in (
+        ("thrust_per_pulse", [f"thrust pulse {number}" for number in numbers], 1.0, ""),
+        ("timing", [f"timing pulse {number}" for number in numbers], 0.0, "s"),
+        ("timing_offset", ["timing offset"] * bool(numbers), 0.0, "s"),
+    ):
+        tolerance = getattr(requested, key)
+        if tolerance is not None and not names:
+            yield Unused(key.replace("_", " "), "the schedule has no pulses")
+        for name in names if tolerance is not None else ():
+            yield _input(name, key, tolerance, nominal, unit)
     sensor = spacecraft.sun_sensor
     if schedule.blocks and sensor is not None and sensor.jitter > 0.0:
-        for number in pulses:
+        for number in numbers:
             yield DispersedInput(f"Sun pulse {number}", "sun_sensor.jitter", "normal", sensor.jitter, 0.0, "s")
     if requested.attitude is not None:
         for axis in "xy":
@@ -216,28 +205,31 @@ def fired(spacecraft: Spacecraft, schedule: Schedule) -> dict[str, Thruster | No
     return members
 
 
-def _thrust(name: str, tolerance: Tolerance, _: Thruster | None) -> Iterator[DispersedInput | Unused]:
-    yield DispersedInput(f"thrust {name}", "thrust", tolerance.kind, tolerance.size, 1.0, "")
-
-
-def _direction(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
-    if thruster is None:
-        yield _input(f"direction {name}", "thrust_direction", tolerance, 0.0, "rad")
-    elif thruster.force is None or thruster.position is None:
-        yield Unused(f"direction {name}", KNOWN_BY_TORQUE)
+def _of_thruster(
+    key: str, name: str, tolerance: Tolerance, thruster: Thruster | None
+) -> Iterator[DispersedInput | Unused]:
+    """Inputs of a tolerance of a thruster, its valve or the table in its place; None: the steerable torquer."""
+    called = f"{key.removeprefix('thrust_')} {name}"
+    if key in BY_VALVE:
+        valve = None if thruster is None else thruster.valve
+        if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
+            yield _input(called, key, tolerance, 1.0, "")
+        elif key == "impulse_bit" or not hasattr(valve, key):
+            yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
+        else:
+            yield _input(called, key, tolerance, getattr(valve, key), "s")
+    elif key == "thrust":
+        yield _input(called, key, tolerance, 1.0, "")
+    elif thruster is None and key == "position":
+        yield Unused(called, "a steerable torquer gives a pure torque, wherever it is mounted")
+    elif thruster is None:
+        yield _input(called, key, tolerance, 0.0, "rad")
+    elif thruster.force is None or (key == "thrust_direction" and thruster.position is None):
+        yield Unused(called, KNOWN_BY_TORQUE)
     else:
-        for axis in "ab":
-            yield _input(f"direction {name} {axis}", "thrust_direction", tolerance, 0.0, "rad")
-
-
-def _position(name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
-    if thruster is None:
-        yield Unused(f"position {name}", "a steerable torquer gives a pure torque, wherever it is mounted")
-    elif thruster.force is None:
-        yield Unused(f"position {name}", KNOWN_BY_TORQUE)
-    else:
-        for axis in "xyz":
-            yield _input(f"position {name} {axis}", "position", tolerance, 0.0, "m")
+        axes, unit = ("xyz", "m") if key == "position" else ("ab", "rad")
+        for axis in axes:
+            yield _input(f"{called} {axis}", key, tolerance, 0.0, unit)
 
 
 def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterator[DispersedInput | Unused]:
@@ -260,28 +252,6 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterat
             yield Unused(name, "the schedule fires no thruster")
         else:
             yield _input(name, key, tolerance, nominal, unit)
-
-
-def _valve(key: str, name: str, tolerance: Tolerance, thruster: Thruster | None) -> Iterator[DispersedInput | Unused]:
-    """A tolerance of a valve, or of a table in its place."""
-    called, valve = f"{key} {name}", None if thruster is None else thruster.valve
-    delay = getattr(valve, key, None)
-    if key == "impulse_bit" and valve is not None and not hasattr(valve, "open_delay"):
-        yield DispersedInput(called, key, tolerance.kind, tolerance.size, 1.0, "")
-    elif key == "impulse_bit" or delay is None:
-        yield Unused(called, f"{name} has no {'impulse_bit' if key == 'impulse_bit' else 'valve'}")
-    else:
-        yield _input(called, key, tolerance, delay, "s")
-
-
-def _of_pulses(
-    key: str, names: Iterable[str], tolerance: Tolerance, nominal: float, unit: str
-) -> Iterator[DispersedInput | Unused]:
-    named = list(names)
-    if not named:
-        yield Unused(key.replace("_", " "), "the schedule has no pulses")
-    for name in named:
-        yield DispersedInput(name, key, tolerance.kind, tolerance.size, nominal, unit)
 
 
 Array = NDArray[np.float64]
@@ -434,13 +404,18 @@ def _of_values(first: DispersedInput, second: DispersedInput, rho: float) -> flo
 
 @cache
 def _nodes() -> tuple[Array, Array]:
-    """Quadrature nodes of the standard normal distribution."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     return nodes, weights / math.sqrt(2.0 * math.pi)
 
 
 Draws = Mapping[str, "Array | float"]
 """Deviations from nominal by the name of the input, (n,) or one for all cases."""
+
+
+def some_of(draws: Draws, rows: Any) -> dict[str, Any]:
+    """Draws of some cases, or of one, by their ``rows``."""
+    return {name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()}
+
 
 BLOCK = 16_384
 """Cases that share a substream of each input."""
@@ -478,26 +453,20 @@ class DrawSource:
 
         The arrays are used anew for the next block. Raises Unsuitable where no physical case is found.
         """
-        self._fill(self._table, number, 0)
-        draws = self._named(self._table)
-        redrawn = []
-        rows = _bad_rows(self._physical(draws), BLOCK)
-        attempt = 0
-        while len(rows):
-            attempt += 1
-            if attempt > MOST_ATTEMPTS:
-                problem = "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)"
-                raise Unsuitable(("dispersions",), problem)
+        rows, redrawn = np.arange(BLOCK), [np.empty(0, dtype=np.intp)]
+        for attempt in range(MOST_ATTEMPTS + 1):
+            drawn = np.empty((len(self._random), len(rows))) if attempt else self._table
+            self._fill(drawn, number, attempt)
+            if attempt:
+                self._table[:, rows] = drawn
+            rows = rows[~np.broadcast_to(np.asarray(self._physical(self._named(drawn))), len(rows))]
+            if not len(rows):
+                return self._named(self._table), np.concatenate(redrawn)
             redrawn.append(rows)
-            again = np.empty((len(self._random), len(rows)))
-            self._fill(again, number, attempt)
-            self._table[:, rows] = again
-            rows = rows[_bad_rows(self._physical(self._named(again)), len(rows))]
-        return draws, np.concatenate(redrawn) if redrawn else np.empty(0, dtype=np.intp)
+        raise Unsuitable(("dispersions",), "almost all draws are unphysical (C > 2A, thrust < 0, delay < 0)")
 
     def _named(self, table: Array) -> dict[str, Array | float]:
-        rows = zip(self._random, table, strict=True)
-        return {**self._fixed, **{entry.name: row for entry, row in rows}}
+        return {**self._fixed, **{entry.name: row for entry, row in zip(self._random, table, strict=True)}}
 
     def _fill(self, table: Array, block: int, attempt: int) -> None:
         """Fill ``table`` (inputs, cases) by the deviations of a block; each ``attempt`` has a stream of its own."""
@@ -526,7 +495,8 @@ def _drawn(name: str, kind: str, seed: int, block: int, attempt: int, count: int
 @lru_cache(KEPT)
 def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: int) -> Array:
     """Read-only draws of `_drawn`."""
-    key, counter = np.array([seed, _number(name)], np.uint64), np.array([0, 0, attempt, block], np.uint64)
+    stream = int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")  # the same everywhere
+    key, counter = np.array([seed, stream], np.uint64), np.array([0, 0, attempt, block], np.uint64)
     generator = np.random.Generator(np.random.Philox(key=key, counter=counter))
     if kind == "normal":
         draws = generator.standard_normal(count)
@@ -536,12 +506,3 @@ def _stream(name: str, kind: str, seed: int, block: int, attempt: int, count: in
         draws = generator.random(count) + generator.random(count) - 1.0
     draws.setflags(write=False)
     return draws
-
-
-def _bad_rows(good: NDArray[np.bool_] | bool, count: int) -> NDArray[np.intp]:
-    return np.flatnonzero(~np.broadcast_to(np.asarray(good), count))
-
-
-def _number(name: str) -> int:
-    """A number of 64 bits for a name, the same everywhere."""
-    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little")

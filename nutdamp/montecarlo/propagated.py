@@ -1,13 +1,11 @@
 """Cases flown, many at once: through real pulse widths, and in closed form for derivatives.
 
-Flights have the true tensor and the disturbances; command blocks fire in each case from the Sun pulses of its own
-nutating body. The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Between pulses a symmetric
-body is free, and two facts make the arcs cheap. Seen in the frame that turns with the nutation, by the phase aα with
-α = ∫ω3 dt, the angular momentum does not move: its transverse part is AΩ = Aω0 + Σ J e^{iaα}, Magnus (17). And that
-frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0) Rot3(aω3 t)). So a pulse adds to a vector,
-and a coast turns a quaternion; no angle is taken before the end. Energy dissipation draws H away from axis 3 in that
-frame, along an arc that `energy_sink` knows. The closed form takes no absolute value and compares nothing: the same
-code runs on complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
+The closed form is the impulse sum Magnus 1970 (17) with exact attitude arcs. Seen in the frame that turns with the
+nutation, by the phase aα with α = ∫ω3 dt, the angular momentum of a free symmetric body does not move: its transverse
+part is AΩ = Aω0 + Σ J e^{iaα}. And that frame, in space, turns about H at |H|/A (the exact arc R(t) = Rot(H t/A) R(0)
+Rot3(aω3 t)). So a pulse adds to a vector, and a coast turns a quaternion; energy dissipation draws H away from axis 3
+in that frame, along an arc that `energy_sink` knows. Nothing takes an absolute value or compares: the same code runs on
+complex arrays, which gives derivatives to rounding (`nutdamp.montecarlo.statistics`).
 """
 
 from __future__ import annotations
@@ -17,14 +15,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre
 from nutdamp.errors import Infeasible
-from nutdamp.flight.dynamics import Dynamics, make_dynamics
+from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo.cases import (
     Cases,
     DispersedCases,
@@ -37,7 +34,7 @@ from nutdamp.montecarlo.cases import (
     rotated,
     times,
     triple,
-    watch_of,
+    watch_over,
 )
 from nutdamp.physics import attitude, batch, energy_sink, sky
 from nutdamp.physics.batch import Bodies, MotionStretch, cos_sin
@@ -46,6 +43,8 @@ from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
 from nutdamp.physics.triaxial import widest_cones
 from nutdamp.schemes.block_model import fire, pushes
+
+Array = NDArray[np.float64]
 
 FAR = 8.0
 """Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
@@ -63,7 +62,7 @@ class Ends:
     estimated body axes of t = 0. ``spin`` is ω3 at the end, ``spin_change`` what it gained, rad/s; ``propellant`` kg or
     None. ``nutation`` rad where it is not simply the angle of ``momentum`` (bodies with I1 ≠ I2). ``aspects`` (m, 2, n)
     rad: least and largest angle on the way from the spin axis to each cone's direction; None without cones.
-    ``drained`` as in `fed.Fed`.
+    ``drained`` as of `cases.supplied`.
     """
 
     momentum: Triple
@@ -290,24 +289,6 @@ def _in_order(cases: DispersedCases, nodes: tuple[int, ...]) -> tuple[DispersedC
     return placed, tuple(nodes[number] for number in order)
 
 
-Array = NDArray[np.float64]
-
-
-class FiredBlocks(NamedTuple):
-    """Motion of cases at the end of their last pulse, and the fired pulses.
-
-    ``rates`` (3, n) rad/s, ``quaternion`` (4, n); ``starts`` (k, n) s of the pulses; ``seen`` (k, n): whether they
-    fire, which needs the sensor to have seen the Sun up to then in the same turns as in the nominal flight: another
-    count of Sun pulses is another plan; ``over`` (n,) s: when the last pulse ends.
-    """
-
-    rates: Array
-    quaternion: Array
-    starts: Array
-    seen: NDArray[np.bool_]
-    over: Array
-
-
 def fly(
     model: DispersedModel,
     bodies: Bodies,
@@ -316,20 +297,23 @@ def fly(
     cases: DispersedCases,
     nominal: Sequence[bool],
     watch: AxisWatch | None = None,
-) -> FiredBlocks:
+) -> tuple[Array, Array, Array, NDArray[np.bool_], Array]:
     """Fire the blocks of ``model`` in each case from its own Sun pulses; ``watch`` sees the motion.
 
-    ``nominal``: `seen_nominally`. A pulse that is due while the one before is on begins as that ends.
+    ``nominal``: `RealWidths.seen_nominally`. A pulse that is due while the one before is on begins as that ends.
+    Returns rates (3, n) rad/s and quaternions (4, n) at the end of the last pulse; starts (k, n) s of the pulses;
+    whether they fire (k, n), which needs the sensor to have seen the Sun up to then in the same turns as in the nominal
+    flight: another count of Sun pulses is another plan; when the last pulse ends (n,), s.
     """
     count, body = rates.shape[1], model.spacecraft
     assert body.sun_sensor is not None
+    assert body.sun is not None
     starts, seen = np.empty((len(model.schedule), count)), np.empty((len(model.schedule), count), dtype=bool)
     over = np.zeros(count)
-    rates, quaternion, sun = rates.copy(), quaternion.copy(), sun_seen(model, cases, count)
-    pulses, shifts = model.schedule.pulses, []
+    rates, quaternion, sun = rates.copy(), quaternion.copy(), in_body(body, cases.tilt, count, body.sun)
     passages = np.flatnonzero(nominal) + 1  # those that the sensor sees of the passages of the Sun
-    for pulse, start, lead in zip(pulses, cases.starts, cases.leads, strict=True):
-        shifts.append(start - lead - pulse.loaded[0])
+    pulses, begins = model.schedule.pulses, zip(model.schedule, cases.starts, cases.leads, strict=True)
+    shifts = [start - lead - pulse.loaded[0] for pulse, start, lead in begins]
     for begin in range(0, count, batch.BLOCK):
         rows = slice(begin, min(begin + batch.BLOCK, count))
 
@@ -362,18 +346,7 @@ def fly(
                 for here, end in clock.passed:
                     watch.some(rows).motion(here, end - here.since)
         rates[:, rows], quaternion[:, rows], over[rows] = clock.here.rates, clock.here.quaternion, clock.here.since
-    return FiredBlocks(rates, quaternion, starts, seen, over)
-
-
-def seen_nominally(model: DispersedModel) -> list[bool]:
-    """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
-    sensor, blocks = model.spacecraft.sun_sensor, model.schedule.blocks
-    if sensor is not None and sensor.sees_all:
-        return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
-    try:
-        return fire(model.spacecraft, model.schedule.blocks)[1]
-    except Infeasible:
-        return [False]
+    return rates, quaternion, starts, seen, over
 
 
 def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable[[object], Array]) -> list[TorqueRamp]:
@@ -394,32 +367,29 @@ def _pushes(thrust: Sequence[Thrusting], seen: NDArray[np.bool_], part: Callable
     return pushes
 
 
-def sun_seen(model: DispersedModel, cases: DispersedCases, count: int) -> Array:
-    """Direction to the Sun in the true body axes of t = 0, (3, n)."""
-    assert model.spacecraft.sun is not None
-    return in_body(model.spacecraft, cases.tilt, count, model.spacecraft.sun)
-
-
 CASE, STEPPED, LOOKED = 5e-3, 1e-2, 4e-3
 """Units of work: of a case and of each of its pulses, of a step of a numerical coast, of an observation of its axis."""
 
 
-@dataclass(frozen=True, eq=False)
 class RealWidths:
     """Flies cases of ``model`` by Euler's equations, see `nutdamp.physics.batch`.
 
     Disturbances and dissipation act as the estimate has them, whatever the moments of a case are.
     """
 
-    model: DispersedModel
+    def __init__(self, model: DispersedModel) -> None:
+        self.model, self._dynamics = model, make_dynamics(model.spacecraft)
 
     @cached_property
-    def _dynamics(self) -> Dynamics:
-        return make_dynamics(self.model.spacecraft)
-
-    @cached_property
-    def _seen(self) -> list[bool]:
-        return seen_nominally(self.model)
+    def seen_nominally(self) -> list[bool]:
+        """Flags of the Sun passages seen in the nominal flight; empty where that cannot be fired."""
+        body, blocks = self.model.spacecraft, self.model.schedule.blocks
+        if body.sun_sensor is not None and body.sun_sensor.sees_all:
+            return [True] * max((number for block in blocks for number in block.sun_pulses), default=0)
+        try:
+            return fire(body, blocks)[1]
+        except Infeasible:
+            return [False]
 
     @cached_property
     def effort(self) -> float:
@@ -434,11 +404,12 @@ class RealWidths:
     def __call__(self, cases: DispersedCases) -> Ends:
         """End states of the ``cases``. Raises Infeasible for motions too long to be integrated."""
         count = number_of(cases)
-        watch = watch_of(self.model, cases) if self.model.spacecraft.keep else None
+        watch = watch_over(self.model.spacecraft, cases.tilt, count) if self.model.spacecraft.keep else None
         moments, rates = _whole(cases.moments, count), _whole(cases.omega0, count)
         propellant, bodies = cases.propellant, self._bodies(moments, cases.wheel)
         if self.model.schedule.blocks:
-            settled, turned, _, seen, over = fly(self.model, bodies, rates, _upright(count), cases, self._seen, watch)
+            seen_nominally, upright = self.seen_nominally, _upright(count)
+            settled, turned, _, seen, over = fly(self.model, bodies, rates, upright, cases, seen_nominally, watch)
             if cases.spent is not None:
                 propellant = sum((kg * sees for kg, sees in zip(cases.spent, seen, strict=True)), 0.0)
         else:
@@ -453,8 +424,10 @@ class RealWidths:
         last = bodies if shed is None else bodies.lighter(shed.sum(axis=0))
         if watch is not None:
             watch.turn(batch.MotionStretch(last, over, settled, turned))
-        momentum, (first, second, _) = triple(last.momentum(settled)), last.moments
-        after = carried(tuple(turned), momentum)
+        momentum = triple(last.momentum(settled))
+        after, nutation = carried(tuple(turned), momentum), None
+        if not np.array_equal(last.moments[0], last.moments[1]):
+            nutation = widest_cones(last.moments, settled, self.model.spacecraft.sense, last.forcing.wheel)[0]
         return Ends(
             momentum=momentum,
             before=triple(bodies.momentum(rates)),
@@ -463,14 +436,10 @@ class RealWidths:
             spin=settled[2],
             spin_change=settled[2] - rates[2],
             propellant=propellant,
-            nutation=None if np.array_equal(first, second) else self._largest(last, settled),
+            nutation=nutation,
             aspects=None if watch is None else watch.angles,
             drained=cases.drained,
         )
-
-    def _largest(self, bodies: batch.Bodies, rates: Array) -> Array:
-        """Largest nutation (n,), rad, of the free motion from ``rates`` (3, n)."""
-        return widest_cones(bodies.moments, rates, self.model.spacecraft.sense, bodies.forcing.wheel)[0]
 
     def _bodies(self, moments: Array, wheel: Cases) -> batch.Bodies:
         return batch.Bodies(moments, self._dynamics.constant, self._dynamics.forcing._replace(wheel=wheel))
@@ -490,18 +459,17 @@ class RealWidths:
         for number, (pulse, on_time, start, impulse) in enumerate(
             zip(self.model.schedule, self.model.on_times, starts, impulses, strict=True)
         ):
-            ramps, thrust = None if pulse.command is None else pulse.command.ramps, cases.thrust[number]
-            if ramps is None:
+            thrust = cases.thrust[number]
+            if pulse.command is None:
                 add(start, on_time, impulse, 0.0, number, 1.0)
                 continue
             if not thrust:
-                for ramp in ramps:
+                for ramp in pulse.command.ramps:
                     share, lean = ramp.impulse / pulse.on_time, (ramp.last - ramp.first) / (ramp.last + ramp.first)
                     begin = start + (ramp.begin - (pulse.t - 0.5 * on_time))
                     add(begin, ramp.end - ramp.begin, impulse * share, lean, number, share)
                 continue
-            command = start - cases.leads[number]
-            fall = 0.0 if pulse.command is None else pulse.command.fall  # of the nominal pulse, evenly
+            command, fall = start - cases.leads[number], pulse.command.fall  # of the nominal pulse, evenly
             for thruster in thrust:
                 acts, passed = thruster.opened.acts[0], 0.0
                 for begin, length, level, lean in thruster.opened.pieces:

@@ -1,12 +1,8 @@
 """Statistics of a study: output vectors, percentiles, exact binomial intervals, sensitivities.
 
-First-order sensitivities are analytic: the closed form runs on numbers with an infinitesimal imaginary part
-(complex-step differentiation, Squire & Trapp 1998), which carries each input's derivative through every operation to
-rounding. The shares from the cases are first-order Sobol indices, from the means of the outcome over equally likely
-intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
-
-Distributions are exact while they fit, in constant memory beyond. Results do not depend on the order or portions of
-the cases: exact values have their places, and the sketch only counts.
+First-order sensitivities are those of the closed form on numbers with an infinitesimal imaginary part (complex-step
+differentiation, Squire & Trapp 1998). The shares from the cases are first-order Sobol indices, from the means of the
+outcome over equally likely intervals of each input (the correlation ratio, Pearson 1905): they see curvature too.
 """
 
 from __future__ import annotations
@@ -20,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Triple, parts_of
-from nutdamp.montecarlo.inputs import DispersedInput, mixing
+from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
 
 STEPS = 200
@@ -197,17 +193,7 @@ class Exact:
     """All values, in the order of the cases."""
 
     def __init__(self, values: Array) -> None:
-        self.values = values
-
-    @property
-    def minimum(self) -> float:
-        """Smallest value."""
-        return float(self.values.min())
-
-    @property
-    def maximum(self) -> float:
-        """Largest value."""
-        return float(self.values.max())
+        self.values, self.minimum, self.maximum = values, float(values.min()), float(values.max())
 
     def quantiles(self, probabilities: Array) -> Array:
         """Values not exceeded with these probabilities (n,) from 0 to 1, to the last bit those of `numpy.quantile`."""
@@ -316,13 +302,12 @@ class FirstOrder:
     """Outcome to first order about nominal values (and biases).
 
     ``jacobian`` (10, d): derivative of each row of `nutdamp.montecarlo.statistics.vectors` by each drawn input, in its
-    unit; ``sigmas`` (d,) standard deviations of the inputs. ``mixing`` (d, d), times its transpose, is their
-    correlation; None where they are independent.
+    unit; ``sigmas`` (d,) standard deviations of the inputs, some of which are correlated in ``groups``.
     """
 
     inputs: tuple[DispersedInput, ...]
     jacobian: Array
-    mixing: Array | None = None
+    groups: tuple[Group, ...]
 
     @property
     def sigmas(self) -> Array:
@@ -337,7 +322,7 @@ class FirstOrder:
     def independent(self, output: str) -> Array:
         """Effect of one sigma of each input on that vector, (m, d); of correlated ones beyond those before it."""
         scaled = (self.jacobian * self.sigmas)[VECTORS[output]]
-        return scaled if self.mixing is None else np.asarray(scaled @ self.mixing)
+        return np.asarray(scaled @ mixing(self.inputs, self.groups)) if self.groups else scaled
 
     def sigma(self, output: str) -> float:
         """Root mean square of that vector about its mean, rad (rad/s, kg)."""
@@ -375,42 +360,34 @@ def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> Fi
         apart, size = (np.linalg.norm(vector[rows], axis=0) for vector in (closed - jacobian, jacobian))
         alike = apart <= ALIKE * size
         jacobian[rows, alike] = closed[rows, alike]
-    return FirstOrder(flown.inputs, jacobian, flown.mixing)
+    return FirstOrder(flown.inputs, jacobian, flown.groups)
 
 
 def by_differences(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:
     """Derivatives by central differences of the model that ``fly`` flies: for blocks fired by Sun pulses."""
-    inputs = model.inputs.drawn
-    steps = np.array([SHARE * abs(entry.size) for entry in inputs])
-    draws: dict[str, Array | float] = {}
-    for index, entry in enumerate(inputs):
-        draw = np.full(2 * len(inputs), entry.size if entry.kind == "bias" else 0.0)
-        draw[2 * index : 2 * index + 2] += steps[index], -steps[index]
-        draws[entry.name] = draw
-    out = np.empty((ROWS, 2 * len(inputs)))
-    if inputs:
-        vectors(model, fly(model.cases(draws)), out)
-    return FirstOrder(inputs, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, _mixing(model))
+    steps = np.array([SHARE * abs(entry.size) for entry in model.inputs.drawn])
+    out = _varied(model, fly, np.stack([steps, -steps], axis=1))
+    return FirstOrder(model.inputs.drawn, 0.5 * (out[:, ::2] - out[:, 1::2]) / steps, model.groups)
 
 
 def first_order(model: DispersedModel) -> FirstOrder:
     """Derivatives of the outcome by every drawn input, by the closed form of ``model``."""
-    inputs = model.inputs.drawn
-    jacobian = np.zeros((ROWS, len(inputs)))
-    if inputs:
-        steps = np.array([STEP * abs(entry.size) for entry in inputs])
-        draws: dict[str, NDArray[np.complex128]] = {}
-        for index, entry in enumerate(inputs):
-            draws[entry.name] = np.full(len(inputs), entry.size if entry.kind == "bias" else 0.0, dtype=complex)
-            draws[entry.name][index] += 1j * steps[index]
-        out = np.empty((ROWS, len(inputs)), dtype=complex)
-        vectors(model, ClosedForm(model)(model.cases(draws)), out)  # type: ignore[arg-type]
-        jacobian = out.imag / steps
-    return FirstOrder(inputs, jacobian, _mixing(model))
+    steps = np.array([STEP * abs(entry.size) for entry in model.inputs.drawn])
+    out = _varied(model, ClosedForm(model), 1j * steps[:, None])
+    return FirstOrder(model.inputs.drawn, out.imag / steps, model.groups)
 
 
-def _mixing(model: DispersedModel) -> Array | None:
-    return mixing(model.inputs.drawn, model.groups) if model.groups else None
+def _varied(model: DispersedModel, fly: Callable[[DispersedCases], Ends], steps: NDArray[Any]) -> NDArray[Any]:
+    """Outcome (10, d k) about nominal values (and biases), with each input off by its ``steps`` (d, k) in turn."""
+    draws: dict[str, NDArray[Any]] = {}
+    for index, entry in enumerate(model.inputs.drawn):
+        draw = np.full(steps.shape, entry.size if entry.kind == "bias" else 0.0, dtype=steps.dtype)
+        draw[index] += steps[index]
+        draws[entry.name] = draw.ravel()
+    out = np.empty((ROWS, steps.size), dtype=steps.dtype)
+    if draws:
+        vectors(model, fly(model.cases(draws)), out)
+    return out
 
 
 def sampled_shares(draws: Mapping[str, Array], outcome: Array) -> dict[str, dict[str, float]]:

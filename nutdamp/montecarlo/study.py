@@ -10,7 +10,7 @@ import math
 import os
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +25,7 @@ from nutdamp.flight.dynamics import shed
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import Flight
 from nutdamp.montecarlo.cases import DispersedModel, cones_used
-from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent
+from nutdamp.montecarlo.inputs import BLOCK, Draws, DrawSource, independent, some_of
 from nutdamp.montecarlo.propagated import Ends, RealWidths
 from nutdamp.montecarlo.statistics import (
     EXACT_CASES,
@@ -71,9 +71,8 @@ class Round:
         self.aspects = out[len(OUTPUTS) :].reshape(-1, 2, last - first)  # the same memory
         self.emptied = np.zeros(last - first, dtype=bool)
         self.portions = range(first // PORTION, math.ceil(last / PORTION))
-        self.taken = 0
-        self.finished = 0
-        self.redrawn = 0
+        self.left = iter(self.portions)
+        self.finished = self.redrawn = 0
         self.failures: list[BaseException] = []
         self.lock = threading.Lock()
 
@@ -91,7 +90,7 @@ class Round:
                     if worker.is_alive():
                         watch(max(self._flown, self.first))
         except BaseException:
-            self.taken = len(self.portions)  # nothing more is begun
+            self.left = iter(())  # nothing more is begun
             raise
         if self.failures:
             raise self.failures[0]
@@ -104,17 +103,14 @@ class Round:
 
     def _work(self, stopped: Callable[[], bool]) -> None:
         try:
-            source = self.results.study.source()
-            drawn, block = None, -1
+            source, block = self.results.study.source(), -1
             while not stopped():
                 with self.lock:
-                    if self.taken >= len(self.portions):
-                        return
-                    portion = self.portions[self.taken]
-                    self.taken += 1
-                begin = max(self.first, portion * PORTION)
-                end = min(self.last, (portion + 1) * PORTION)
-                if drawn is None or begin // BLOCK != block:
+                    portion = next(self.left, None)
+                if portion is None:
+                    return
+                begin, end = max(self.first, portion * PORTION), min(self.last, (portion + 1) * PORTION)
+                if begin // BLOCK != block:
                     block = begin // BLOCK
                     drawn = source.block(block)
                 redrawn = self._fly(drawn, block * BLOCK, begin, end)
@@ -124,7 +120,7 @@ class Round:
         except BaseException as failure:  # handed to the thread that waits
             with self.lock:
                 self.failures.append(failure)
-                self.taken = len(self.portions)
+                self.left = iter(())
 
     def _fly(self, drawn: tuple[Draws, NDArray[np.intp]], start: int, begin: int, end: int) -> int:
         """Fly cases ``begin`` to ``end`` of the block that starts at ``start``; returns the number of redraws."""
@@ -133,7 +129,7 @@ class Round:
         # Whole strides are flown, even for fewer cases: what flies them may let one depend on its stride.
         low, high = begin - begin % STRIDE, end + -end % STRIDE
         rows = slice(low - start, high - start)
-        ends = study.flies(study.model.cases({n: d if isinstance(d, float) else d[rows] for n, d in draws.items()}))
+        ends = study.flies(study.model.cases(some_of(draws, rows)))
         inner = slice(begin - low, end - low)
         outputs = np.empty((len(OUTPUTS), high - low))
         measure(study.model, ends, outputs)
@@ -168,21 +164,42 @@ CONFIDENCE = 0.95
 WORTH_SAYING = math.radians(1e-4)
 """rad by which cases of falling moments must err for that to be said."""
 
-Collect = Callable[[int, Array], None]
-"""Takes the number (from 0) of the first of some cases, and `Results.values` (5 + 2m, n) of them, in order."""
-
 
 def threads_here() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """Study: cases of ``model`` drawn from ``seed``.
+class DrawnCases:
+    """Cases of a ``model`` drawn from a ``seed``. They count from 0 here; people see them count from 1."""
 
-    Cases count from 0 here; people see them count from 1.
-    """
+    model: Any
+    seed: int
+
+    def source(self) -> DrawSource:
+        """Draws for one thread."""
+        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
+
+    def draws_of(self, case: int) -> dict[str, float]:
+        """Deviations of one case (from 0), by input."""
+        draws, _ = self.source().block(case // BLOCK)
+        return {name: float(draw) for name, draw in some_of(draws, case % BLOCK).items()}
+
+    def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
+        """Deviations of ``cases`` (from 0, ascending), by input."""
+        source, blocks, parts = self.source(), cases // BLOCK, list[dict[str, Any]]()
+        for block in np.unique(blocks).tolist():
+            draws, _ = source.block(block)
+            parts.append(some_of(draws, cases[blocks == block] % BLOCK))
+        return {
+            name: draw if isinstance(draw, float) else np.concatenate([part[name] for part in parts])
+            for name, draw in parts[0].items()
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Study(DrawnCases):
+    """Study: cases of ``model`` drawn from ``seed``."""
 
     model: DispersedModel
     seed: int = 1
@@ -196,28 +213,6 @@ class Study:
     def first_order(self) -> FirstOrder:
         """Sensitivities of the flight."""
         return as_flown(self.model, self.flies)
-
-    def source(self) -> DrawSource:
-        """Draws for one thread."""
-        return DrawSource(self.model.inputs.drawn, self.seed, self.model.physical, self.model.groups)
-
-    def draws_of(self, case: int) -> dict[str, float]:
-        """Deviations of one case (from 0), by input."""
-        draws, _ = self.source().block(case // BLOCK)
-        return {name: float(draw if isinstance(draw, float) else draw[case % BLOCK]) for name, draw in draws.items()}
-
-    def draws_of_all(self, cases: NDArray[np.intp]) -> dict[str, Array | float]:
-        """Deviations of ``cases`` (from 0, ascending), by input."""
-        source, parts = self.source(), list[dict[str, Array | float]]()
-        blocks = cases // BLOCK
-        for block in np.unique(blocks).tolist():
-            rows = cases[blocks == block] % BLOCK
-            draws, _ = source.block(block)
-            parts.append({name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()})
-        return {
-            name: draw if isinstance(draw, float) else np.concatenate([part[name] for part in parts])
-            for name, draw in parts[0].items()
-        }
 
     def ends_of(self, draws: Draws) -> Ends:
         """End state of one case with these deviations; none: of the estimate itself."""
@@ -250,11 +245,6 @@ class Study:
         shares = [*([] if ends.aspects is None else cones_used(body.keep, ends.aspects)), ends.drained]
         return np.asarray(requirements.severity(body, Left(values[0], values[aim], ends.spin), shares))
 
-    def aspects_of(self, draws: Draws) -> Array | None:
-        """Least and largest angle (m, 2) rad from the axis to each cone's direction in one case; None without cones."""
-        aspects = self.ends_of(draws).aspects
-        return None if aspects is None else aspects[:, :, 0]
-
     @property
     def lightening_error(self) -> str:
         """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
@@ -277,13 +267,36 @@ class Study:
         )
 
 
+@dataclass(eq=False)
 class Counted:
-    """Number ``met`` of the ``done`` cases of a ``study`` that comply; ``requested`` are to be flown."""
+    """Results of a study so far: the cases from 0 to ``done`` of the ``requested``, of which ``met`` comply.
+
+    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
+    from the spin axis to its direction in all cases.
+    """
 
     study: Any
     requested: int
-    done: int
-    met: int
+    done: int = 0
+    redrawn: int = 0
+    met: int = 0
+    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
+    broken: NDArray[np.int64] = field(init=False)
+    aspects: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        cones = len(self.study.model.spacecraft.keep)
+        self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
+
+    def count(self, severity: Array, angles: Array, good: NDArray[np.bool_]) -> None:
+        """Count cases from ``done`` on: their `Study.severity` (n,), ``angles`` (m, 2, n) to cones, who may comply."""
+        broken = cones_used(self.study.model.spacecraft.keep, angles) > 1.0
+        self.met += int(np.count_nonzero(good & ~broken.any(axis=0)))
+        self.broken += broken.sum(axis=1)
+        self.aspects[:, 0] = np.minimum(self.aspects[:, 0], angles[:, 0].min(axis=1))
+        self.aspects[:, 1] = np.maximum(self.aspects[:, 1], angles[:, 1].max(axis=1))
+        self.worst.add(self.done, severity)
+        self.done += len(severity)
 
     @property
     def met_fraction(self) -> float | None:
@@ -293,11 +306,7 @@ class Counted:
     @property
     def interval(self) -> tuple[float, float]:
         """Exact interval about `met_fraction`."""
-        return self.interval_about(self.met)
-
-    def interval_about(self, count: int, of: int | None = None) -> tuple[float, float]:
-        """Exact interval about the share of ``count`` of the cases, or of ``of`` of them."""
-        return binomial_interval(count, self.done if of is None else of, CONFIDENCE)
+        return binomial_interval(self.met, self.done, CONFIDENCE)
 
     @property
     def probability(self) -> float:
@@ -313,30 +322,21 @@ class Counted:
 
 @dataclass(eq=False)
 class Results(Counted):
-    """Results of a study so far: the cases from 0 to ``done``.
+    """Results of a study of a schedule.
 
     ``values`` (5 + 2m, capacity), outputs and the least and largest angle (rad) to the direction of each of m cones,
     are kept up to `EXACT_CASES`; beyond, ``sketches`` count. ``early`` (10, `EARLY`) is the outcome of the first cases.
-    By cone, (m,): ``broken`` counts the cases that break it, ``aspects`` (m, 2) rad are the least and the largest angle
-    in all cases. ``emptied`` counts those whose tank runs empty.
+    ``emptied`` counts those whose tank runs empty.
     """
 
     study: Study
-    requested: int
-    done: int = 0
-    redrawn: int = 0
-    met: int = 0
     emptied: int = 0
-    worst: Worst = field(default_factory=lambda: Worst(KEPT_WORST))
     early: Array = field(default_factory=lambda: np.zeros((ROWS, EARLY)))
     values: Array | None = field(init=False)
     sketches: list[Sketch] | None = field(init=False)
-    broken: NDArray[np.int64] = field(init=False)
-    aspects: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        cones = len(self.study.model.spacecraft.keep)
-        self.broken, self.aspects = np.zeros(cones, dtype=np.int64), np.tile([math.pi, 0.0], (cones, 1))
+        super().__post_init__()
         exact = self.requested <= EXACT_CASES
         self.values = np.empty((self.rows, self.requested)) if exact else None
         self.sketches = None if exact else [Sketch() for _ in OUTPUTS]
@@ -364,40 +364,22 @@ class Results(Counted):
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
         """`sampled_shares` of the first cases, of correlated inputs like `FirstOrder.shares`; call it at the end."""
-        count = min(self.done, EARLY)
-        model, source = self.study.model, self.study.source()
-        rows: dict[str, list[Array]] = {entry.name: [] for entry in model.inputs.drawn if entry.kind != "bias"}
-        for block in range(math.ceil(count / BLOCK)):
-            draws, _ = source.block(block)
-            for name, parts in rows.items():
-                parts.append(np.array(draws[name][: count - block * BLOCK]))  # type: ignore[index]
-        drawn = {name: np.concatenate(parts) for name, parts in rows.items()}
+        count, model = min(self.done, EARLY), self.study.model
+        draws = self.study.draws_of_all(np.arange(count))
+        drawn = {name: draw for name, draw in draws.items() if not isinstance(draw, float)}  # not of a bias
         return sampled_shares(independent(drawn, model.inputs.drawn, model.groups), self.early[:, :count])
 
-    def take(
-        self, first: int, values: Array, severity: Array, aspects: Array, emptied: NDArray[np.bool_] | None = None
-    ) -> None:
-        """Count the cases from ``first`` on: outputs (5, n), `Study.severity` (n,), ``aspects`` (m, 2, n) of cones.
-
-        ``emptied`` (n,): whose tank runs empty; None for none.
-        """
-        broken = cones_used(self.study.model.spacecraft.keep, aspects) > 1.0
+    def take(self, values: Array, severity: Array, angles: Array, emptied: NDArray[np.bool_]) -> None:
+        """Count further cases: outputs (5, n), see `count`; ``emptied`` (n,): whose tank runs empty."""
         missed = (severity > 1.0) & bool(requirements.required(self.study.model.spacecraft))
-        emptied = np.zeros(len(severity), dtype=bool) if emptied is None else emptied
-        self.met += int(np.count_nonzero(~(broken.any(axis=0) | missed | emptied)))
         self.emptied += int(np.count_nonzero(emptied))
-        self.broken += broken.sum(axis=1)
-        self.aspects[:, 0] = np.minimum(self.aspects[:, 0], aspects[:, 0].min(axis=1))
-        self.aspects[:, 1] = np.maximum(self.aspects[:, 1], aspects[:, 1].max(axis=1))
-        self.worst.add(first, severity)
         for sketch, row in zip(self.sketches or (), values, strict=False):
             sketch.add(row)
-        self.done = first + values.shape[1]
+        self.count(severity, angles, ~(missed | emptied))
 
     def extended(self, requested: int) -> Results:
         """Copy with room for ``requested`` cases: no fewer than are done, and no more than `EXACT_CASES`."""
-        done = self.done, self.redrawn, self.met, self.emptied, self.worst
-        more = Results(self.study, requested, *done, self.early)
+        more = replace(self, requested=requested)
         more.broken, more.aspects = self.broken, self.aspects
         assert self.values is not None
         assert more.values is not None
@@ -411,12 +393,13 @@ def run(
     threads: int = 1,
     watch: Callable[[int], None] = lambda _: None,
     stopped: Callable[[], bool] = lambda: False,
-    collect: Collect | None = None,
+    collect: Callable[[int, Array], None] | None = None,
 ) -> Results:
     """Fly the cases that ``results`` is to have and does not have yet; returns ``results``.
 
     ``watch`` is called now and then with how many are done. When ``stopped`` says so, the cases done so far, always
-    the first ones, are kept. ``collect`` is given their outputs in order.
+    the first ones, are kept. ``collect`` is given the number (from 0) of the first of some cases, and their
+    `Results.values`, in order.
     """
     # The C library keeps freed memory up to twice the largest block freed so far: else each stride asks for new pages.
     np.empty(FREED, dtype=np.uint8)
@@ -429,9 +412,7 @@ def run(
         if done == 0:
             break
         results.redrawn += redrawn
-        results.take(
-            first, out[:, :done], flights.severity[:done], flights.aspects[:, :, :done], flights.emptied[:done]
-        )
+        results.take(out[:, :done], flights.severity[:done], flights.aspects[:, :, :done], flights.emptied[:done])
         if collect is not None:
             collect(first, out[:, :done])
         watch(results.done)

@@ -325,12 +325,12 @@ def _emptied(results: Results) -> Iterator[Text]:
 
 def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, Any]:
     """One case (from 0): the true value of each input, in SI, and the outputs."""
-    outputs, angles = study.outputs_of(draws).tolist(), study.aspects_of(draws)
+    outputs, aspects = study.outputs_of(draws).tolist(), study.ends_of(draws).aspects
     return {
         "case": case + 1,
         "inputs": {entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn},
         **{column: shown(column, value) for column, value in zip(OUTPUT_COLUMNS, outputs, strict=True)},
-        **({} if angles is None else angles_json(study.model.spacecraft, angles)),
+        **({} if aspects is None else angles_json(study.model.spacecraft, aspects[:, :, 0])),
     }
 
 

@@ -105,7 +105,7 @@ MARGINS = (
            "screen"),
     Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
     Column("damps", "", "", lambda row: row.damps, where="json", kind=YES_NO),
-    Column("reversed", "", "", lambda row: row.cause.turned, where="json", kind=YES_NO),
+    Column("reversed", "", "", lambda row: row.turned, where="json", kind=YES_NO),
 )  # fmt: skip
 
 
@@ -200,7 +200,7 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
     if loop is None:
         return
     per_channel = margins(spacecraft, loop)
-    turned = [margin.channel for margin in per_channel if margin.cause.turned]
+    turned = [margin.channel for margin in per_channel if margin.turned]
     if turned and len(turned) == len(per_channel) and loop.sensor.scale < 0.0:
         scale = f"loop.sensor.scale = {100.0 * loop.sensor.scale:g} %"
         yield f"{scale} is a reversed sensor: every firing feeds the nutation"
@@ -238,7 +238,7 @@ def _settled(run: LoopRun) -> str:
 def verification_screen(verification: LoopVerification) -> RenderableType:
     """The loop beside the same by DOP853."""
     run, other = verification.run, verification.other
-    parts = [*opening(run.spacecraft, verbose=True), Text(described(run.loop), style="bold"), Text()]
+    parts = [*opening(run.flight.spacecraft, verbose=True), Text(described(run.loop), style="bold"), Text()]
     if other is None:
         return Group(*parts, Text(f"NOT CONFIRMED by DOP853, full tensor: {verification.missing}."))
     result = f"DOP853 on the full tensor, {verification.evaluations:,} evaluations, fires "
@@ -289,7 +289,7 @@ def verified_json(verification: LoopVerification) -> dict[str, Any]:
     """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
     run = verification.run
     return {
-        **heading(run.spacecraft),
+        **heading(run.flight.spacecraft),
         "scheme": "loop",
         "agree": None if verification.missing else verification.agree,
         "missing": verification.missing or None,

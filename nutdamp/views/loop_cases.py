@@ -19,7 +19,7 @@ from nutdamp.control_loop.law import Ending
 from nutdamp.control_loop.simulation import FlownLoops
 from nutdamp.files.export import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
-from nutdamp.montecarlo.statistics import Array, Exact
+from nutdamp.montecarlo.statistics import Array, Exact, binomial_interval
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions
@@ -204,10 +204,10 @@ def _numbers(output: LoopOutput, values: Iterable[float], largest: float) -> lis
     return [MISSING if math.isnan(value) else text for value, text in zip(scaled, texts, strict=True)]
 
 
-def _share(results: LoopResults, count: int, of: int) -> str:
+def _share(count: int, of: int) -> str:
     if not of:
         return "no case"
-    low, high = results.interval_about(count, of)
+    low, high = binomial_interval(count, of, CONFIDENCE)
     share, least, most = (decisions.percent(fraction, 0.99) for fraction in (count / of, low, high))
     return f"{share} of cases (95 % interval {least} to {most})"
 
@@ -215,7 +215,7 @@ def _share(results: LoopResults, count: int, of: int) -> str:
 def _settled(results: LoopResults) -> Iterator[RenderableType]:
     stopped = [(stop, count) for stop, count in results.stops.most_common() if stop is not Ending.END]
     lasting = "and is not stopped, " if stopped else ""
-    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results, results.settled, results.done)}.")
+    yield Text.assemble(("Falls quiet ", "bold"), f"{lasting}in {_share(results.settled, results.done)}.")
     parts = [f"stopped in {count:,}: {stop.value}" for stop, count in stopped]
     never = results.done - results.settled - sum(count for _, count in stopped)
     if never:
@@ -228,7 +228,7 @@ def _settled(results: LoopResults) -> Iterator[RenderableType]:
 
 def _dead_band(results: LoopResults) -> Text:
     expected = degrees(results.study.band.most)
-    share = _share(results, results.within, len(results.of("quiet")))
+    share = _share(results.within, len(results.of("quiet")))
     return Text.assemble(("Dead band ", "bold"), f"(at most {expected}, from the nominal sensor): kept in {share}.")
 
 
@@ -295,11 +295,11 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
             output.key: percentiles_json(output.key, nominal, results.distribution(output.name))
             for output, nominal in zip(SHOWN_OUTPUTS, study.nominal.tolist(), strict=True)
         },
-        "settled": _fraction(results, results.settled, results.done),
+        "settled": _fraction(results.settled, results.done),
         "never_started": results.idle,
         "dead_band": {
             "expected_deg": math.degrees(study.band.most),
-            **_fraction(results, results.within, len(results.of("quiet"))),
+            **_fraction(results.within, len(results.of("quiet"))),
         },
         "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
         "requirement": requirement_of(results),
@@ -325,8 +325,8 @@ def _case_json(study: LoopStudy, row: LoopCaseRow) -> dict[str, Any]:
     return {"case": row.case + 1, "inputs": inputs, **outputs, **angles_json(study.spacecraft, row.angles)}
 
 
-def _fraction(results: LoopResults, count: int, of: int) -> dict[str, float | None]:
-    low, high = results.interval_about(count, of) if of else (None, None)
+def _fraction(count: int, of: int) -> dict[str, float | None]:
+    low, high = binomial_interval(count, of, CONFIDENCE) if of else (None, None)
     return {"fraction": count / of if of else None, "low": low, "high": high, "confidence": CONFIDENCE}
 
 
@@ -343,11 +343,11 @@ class LoopCasesWriter:
 
     def write(self, first: int, values: Array, stops: list[Ending], angles: Array) -> None:
         """Write the cases from ``first`` (from 0) on, with their outputs (8, n) and ``angles`` (m, 2, n) rad."""
-        drawn = self._study.draws_from(first, len(stops))
+        drawn = self._study.draws_of_all(np.arange(first, first + len(stops)))
         rows = [
             LoopCaseRow(
                 first + row,
-                {name: float(np.asarray(draws)[row]) for name, draws in drawn.items()},
+                {name: draw if isinstance(draw, float) else float(draw[row]) for name, draw in drawn.items()},
                 values[:, row].tolist(),
                 stop,
                 angles[..., row],

@@ -28,10 +28,11 @@ def timed(model: DispersedModel, cases: DispersedCases) -> DispersedCases:
     moments, rates = (np.array([np.broadcast_to(part, count) for part in of]) for of in (cases.moments, cases.omega0))
     upright = np.tile([[1.0], [0.0], [0.0], [0.0]], count)
     bodies = batch.Bodies(moments, dynamics.constant, dynamics.forcing._replace(wheel=cases.wheel))
-    fired = propagated.fly(model, bodies, rates, upright, cases, propagated.seen_nominally(model))
-    pulses = zip(cases.impulses, fired.seen, strict=True)
+    nominal = propagated.RealWidths(model).seen_nominally
+    _, _, starts, fires, _ = propagated.fly(model, bodies, rates, upright, cases, nominal)
+    pulses = zip(cases.impulses, fires, strict=True)
     impulses = tuple(triple(part * seen for part in impulse) for impulse, seen in pulses)
-    return replace(cases, starts=tuple(fired.starts), impulses=impulses)
+    return replace(cases, starts=tuple(starts), impulses=impulses)
 
 
 def realised(model: DispersedModel, draws: Draws) -> tuple[Spacecraft, Schedule]:

@@ -177,7 +177,7 @@ def test_what_is_seen_is_what_the_estimator_makes_of_samples(sensor: Sensor, pre
     seen = transfer(law, body.spin)
     times = np.asarray(np.arange(400) * seen.step, dtype=np.float64)
     rates = fly(body, loop(sensor, 80.0), float(times[-1])).flight.motion(times)[0]
-    estimator, shown = Estimator(law, sensor, 0.0), Signal(body, sensor, 1).shown(rates)
+    estimator, shown = Estimator(law, sensor, 0.0), Signal(body, sensor, (1,)).shown(rates)
     true = rates[:, 0] + 1j * rates[:, 1]
     board = estimator.on_board(estimator.feed(times, shown, rates[:, 2]), rates[:, 2])
     first = int(np.argmax(~np.isnan(board)))
@@ -191,7 +191,7 @@ def test_noise_is_what_the_estimator_makes_of_noise(sensor: Sensor) -> None:
     law, spin = Law(body, loop(sensor)), np.full(len(numbers), body.spin)
     seen, estimator = transfer(law, body.spin), Estimator(law, sensor, 0.0)
     still = np.zeros((len(numbers), 1 if sensor.kind == "accelerometer" else 2))
-    values = Signal(body, sensor, 1).sampled(numbers, still)
+    values = Signal(body, sensor, (1,)).sampled(numbers, still)
     estimated = estimator.on_board(estimator.feed(np.asarray(numbers * seen.step), values, spin), spin)[200:]
     drawn = seen.noise(seen.drawn(np.random.default_rng(2), 1, len(numbers) + len(seen.weights)))[0]
     turn = np.exp(1j * float(law.rate(body.spin)) * seen.step)
@@ -201,8 +201,8 @@ def test_noise_is_what_the_estimator_makes_of_noise(sensor: Sensor) -> None:
         assert 1.0 - lasting.real == pytest.approx(seen.fresh, rel=0.1)
     size = math.sqrt(float((np.abs(estimated) ** 2).mean()))
     # Of an accelerometer it counts the axis in which the sensor shows least.
-    least = 0.95 * estimator.doubt if sensor.kind == "gyro" else 0.0
-    assert least < size < 1.05 * estimator.doubt
+    least = 0.95 * estimator.doubts.noise if sensor.kind == "gyro" else 0.0
+    assert least < size < 1.05 * estimator.doubts.noise
 
 
 @pytest.mark.parametrize(("sigma", "offset"), [deep(0.05, 0j), (0.3, 0j), (0.05, 0.2 + 0.1j)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,11 @@ from support.builders import spinner
 from support.cases import deep, spread
 from support.loops import FOUR, around, fired_by, fires, rad
 
+from nutdamp.control_loop.controller import Case, Scatter
 from nutdamp.control_loop.law import Ending, Law
 from nutdamp.control_loop.sensor import Estimator, gain
-from nutdamp.control_loop.simulation import Case, LoopRun, expects_alone, fly, fly_together
-from nutdamp.control_loop.stability import Cause, Margin, feeding
+from nutdamp.control_loop.simulation import Fleet, LoopRun, expects_alone, fly
+from nutdamp.control_loop.stability import Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
 from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
@@ -171,15 +172,14 @@ def test_random_loops_are_accused_of_what_is_wrong_with_them_and_of_nothing_else
 
 
 def test_rounding_is_no_share_that_a_firing_leaves() -> None:
-    margin = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, Cause(sensor=False, backwards=False))
+    margin = Margin("+M1", 0.01, 0.0, 1.0, 2.22e-16, 1.0, 0.4, turned=False)
     assert margin_table((margin,)).cells("screen")[0][2] == "0"
 
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass
-class Off:
+class Off(Scatter):
     """Every other firing a little weaker and late."""
 
     def of(self, number: int) -> tuple[float, float]:
@@ -236,7 +236,7 @@ def truths(rng: np.random.Generator, craft: Spacecraft, loop: Loop, count: int) 
             channels=channels,
             loop=replace(loop, sensor=sensor, reversed=(channels[0].name,) if number == 0 else ()),
         )
-        cases.append(Case(truth, (11, number + 1), Off() if number % 2 else None))
+        cases.append(Case(truth, (11, number + 1), Off((), None, None) if number % 2 else None))
     return cases
 
 
@@ -254,7 +254,7 @@ def test_loops_flown_together_fire_as_each_alone(seed: int, law: str) -> None:
     known, until = Law(craft, loop), 30.0 * craft.body_period
     cases = truths(rng, craft, loop, 6)
     assert not expects_alone(known, craft)
-    together = fly_together(known, cases, until)
+    together = Fleet(known, cases, until).fly()
     for row, (case, pilot) in enumerate(zip(cases, together.pilots, strict=True)):
         assert case.truth.loop is not None
         run = fly(case.truth, case.truth.loop, until, seed=case.key, law=known, scatter=case.scatter)
@@ -282,9 +282,9 @@ def test_a_case_does_not_depend_on_those_beside_it(monkeypatch: pytest.MonkeyPat
     craft, loop = random_loop(rng, FOUR_PULSE)
     craft = replace(craft, dissipation=200.0)
     known, cases = Law(craft, loop), truths(rng, craft, loop, 9)
-    whole = fly_together(known, cases, 40.0)
+    whole = Fleet(known, cases, 40.0).fly()
     monkeypatch.setattr("nutdamp.control_loop.simulation.TOGETHER", 100)
-    parts, alone = fly_together(known, cases, 40.0), fly_together(known, cases[7:8], 40.0)
+    parts, alone = Fleet(known, cases, 40.0).fly(), Fleet(known, cases[7:8], 40.0).fly()
     assert np.abs(whole.rates - parts.rates).max() < 1e-12
     assert np.abs(whole.rates[:, 7] - alone.rates[:, 0]).max() < 1e-12
     assert len(whole.pilots[7].fired) == len(alone.pilots[0].fired) > 2
@@ -305,6 +305,6 @@ def test_a_loop_without_end_is_over_and_the_others_go_on(monkeypatch: pytest.Mon
     monkeypatch.setattr("nutdamp.control_loop.controller.MOST_FIRINGS", 3)
     craft, loop = fired_by(3.0, FOUR[:2]), fires(Sensor(rate=20.0), 0.57, 0.29, on_time=0.2)
     still = replace(craft, omega0=np.array([0.021, 0.0, 3.0]))
-    fleet = fly_together(Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0)
+    fleet = Fleet(Law(craft, loop), [Case(replace(each, loop=loop), (1,)) for each in (craft, still)], 60.0).fly()
     assert [len(pilot.fired) for pilot in fleet.pilots] == [3, 2]
     assert [pilot.ending[0] for pilot in fleet.pilots] == [Ending.FULL, Ending.END]

@@ -121,9 +121,8 @@ def test_torques_are_those_of_a_dispersed_schedule() -> None:
 def test_what_a_loop_draws_is_correlated_as_the_file_says() -> None:
     scaled = replace(ALL, sensor_scale=relative(0.05, "uniform"))
     pairs = (("A", "C", 0.9), ("sensor scale 1", "sensor scale 2", 0.7))
-    draws, plain = (
-        loop_study(craft(dispersions=replace(scaled, correlation=some))).draws_from(0, 4_000) for some in (pairs, ())
-    )
+    studies = (loop_study(craft(dispersions=replace(scaled, correlation=some))) for some in (pairs, ()))
+    draws, plain = (study.draws_of_all(np.arange(4_000)) for study in studies)
     assert np.corrcoef(draws["A"], draws["C"])[0, 1] == pytest.approx(0.9, abs=0.02)
     measured = np.corrcoef(draws["sensor scale 1"], draws["sensor scale 2"])[0, 1]
     assert measured == pytest.approx(6.0 / math.pi * math.asin(0.35), abs=0.03)
@@ -212,7 +211,7 @@ def test_a_loop_whose_tank_is_empty_fires_no_more_and_does_not_comply() -> None:
     assert 12 < empty < 28
     assert results.met == results.settled == 40 - empty
     used = output(results, "propellant")
-    tanks = np.broadcast_to(needs + results.study.draws_from(0, 40)["tank propellant"], 40)
+    tanks = np.broadcast_to(needs + results.study.draws_of_all(np.arange(40))["tank propellant"], 40)
     assert used[results.lost] == pytest.approx(tanks[results.lost], rel=1e-9)
     assert np.all(used <= tanks)
 

@@ -191,7 +191,7 @@ def test_faults_are_named_by_the_static_check() -> None:
     craft, reverse = fired_by(), Sensor(scale=-1.0)
 
     def turned(sensor: Sensor | None, *wrong: str) -> set[str]:
-        return {each.channel for each in margins(craft, fires(sensor, reversed=wrong)) if each.cause.turned}
+        return {each.channel for each in margins(craft, fires(sensor, reversed=wrong)) if each.turned}
 
     assert turned(None, "+M2") == {"+M2"}
     assert turned(reverse) == {each.name for each in FOUR}

@@ -17,7 +17,7 @@ from support.dispersed import normal
 
 import nutdamp
 from nutdamp.montecarlo.cases import DispersedModel
-from nutdamp.montecarlo.inputs import DispersedInput
+from nutdamp.montecarlo.inputs import DispersedInput, mixing
 from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.statistics import by_differences
 from nutdamp.montecarlo.study import Results, run, study_of
@@ -92,8 +92,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     one_each = Schedule(tuple(channel_pulse(one, 100.0 * at, 0.02) for at, one in enumerate(body.channels, start=1)))
     known = [one.name for one in DispersedModel(body, one_each).inputs.drawn]
     kernel = study_of(body, made).first_order
-    expected = kernel.jacobian * kernel.sigmas
-    expected = expected if kernel.mixing is None else expected @ kernel.mixing
+    expected = kernel.jacobian * kernel.sigmas @ mixing(kernel.inputs, kernel.groups)
     spins = body.inertia.C * abs(body.spin)
     for kind, rows, size in ((0, slice(0, 2), spins), (1, slice(2, 4), float(np.linalg.norm(body.momentum)))):
         shared, _, own = search.chance.model.spread(kind, columns, columns.width)
