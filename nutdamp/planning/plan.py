@@ -245,7 +245,7 @@ class Plan(results.Data, results.Tabled):
         if self.schedule is None:
             raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
         end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
-        count = units.rows(samples)
+        count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown
         return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
 
