@@ -53,17 +53,11 @@ def load(
 ) -> Spacecraft:
     """Load the spacecraft in a file (YAML or JSON), or in a dict of the keys of such a file.
 
-    Parameters
-    ----------
-    path
-        Name of the file, or a dict: numbers in SI, texts with a unit.
-    set
-        Keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
+    ``path``: name of the file, or a dict: numbers in SI, texts with a unit.
+    ``set``: keys of the file to change, as ``--set`` does: ``{"limits.horizon": "300 s", "thrusters.T1.force": 12.0}``.
 
     Raises CannotRead, or FaultyFile with everything wrong: in a dict, lines count in its JSON.
 
-    Examples
-    --------
     >>> nutdamp.load({"name": "Top", "inertia": {"A": 120, "C": "80 kg m^2"}, "omega0": [0.1, 0, 3]})
     <Spacecraft Top: prolate, a = 0.3333, nutation 2.862 deg>
     """
@@ -75,8 +69,6 @@ def load(
 def read(text: str, name: str = "text") -> Spacecraft:
     """Read the spacecraft in the ``text`` of a file; raises FaultyFile, whose faults call the file ``name``.
 
-    Examples
-    --------
     >>> nutdamp.read("{name: Top, inertia: {A: 120, C: 80}, omega0: [0, 0, 3]}").nutation
     0.0
     """
@@ -89,8 +81,6 @@ def read(text: str, name: str = "text") -> Spacecraft:
 def example(name: str = "example") -> Spacecraft:
     """Load the built-in example, or the one of that ``name`` among those of ``nutdamp init --list``.
 
-    Examples
-    --------
     >>> nutdamp.example("ace").name
     'ACE'
     """
@@ -103,8 +93,6 @@ def example(name: str = "example") -> Spacecraft:
 def check(path: PathName | Mapping[str, object]) -> CheckedFile:
     """Check a spacecraft file, as ``nutdamp check`` does; raises CannotRead, and FaultyFile with everything wrong.
 
-    Examples
-    --------
     >>> nutdamp.check({"name": "Top", "inertia": {"A": 120, "C": 80}, "omega0": [0, 0, 3]}).to_dict()["valid"]
     True
     """
@@ -123,17 +111,11 @@ def _expected(spacecraft: Spacecraft) -> Spacecraft:
 def plan(spacecraft: Spacecraft, scheme: str | None = None, options: Choice = None, **chosen: Any) -> Plan:
     """Plan one scheme, or the recommended one, and judge it by flying it; an infeasible plan says why.
 
-    Parameters
-    ----------
-    spacecraft
-        Of `load`, `read` or `example`.
-    scheme
-        Name of a scheme; without it that which `compare` recommends. Raises Infeasible where there is none.
-    options, chosen
-        `Options` of several schemes or those of one, or their fields by keyword, in SI: ``on_time=0.2`` (s).
+    ``spacecraft``: of `load`, `read` or `example`.
+    ``scheme``: name of a scheme; without it that which `compare` recommends. Raises Infeasible where there is none.
+    ``options``, ``chosen``: `Options` of several schemes or those of one, or their fields by keyword, in SI:
+    ``on_time=0.2`` (s).
 
-    Examples
-    --------
     >>> nutdamp.plan(nutdamp.example(), "two-pulse")
     <Plan two-pulse: 2 pulses until 7.434 s, nutation left < 1e-9 deg>
     >>> nutdamp.plan(nutdamp.example(), "four-pulse", on_time=0.2).pulses[0].on_time
@@ -162,18 +144,11 @@ def compare(
 ) -> Comparison:
     """Plan schemes, compare them and recommend one, as ``nutdamp plan`` does.
 
-    Parameters
-    ----------
-    names
-        Schemes, default the classic three and optimal, or those that point where the file has a target axis.
-    options, chosen
-        As of `plan`; each scheme takes those that it has.
-    samples, timed
-        Dispersed cases of each plan where the file has dispersions, 0 to judge nominal values alone; recommend pulses
-        that no command block can fire, too.
+    ``names``: schemes, default the classic three and optimal, or those that point where the file has a target axis.
+    ``options``, ``chosen``: as of `plan`; each scheme takes those that it has.
+    ``samples``, ``timed``: dispersed cases of each plan where the file has dispersions, 0 to judge nominal values
+    alone; recommend pulses that no command block can fire, too.
 
-    Examples
-    --------
     >>> nutdamp.compare(nutdamp.example(), ["two-pulse", "four-pulse"], samples=0).recommended.scheme
     'four-pulse'
     """
@@ -189,15 +164,10 @@ def robust(
 ) -> RobustComparison:
     """Search the cheapest plan with which enough dispersed cases comply, as ``nutdamp plan --robust`` does.
 
-    Parameters
-    ----------
-    compared
-        The comparison of `compare`: its plans are among the candidates. ``options``: those that it was made with.
-    progress
-        Called with the number of attempts made, and that of all.
+    ``compared``: the comparison of `compare`: its plans are among the candidates. ``options``: those that it was made
+    with.
+    ``progress``: called with the number of attempts made, and that of all.
 
-    Examples
-    --------
     >>> nutdamp.robust(nutdamp.compare(nutdamp.example("magnus-a03"), ["two-pulse"]))
     Traceback (most recent call last):
     nutdamp.errors.BadRequest: the spacecraft file has no dispersions: ...
@@ -217,8 +187,6 @@ def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
 
     Warns where columns contradict each other or a limit is broken. Raises CannotRead, or FaultyFile.
 
-    Examples
-    --------
     >>> nutdamp.plan(nutdamp.example(), "two-pulse").to_csv("pulses.csv")
     >>> len(nutdamp.load_schedule("pulses.csv", nutdamp.example()))
     2
@@ -234,17 +202,10 @@ def load_schedule(path: PathName, spacecraft: Spacecraft) -> Plan:
 def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, samples: int = 1000) -> Simulation:
     """Propagate a plan by the impulse sum (17) and through its real widths, as ``nutdamp simulate`` does.
 
-    Parameters
-    ----------
-    plan
-        Of `plan` or `load_schedule`; ``plan(spacecraft, "none")`` is free motion.
-    until, samples
-        End, s, default one inertial nutation period after the last pulse; rows of the track.
-    flown
-        Show the flight through the real widths, not the impulse sum.
+    ``plan``: of `plan` or `load_schedule`; ``plan(spacecraft, "none")`` is free motion.
+    ``until``, ``samples``: end, s, default one inertial nutation period after the last pulse; rows of the track.
+    ``flown``: show the flight through the real widths, not the impulse sum.
 
-    Examples
-    --------
     >>> nutdamp.simulate(nutdamp.plan(nutdamp.example(), "two-pulse"), 20.0, flown=True).decision.met
     True
     """
@@ -269,17 +230,10 @@ def trade(
 ) -> Trade:
     """Trade time against cost, as ``nutdamp trade`` does.
 
-    Parameters
-    ----------
-    points
-        Horizons tried for each front.
-    allow
-        How far from its target H may end, rad; a front for each.
-    least, progress
-        ``propellant`` or ``impulse``; called with the number of horizons tried, and that of all.
+    ``points``: horizons tried for each front.
+    ``allow``: how far from its target H may end, rad; a front for each.
+    ``least``, ``progress``: ``propellant`` or ``impulse``; called with the number of horizons tried, and that of all.
 
-    Examples
-    --------
     >>> nutdamp.trade(nutdamp.example().with_(limits={"horizon": "8 s"}), 1, [0.0])
     <Trade of Sounder-1, fronts: 1, schedules: 1>
     """
@@ -305,20 +259,12 @@ def disperse(
 ) -> Dispersion:
     """Fly the schedule of a plan through its real widths in dispersed cases, as ``nutdamp disperse`` does.
 
-    Parameters
-    ----------
-    samples, seed
-        Number of cases, and the seed of their draws: a whole number from 0 to 2**64 - 1.
-    threads
-        Default: the processors there are.
-    csv
-        File of the inputs and outputs of each case, written as they are flown.
-    remark, progress, stopped
-        Called with notes on the model; with the number of cases flown, and that of all; to end early. A stop before
-        the first case raises KeyboardInterrupt.
+    ``samples``, ``seed``: number of cases, and the seed of their draws: a whole number from 0 to 2**64 - 1.
+    ``threads``: default: the processors there are.
+    ``csv``: file of the inputs and outputs of each case, written as they are flown.
+    ``remark``, ``progress``, ``stopped``: called with notes on the model; with the number of cases flown, and that of
+    all; to end early. A stop before the first case raises KeyboardInterrupt.
 
-    Examples
-    --------
     >>> nutdamp.disperse(nutdamp.plan(nutdamp.example(), "two-pulse"), 100)
     <Dispersion: 100 of 100 cases comply>
     """
@@ -357,8 +303,6 @@ def disperse_loop(
 
     ``samples``: default what shows the share required. Others: see `disperse`. Raises Infeasible where it cannot damp.
 
-    Examples
-    --------
     >>> nutdamp.disperse_loop(nutdamp.example("upper-stage"), 2, until=60.0)
     <LoopDispersion: 2 of 2 cases comply>
     """
@@ -385,15 +329,9 @@ def disperse_loop(
 def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, case: int | None = None) -> LoopPlan:
     """Fly the closed loop of the file, as ``nutdamp loop`` does.
 
-    Parameters
-    ----------
-    until, seed
-        End, s, default the horizon after the nutation is at ``start``; of the noise of the sensor.
-    case
-        Number (from 1) of a dispersed case of `disperse_loop` with that seed.
+    ``until``, ``seed``: end, s, default the horizon after the nutation is at ``start``; of the noise of the sensor.
+    ``case``: number (from 1) of a dispersed case of `disperse_loop` with that seed.
 
-    Examples
-    --------
     >>> nutdamp.loop(nutdamp.example("upper-stage"), 60.0).flown_run.stop.name
     'END'
     """
@@ -407,8 +345,6 @@ def loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int = 1, c
 def verify(plan: Plan) -> Verified:
     """Fly the schedule of a plan by independent methods, as ``nutdamp verify`` does.
 
-    Examples
-    --------
     >>> nutdamp.verify(nutdamp.plan(nutdamp.example(), "two-pulse")).agree
     True
     """
@@ -423,8 +359,6 @@ def verify(plan: Plan) -> Verified:
 def verify_loop(spacecraft: Spacecraft, until: float | None = None) -> LoopVerification:
     """Fly the closed loop of the file in closed form and by DOP853 to ``until`` s, as ``nutdamp verify --loop`` does.
 
-    Examples
-    --------
     >>> nutdamp.verify_loop(nutdamp.example("upper-stage"), 10.0).agree
     True
     """
@@ -443,17 +377,10 @@ def budget(
 ) -> Budget:
     """Budget pulses a day and propellant a year that hold the nutation, as ``nutdamp budget`` does.
 
-    Parameters
-    ----------
-    thresholds
-        Pairs (start, stop), rad, default those of the loop in the file.
-    largest
-        Nutation by which damping must begin, rad, default the one required.
-    seed, progress
-        Of the noise of the sensor; called with the number of pairs done, and that of all.
+    ``thresholds``: pairs (start, stop), rad, default those of the loop in the file.
+    ``largest``: nutation by which damping must begin, rad, default the one required.
+    ``seed``, ``progress``: of the noise of the sensor; called with the number of pairs done, and that of all.
 
-    Examples
-    --------
     >>> nutdamp.budget(nutdamp.example("upper-stage"))
     <Budget of Upper stage, pairs of thresholds: 1>
     """
@@ -479,15 +406,9 @@ def export(
 ) -> None:
     """Write a plan in a format of ``nutdamp export``.
 
-    Parameters
-    ----------
-    format, path
-        Name of the format and of the file.
-    until, xml
-        End of a history or spin table, s; CCSDS messages as XML, default where the name ends in .xml.
+    ``format``, ``path``: name of the format and of the file.
+    ``until``, ``xml``: end of a history or spin table, s; CCSDS messages as XML, default where the name ends in .xml.
 
-    Examples
-    --------
     >>> nutdamp.export(nutdamp.plan(nutdamp.example(), "two-pulse"), "json", "plan.json")
     """
     from nutdamp.files.tabular import write_whole
@@ -510,17 +431,11 @@ def fit(
 ) -> Fitted:
     """Estimate a spacecraft from a CSV file of telemetry, as ``nutdamp fit`` does.
 
-    Parameters
-    ----------
-    telemetry, sun_pulses
-        Names of the CSV files; ``sun_pulses`` are times of Sun pulses.
-    schedule
-        Pulses fired during the record: a plan of `load_schedule`, or the name of its file.
-    ignored
-        Called with columns that are ignored, in place of Python warnings of them and of doubts about the estimates.
+    ``telemetry``, ``sun_pulses``: names of the CSV files; ``sun_pulses`` are times of Sun pulses.
+    ``schedule``: pulses fired during the record: a plan of `load_schedule`, or the name of its file.
+    ``ignored``: called with columns that are ignored, in place of Python warnings of them and of doubts about the
+    estimates.
 
-    Examples
-    --------
     >>> body = nutdamp.example()
     >>> nutdamp.plan(body, "none").fly(20.0, samples=50).to_csv("flight.csv")
     >>> nutdamp.fit("flight.csv", body, ignored=print).spacecraft().name
@@ -560,21 +475,13 @@ def report(
 ) -> Report:
     """Compare the schemes named, as `compare` does, and write the page of ``nutdamp report``.
 
-    Parameters
-    ----------
-    spacecraft, output
-        One of `load`, or an argument of `load`; HTML file.
-    names, options, disperse
-        As of `compare`, with ``disperse`` for its ``samples``.
-    points
-        Horizons tried for each front of time against cost, none by default.
-    control
-        Texts of title, document, issue, author, date; see ``report --help``.
+    ``spacecraft``, ``output``: one of `load`, or an argument of `load`; HTML file.
+    ``names``, ``options``, ``disperse``: as of `compare`, with ``disperse`` for its ``samples``.
+    ``points``: horizons tried for each front of time against cost, none by default.
+    ``control``: texts of title, document, issue, author, date; see ``report --help``.
 
     Raises MissingExtra without the extra plot.
 
-    Examples
-    --------
     >>> nutdamp.report(nutdamp.example(), "report.html", ["two-pulse"], disperse=0).met
     True
     """

@@ -189,7 +189,7 @@ def _time(table: Table, line: int, cells: Cells, spacecraft: Spacecraft, name: s
     commands = spacecraft.commands
     if commands is None:
         return 0.0
-    time = commands.delay_of(value) if name == "delay" else commands.width_of(value)
+    time = commands.time(name, value)
     if time is None:
         table.fault(
             line,
@@ -229,9 +229,8 @@ def _against_commands(table: Table, line: int, cells: Cells, block: Block, space
         table.warn(line, "count", text)
     if block.every not in commands.every:
         table.warn(line, "every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
-    counted = (commands.delay_counts(block.delay), commands.width_counts(block.width))
-    for name, time, right in zip(TIMES, (block.delay, block.width), counted, strict=True):
-        counts = cells.get(f"{name}_counts", "")
+    for name, time in zip(TIMES, (block.delay, block.width), strict=True):
+        counts, right = cells.get(f"{name}_counts", ""), commands.counts(name, time)
         if counts and f"{name}_s" in cells and counts != str(right):
             text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
             table.warn(line, f"{name}_counts", text)

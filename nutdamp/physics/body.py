@@ -271,16 +271,14 @@ def growth(moments: ArrayLike, spin: float, wheel: float = 0.0) -> Stability:
     With a wheel p² = -(H3 - I1ω3)(H3 - I2ω3)/(I1 I2).
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
+    kind = axis_class(moments)
     if wheel != 0.0:
         axial = third * spin + wheel
         square = -((axial - first * spin) / first) * ((axial - second * spin) / second)
-        return Stability(square, square < 0.0, 1.0 / math.sqrt(square) if square > 0.0 else math.inf)
-    kind = axis_class(moments)
-    if spin == 0.0 or kind == "sphere":
-        return Stability(0.0, True, math.inf)
-    if kind == "degenerate":
-        return Stability(0.0, False, math.inf)
-    square = -((third - first) / first) * ((third - second) / second) * spin**2
+    elif spin == 0.0 or kind in ("sphere", "degenerate"):
+        return Stability(0.0, spin == 0.0 or kind == "sphere", math.inf)
+    else:
+        square = -((third - first) / first) * ((third - second) / second) * spin**2
     return Stability(square, square < 0.0, 1.0 / math.sqrt(square) if square > 0.0 else math.inf)
 
 

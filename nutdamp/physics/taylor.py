@@ -336,7 +336,9 @@ def integrate(
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     jerk = None if slope is None else slope / inertia
-    strength = _strength(acceleration, jerk, forcing, min(moments), end - start)
+    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
+    if jerk is not None:
+        strength = max(strength, float(np.linalg.norm(acceleration + jerk * (end - start))))
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0) + abs(forcing.wheel) / min(moments)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     even = jerk is None and falling is None
@@ -370,12 +372,6 @@ def integrate(
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
     raise _refused(start, end)
-
-
-def _strength(acceleration: Array, jerk: Array | None, forcing: Forcing, least: float, duration: float) -> float:
-    """Largest acceleration by all torques in ``duration`` s, rad/s²; ``least`` is the smallest principal moment."""
-    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / least
-    return strength if jerk is None else max(strength, float(np.linalg.norm(acceleration + jerk * duration)))
 
 
 def _refused(start: float, end: float, angle: float | None = None) -> Infeasible:

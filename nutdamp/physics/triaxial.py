@@ -104,7 +104,8 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     polhode = _polhode(moments, rates0)
     if polhode.pace == 0.0 or polhode.complement == 0.0:
         return math.inf
-    return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
+    quarter = 0.5 * math.pi / _means(polhode.complement)[1]
+    return 4.0 * quarter / (polhode.pace * polhode.rate_unit)
 
 
 def arc_cones(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
@@ -226,10 +227,11 @@ def _swing(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     if polhode.complement == 0.0:
         return _swing_on_separatrix(polhode, size, times)
     c = polhode.axes[2]
-    period = 2.0 * _quarter(polhode.complement) / polhode.pace
+    mean = _means(polhode.complement)[1]
+    period = 2.0 * (0.5 * math.pi / mean) / polhode.pace
     # The integrand is regular within K' of the real axis, so that its coefficients fall like exp(-π k K'/K).
     parameter_agm = _means(1.0 - polhode.complement)[1] if polhode.complement < 1.0 else 0.0
-    modes = 2 + math.ceil(MODES_REACH / math.pi * parameter_agm / _means(polhode.complement)[1])
+    modes = 2 + math.ceil(MODES_REACH / math.pi * parameter_agm / mean)
     count = 2 * modes + 1
     rate = np.abs(_rates(polhode, np.linspace(0.0, period, count, endpoint=False))[:, c])
     coefficients = np.fft.rfft(rate / (size + polhode.moments[c] * rate)) / count
@@ -276,7 +278,7 @@ def _turn(rates: Array, times: Array) -> Array:
 
 
 def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
-    """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit."""
+    """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit, π/2 over the quarter period K."""
     arithmetic, geometric = 1.0, math.sqrt(complement)
     pairs = [(arithmetic, geometric)]
     for _ in range(MEANS):
@@ -285,11 +287,6 @@ def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
         arithmetic, geometric = 0.5 * (arithmetic + geometric), math.sqrt(arithmetic * geometric)
         pairs.append((arithmetic, geometric))
     return pairs, 0.5 * (arithmetic + geometric)
-
-
-def _quarter(complement: float) -> float:
-    """Quarter period K of Jacobi's functions from 1 - m > 0."""
-    return 0.5 * math.pi / _means(complement)[1]
 
 
 def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:

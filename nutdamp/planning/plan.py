@@ -18,7 +18,7 @@ import numpy as np
 
 from nutdamp import units
 from nutdamp.common import results, work
-from nutdamp.common.numerics import cleaned_change
+from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
@@ -339,7 +339,7 @@ class Plan(results.Data, results.Tabled):
     def spin_change(self) -> float | None:
         """ω3 at the end minus at the start, rad/s, flown."""
         before, after = self.spacecraft.spin, self.flight.settled.spin
-        return cleaned_change(after - before, before) if self.feasible else None
+        return float(cleaned([after - before, before])[0]) if self.feasible else None
 
     @cached_property
     def delta_v(self) -> Vector | None:
