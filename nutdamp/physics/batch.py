@@ -411,15 +411,12 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     """Fly cases with different orders of edges, in place."""
     edges = pulses.edges
     order = np.argsort(edges, axis=0, kind="stable")
-    edges = np.take_along_axis(edges, order, axis=0)
-    turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
+    edges, of_each = np.take_along_axis(edges, order, axis=0), order[:, None, :]
+    turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
     slopes, slope = pulses.slopes, None
-    half = (
-        None
-        if pulses.sheds is None
-        else np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), order[:, None, :], axis=0)
-    )
-    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), order[:, None, :], axis=0)
+    half = None if pulses.sheds is None else np.repeat(0.5 * pulses.sheds, 2, axis=0)
+    half = None if half is None else np.take_along_axis(half, of_each, axis=0)
+    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):

@@ -163,7 +163,6 @@ class _ScaledPolhode(NamedTuple):
     pace: float  # p; zero where the rates are constant
     complement: float  # 1 - m
     about_c: float  # P
-    balance: float  # Q
 
 
 def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
@@ -173,7 +172,10 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
     rates /= rate_unit
     rates[np.abs(rates) < NEGLIGIBLE] = 0.0
     least, b, most = (int(axis) for axis in np.argsort(inertia, kind="stable"))
-    balance = _balance(inertia, rates, least, b, most)
+    # H² - 2T I_b, positive about the axis of the largest moment, zero on the separatrix: rational, to keep all digits.
+    i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, b, most))
+    w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
+    balance = float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
     a, c = (least, most) if balance >= 0.0 else (most, least)
     d_ca, d_cb, d_ba = (abs(float(inertia[x] - inertia[y])) for x, y in ((c, a), (c, b), (b, a)))
     about_c = float(inertia[a] * d_ca * rates[a] ** 2 + inertia[b] * d_cb * rates[b] ** 2)
@@ -183,23 +185,13 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
         largest = math.sqrt(rates[c] ** 2 + inertia[b] * d_ba / (inertia[c] * d_ca) * rates[b] ** 2)
         pace = largest * math.sqrt(d_ca / inertia[a] * (d_cb / inertia[b]))
         complement = min(abs(balance) / (inertia[c] * d_cb * largest**2), 1.0)
-    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
+    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c)
 
 
 def _unit(values: Array) -> float:
     """Power of two near the largest value: dividing by it rounds nothing."""
     largest = float(np.max(np.abs(values)))
     return math.ldexp(1.0, math.frexp(largest)[1] - 1) if largest > 0.0 else 1.0
-
-
-def _balance(inertia: Array, rates: Array, least: int, middle: int, most: int) -> float:
-    """H² - 2T I_b, positive for motion about the axis of the largest moment.
-
-    It vanishes on the separatrix; rational numbers keep all its digits.
-    """
-    i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, middle, most))
-    w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
-    return float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
 
 
 def _rates(polhode: _ScaledPolhode, times: Array) -> Array:

@@ -267,11 +267,6 @@ class Schedule:
         return any(pulse.on_time == 0.0 for pulse in self.pulses)
 
     @property
-    def through_valves(self) -> bool:
-        """True if any of the pulses differs in length from its command."""
-        return any(pulse.through_valve for pulse in self.pulses)
-
-    @property
     def shaped(self) -> bool:
         """True if the thrust of any of the pulses is no rectangle."""
         return any(pulse.command is not None for pulse in self.pulses)

@@ -79,7 +79,7 @@ def _date(row: PulseRow) -> str | None:
 
 
 def _valves(schedule: Schedule) -> bool:
-    return schedule.through_valves
+    return any(pulse.through_valve for pulse in schedule)
 
 
 PULSES = (
