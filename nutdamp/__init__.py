@@ -7,104 +7,76 @@ As a library it is these few names, of which `nutdamp.api` tells more; each is l
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nutdamp import errors
-    from nutdamp.api import (
-        budget,
-        check,
-        compare,
-        disperse,
-        disperse_loop,
-        example,
-        export,
-        fit,
-        load,
-        load_schedule,
-        loop,
-        plan,
-        read,
-        report,
-        robust,
-        simulate,
-        trade,
-        verify,
-        verify_loop,
-    )
-    from nutdamp.control_loop.budget import Budget
-    from nutdamp.control_loop.dispersion import LoopDispersion
-    from nutdamp.control_loop.evaluation import LoopPlan, LoopVerification
-    from nutdamp.errors import NutdampError
-    from nutdamp.estimation.forecast import Fitted
-    from nutdamp.flight.propagation import Flight, Residual, Track
-    from nutdamp.montecarlo.study import Dispersion
-    from nutdamp.page.report import Report
-    from nutdamp.planning.decision import Comparison, Simulation
-    from nutdamp.planning.plan import Plan, Verified
-    from nutdamp.planning.robust import RobustComparison
-    from nutdamp.planning.tradeoff import Trade
-    from nutdamp.schemes.catalogue import (
-        FourPulseOptions,
-        HalfConeOptions,
-        OptimalOptions,
-        Options,
-        RhumbLineOptions,
-        TwoPulseOptions,
-    )
-    from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.views.check import CheckedFile
-
-
-__all__ = [
-    "Budget",
-    "CheckedFile",
-    "Comparison",
-    "Dispersion",
-    "Fitted",
-    "Flight",
-    "FourPulseOptions",
-    "HalfConeOptions",
-    "LoopDispersion",
-    "LoopPlan",
-    "LoopVerification",
-    "NutdampError",
-    "OptimalOptions",
-    "Options",
-    "Plan",
-    "Report",
-    "Residual",
-    "RhumbLineOptions",
-    "RobustComparison",
-    "Simulation",
-    "Spacecraft",
-    "Track",
-    "Trade",
-    "TwoPulseOptions",
-    "Verified",
-    "__version__",
-    "budget",
-    "check",
-    "compare",
-    "disperse",
-    "disperse_loop",
-    "errors",
-    "example",
-    "export",
-    "fit",
-    "load",
-    "load_schedule",
-    "loop",
-    "plan",
-    "read",
-    "report",
-    "robust",
-    "simulate",
-    "trade",
-    "verify",
-    "verify_loop",
-]
+    from nutdamp import errors as errors
+    from nutdamp.api import budget as budget
+    from nutdamp.api import check as check
+    from nutdamp.api import compare as compare
+    from nutdamp.api import disperse as disperse
+    from nutdamp.api import disperse_loop as disperse_loop
+    from nutdamp.api import example as example
+    from nutdamp.api import export as export
+    from nutdamp.api import fit as fit
+    from nutdamp.api import load as load
+    from nutdamp.api import load_schedule as load_schedule
+    from nutdamp.api import loop as loop
+    from nutdamp.api import plan as plan
+    from nutdamp.api import read as read
+    from nutdamp.api import report as report
+    from nutdamp.api import robust as robust
+    from nutdamp.api import simulate as simulate
+    from nutdamp.api import trade as trade
+    from nutdamp.api import verify as verify
+    from nutdamp.api import verify_loop as verify_loop
+    from nutdamp.control_loop.budget import Budget as Budget
+    from nutdamp.control_loop.dispersion import LoopDispersion as LoopDispersion
+    from nutdamp.control_loop.evaluation import LoopPlan as LoopPlan
+    from nutdamp.control_loop.evaluation import LoopVerification as LoopVerification
+    from nutdamp.errors import NutdampError as NutdampError
+    from nutdamp.estimation.forecast import Fitted as Fitted
+    from nutdamp.flight.propagation import Flight as Flight
+    from nutdamp.flight.propagation import Residual as Residual
+    from nutdamp.flight.propagation import Track as Track
+    from nutdamp.montecarlo.study import Dispersion as Dispersion
+    from nutdamp.page.report import Report as Report
+    from nutdamp.planning.decision import Comparison as Comparison
+    from nutdamp.planning.decision import Simulation as Simulation
+    from nutdamp.planning.plan import Plan as Plan
+    from nutdamp.planning.plan import Verified as Verified
+    from nutdamp.planning.robust import RobustComparison as RobustComparison
+    from nutdamp.planning.tradeoff import Trade as Trade
+    from nutdamp.schemes.catalogue import FourPulseOptions as FourPulseOptions
+    from nutdamp.schemes.catalogue import HalfConeOptions as HalfConeOptions
+    from nutdamp.schemes.catalogue import OptimalOptions as OptimalOptions
+    from nutdamp.schemes.catalogue import Options as Options
+    from nutdamp.schemes.catalogue import RhumbLineOptions as RhumbLineOptions
+    from nutdamp.schemes.catalogue import TwoPulseOptions as TwoPulseOptions
+    from nutdamp.spacecraft.model import Spacecraft as Spacecraft
+    from nutdamp.views.check import CheckedFile as CheckedFile
 
 __version__ = "0.3.0.dev0"
 
-_HOMES = {
+_HOMES: dict[str, tuple[str, ...]] = {
+    "nutdamp.api": (
+        "budget",
+        "check",
+        "compare",
+        "disperse",
+        "disperse_loop",
+        "example",
+        "export",
+        "fit",
+        "load",
+        "load_schedule",
+        "loop",
+        "plan",
+        "read",
+        "report",
+        "robust",
+        "simulate",
+        "trade",
+        "verify",
+        "verify_loop",
+    ),
     "nutdamp.control_loop.budget": ("Budget",),
     "nutdamp.control_loop.dispersion": ("LoopDispersion",),
     "nutdamp.control_loop.evaluation": ("LoopPlan", "LoopVerification"),
@@ -117,10 +89,20 @@ _HOMES = {
     "nutdamp.planning.plan": ("Plan", "Verified"),
     "nutdamp.planning.robust": ("RobustComparison",),
     "nutdamp.planning.tradeoff": ("Trade",),
+    "nutdamp.schemes.catalogue": (
+        "FourPulseOptions",
+        "HalfConeOptions",
+        "OptimalOptions",
+        "Options",
+        "RhumbLineOptions",
+        "TwoPulseOptions",
+    ),
     "nutdamp.spacecraft.model": ("Spacecraft",),
     "nutdamp.views.check": ("CheckedFile",),
 }
-"""Modules of the public classes; options of schemes are those of the catalogue, functions those of `nutdamp.api`."""
+"""Modules of the public names."""
+
+__all__ = ["__version__", "errors", *(name for names in _HOMES.values() for name in names)]
 
 
 if not TYPE_CHECKING:  # or else a type checker would believe in any name
@@ -134,8 +116,7 @@ if not TYPE_CHECKING:  # or else a type checker would believe in any name
         if name == "errors":
             return import_module("nutdamp.errors")
         import_module("nutdamp.api")  # results show themselves by what it names
-        usual = "nutdamp.schemes.catalogue" if name.endswith("Options") else "nutdamp.api"
-        home = next((module for module, names in _HOMES.items() if name in names), usual)
+        home = next(module for module, names in _HOMES.items() if name in names)
         value = getattr(import_module(home), name)
         globals()[name] = value
         return value

@@ -255,7 +255,7 @@ def simulate(plan: Plan, until: float | None = None, *, flown: bool = False, sam
     body, pulses = feasible(plan).spacecraft, plan.pulses
     end = units.end_of_flight(pulses.end + body.inertial_period if until is None else until)
     drawn_to = shown_until(body, pulses) if until is None else end
-    return Simulation(plan, end, flown, units.rows(samples), drawn_to)
+    return Simulation(plan, end, flown, units.count("samples", samples, 2), drawn_to)
 
 
 def trade(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -268,18 +268,11 @@ def tilt(value: Any, name: str = "largest") -> float:
     raise BadRequest(f"{name} = {as_given(value)}: expected an angle in rad between 0 and a right angle")
 
 
-def rows(value: Any) -> int:
-    """A number of samples; raises BadRequest."""
-    if is_count(value) and value >= 2:
+def count(name: str, value: Any, least: int = 1) -> int:
+    """A whole number of at least ``least``, which is no less than 1; raises BadRequest."""
+    if is_count(value) and value >= least:
         return int(value)
-    raise BadRequest(f"samples = {as_given(value)}: expected a whole number of at least 2")
-
-
-def count(name: str, value: Any) -> int:
-    """A whole number of at least 1; raises BadRequest."""
-    if is_count(value) and value >= 1:
-        return int(value)
-    raise BadRequest(f"{name} = {as_given(value)}: expected a whole number of at least 1")
+    raise BadRequest(f"{name} = {as_given(value)}: expected a whole number of at least {least}")
 
 
 def shifts(value: Any) -> tuple[float, ...]:
@@ -335,42 +328,39 @@ def replaced(value: Record, fields: Mapping[str, object]) -> Record:
     for name, entry in fields.items():
         if name not in known:
             raise BadRequest(f"replace: there is no {name!r}; there are {', '.join(known)}")
-        kind = kinds[name]
-        if not _fits(entry, kind):
-            raise BadRequest(f"{name}: expected {_described(kind)}, got {as_given(entry)}")
-        values[name] = np.array(entry, dtype=float) if _array(kind) else entry
+        expected, fits = _meaning(kinds[name])
+        if not fits(entry):
+            raise BadRequest(f"{name}: expected {expected}, got {as_given(entry)}")
+        values[name] = np.array(entry, dtype=float) if expected == THREE_NUMBERS else entry
     return dataclasses.replace(value, **values)
 
 
-def _array(kind: Any) -> bool:
-    """True for the type hint of three numbers; its parts differ between versions of numpy."""
+THREE_NUMBERS = "three numbers"
+"""Words for an array in the type hints of `replaced`."""
+
+
+def _meaning(kind: Any) -> tuple[str, Callable[[Any], bool]]:
+    """A type hint in words, and the test of a value."""
     import numpy as np
     from numpy.typing import NDArray
 
-    return bool(kind == NDArray[np.float64])
-
-
-def _fits(value: object, kind: Any) -> bool:
-    """True where a value is of the kind that a type hint names; an array is three numbers."""
     parts = get_args(kind)
     if get_origin(kind) is UnionType:
-        return any(_fits(value, part) for part in parts)
-    if _array(kind):
-        numbers: Any = value
-        sized = isinstance(value, Sequence) or getattr(value, "ndim", 0) == 1
-        return sized and len(numbers) == 3 and all(map(is_number, numbers))
+        words, tests = zip(*map(_meaning, parts), strict=True)
+        return " or ".join(words), lambda value: any(fits(value) for fits in tests)
+    if kind == NDArray[np.float64]:  # whose parts differ between versions of numpy
+        return THREE_NUMBERS, _is_vector
     if get_origin(kind) is tuple:
-        return isinstance(value, tuple) and all(_fits(entry, parts[0]) for entry in value)
-    return is_number(value) if kind is float else isinstance(value, kind)
+        held = parts[0]
+        return (
+            f"a tuple of {held.__name__}",
+            lambda value: isinstance(value, tuple) and all(isinstance(entry, held) for entry in value),
+        )
+    if kind is float:
+        return "a number", is_number
+    return {str: "a text", type(None): "None"}.get(kind, f"a {kind.__name__}"), lambda value: isinstance(value, kind)
 
 
-def _described(kind: Any) -> str:
-    """A kind that a type hint names, in words."""
-    parts = get_args(kind)
-    if get_origin(kind) is UnionType:
-        return " or ".join(_described(part) for part in parts)
-    if _array(kind):
-        return "three numbers"
-    if get_origin(kind) is tuple:
-        return f"a tuple of {parts[0].__name__}"
-    return {float: "a number", str: "a text", type(None): "None"}.get(kind) or f"a {kind.__name__}"
+def _is_vector(value: Any) -> bool:
+    sized = isinstance(value, Sequence) or getattr(value, "ndim", 0) == 1
+    return sized and len(value) == 3 and all(map(is_number, value))

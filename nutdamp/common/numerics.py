@@ -37,11 +37,6 @@ def cleaned(vectors: ArrayLike) -> NDArray[np.float64]:
     return np.where(np.abs(values) < NOISE * largest, 0.0, values) + 0.0
 
 
-def cleaned_change(change: float, whole: float) -> float:
-    """Difference of two numbers of the size of ``whole``; 0 where it is rounding beside them."""
-    return float(cleaned([change, whole])[0])
-
-
 def finite(data: dict[str, Any]) -> dict[str, Any]:
     """Data with None for numbers that are not finite."""
     return {key: _finite(entry) for key, entry in data.items()}

@@ -98,7 +98,6 @@ class Epoch:
 
     def rounded(self, digits: int) -> str:
         """ISO 8601 text with ``digits`` digits of a second: ``2026-03-01T12:00:00.000``; 60 within a leap second.
-        second.
 
         Rounding carries over to the next minute or day. Raises ValueError after the year 9999, where no such text can
         be written.

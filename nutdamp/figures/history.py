@@ -160,7 +160,7 @@ def firings(axes: Axes, flight: Flight, until: float) -> None:
         _bar(axes, flight, block, row)
     axes.set_yticks(list(rows.values()), list(rows))
     axes.grid(axis="x")
-    notes = ["effective on-times, not the commands"] * flight.schedule.through_valves
+    notes = ["effective on-times, not the commands"] * any(pulse.through_valve for pulse in flight.schedule)
     if any(pulse.channel == STEERABLE for pulse in flight.schedule):
         notes.append("angles: torque from body axis +1")
     axes.set_title("; ".join(notes), loc="right", **style.NOTE)

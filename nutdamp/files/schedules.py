@@ -162,7 +162,7 @@ def _time(row: Row, spacecraft: Spacecraft, name: str) -> float | None:
         return None
     if commands is None:
         return 0.0
-    time = commands.delay_of(value) if name == "delay" else commands.width_of(value)
+    time = commands.time(name, value)
     if time is None:
         most = len(commands.widths)
         row.fault(column, f"expected the number of an entry of commands.width, 1 to {most}, got {row[column]}")
@@ -191,9 +191,8 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
         row.warn("count", text)
     if block.every not in commands.every:
         row.warn("every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
-    counted = (commands.delay_counts(block.delay), commands.width_counts(block.width))
-    for name, time, right in zip(TIMES, (block.delay, block.width), counted, strict=True):
-        counts = row.get(f"{name}_counts", "")
+    for name, time in zip(TIMES, (block.delay, block.width), strict=True):
+        counts, right = row.get(f"{name}_counts", ""), commands.counts(name, time)
         if counts and f"{name}_s" in row and counts != str(right):
             text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
             row.warn(f"{name}_counts", text)

@@ -84,7 +84,7 @@ class Arc:
         A, C, state, since, wheel = self.A, self.C, self.state, time - self.start, self.wheel
         motion = state.quaternion, state.omega, state.spin, since, wheel
         if self.growth != 0.0:
-            return SpinState(*energy_sink.arc_end(A, C, self.growth, *motion))
+            return SpinState(*energy_sink.arc(A, C, self.growth, *motion))
         turned = cmath.exp(-1j * ((A - C) / A * state.spin - wheel / A) * since)
         quaternion = attitude.arc_end(A, C, *motion)
         return SpinState(state.omega * turned, state.spin, quaternion)

@@ -17,7 +17,6 @@ from nutdamp.common import numerics
 
 Array = NDArray[np.float64]
 
-
 _BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -120,14 +119,11 @@ def arc(A: float, C: float, quaternion: Array, omega: complex, spin: float, time
     times = np.asarray(times, dtype=float)
     half_about_momentum = 0.5 * size / A * times
     half_about_axis = 0.5 * ((A - C) / A * spin - wheel / A) * times
-    zero = np.zeros_like(times)
     # A body at rest has no direction of H, but then the angle about it is zero as well.
-    direction = momentum / size if size > 0 else momentum
-    outer = np.concatenate(
-        [np.cos(half_about_momentum)[..., None], np.sin(half_about_momentum)[..., None] * direction], axis=-1
-    )
-    inner = np.stack([np.cos(half_about_axis), zero, zero, np.sin(half_about_axis)], axis=-1)
-    return multiply(multiply(outer, quaternion), inner)
+    x, y, z = momentum / size if size > 0 else momentum
+    sine = np.sin(half_about_momentum)
+    turned = product((np.cos(half_about_momentum), sine * x, sine * y, sine * z), quaternion)
+    return np.stack(product(turned, (np.cos(half_about_axis), 0.0, 0.0, np.sin(half_about_axis))), axis=-1)
 
 
 def arc_end(
@@ -154,9 +150,8 @@ def about_axis(body_axis: Array, body_side: Array, axis: Array, side: Array, pha
         across = np.cross(along, towards)
         across /= np.linalg.norm(across)
         frames.append(np.column_stack([np.cross(across, along), across, along]))
-    turn = np.array(
-        [[math.cos(phase), -math.sin(phase), 0.0], [math.sin(phase), math.cos(phase), 0.0], [0.0, 0.0, 1.0]]
-    )
+    cosine, sine = math.cos(phase), math.sin(phase)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return from_matrix(frames[1] @ turn @ frames[0].T)
 
 

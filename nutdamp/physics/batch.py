@@ -36,19 +36,10 @@ class Series:
     slices; ``turns`` (order+1, 4, n) is the quaternion. The equations are those of `taylor`.
     """
 
-    def __init__(
-        self,
-        moments: Array,
-        forcing: Forcing,
-        rates: Array,
-        quaternion: Array,
-        now: Array,
-        step: Array,
-        acceleration: Array,
-        jerk: Array | None = None,
-    ) -> None:
+    def __init__(self, here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None) -> None:
+        bodies, now, rates, quaternion = here[:4]
+        moments, forcing, count = bodies.moments, bodies.forcing, len(step)
         first, second, third = moments
-        count = len(step)
         self.now, self.step, self.acceleration, self.jerk, self.moments = now, step, acceleration, jerk, moments
         self.coupling = np.stack([(second - third) / first, (third - first) / second, (first - second) / third])
         self.coupled = bool(self.coupling[2].any())
@@ -70,7 +61,11 @@ class Series:
         small = 0
         while self.order < LARGEST_ORDER and small < 2:
             self._next()
-            small = small + 1 if self.order >= early and self._size(self.order) < scale else 0
+            if self.order < early:
+                continue
+            terms = self.rates[self.order, :3] * self.step, self.turns[self.order]
+            size = max(float(size) for part in terms for size in (part.max(), -part.min()))
+            small = small + 1 if size < scale else 0
         return small == 2
 
     def end(self) -> tuple[Array, Array]:
@@ -92,11 +87,6 @@ class Series:
         powers = ways[:, None] ** np.arange(self.order + 1)
         rates, turns = (np.tensordot(powers, part[: self.order + 1], 1) for part in (self.rates, self.turns))
         return rates[:, :3], turns
-
-    def _size(self, order: int) -> float:
-        """Size of the terms of one order."""
-        parts = self.rates[order, :3] * self.step, self.turns[order]
-        return max(float(size) for part in parts for size in (part.max(), -part.min()))
 
     def _next(self) -> None:
         """Append the next order: products of series are sums over the orders so far."""
@@ -405,7 +395,7 @@ def _fly_alike(
             rising = [first // 2 for first in sorted(on)]
             slope = np.sum(slopes[rising], axis=0)
             torque = torque + sum(slopes[number] * (now - edges[2 * number]) for number in rising)
-        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
+        advance(MotionStretch(bodies, now, rates, quaternion, torque, slope), edges[edge] - now, watch)
         now = edges[edge]
         number, ends = divmod(edge, 2)
         bodies = bodies.lighter(None if half is None else half[number])
@@ -421,19 +411,16 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
     """Fly cases with different orders of edges, in place."""
     edges = pulses.edges
     order = np.argsort(edges, axis=0, kind="stable")
-    edges = np.take_along_axis(edges, order, axis=0)
-    turns, kicks = (np.take_along_axis(jump, order[:, None, :], axis=0) for jump in pulses.jumps)
+    edges, of_each = np.take_along_axis(edges, order, axis=0), order[:, None, :]
+    turns, kicks = (np.take_along_axis(jump, of_each, axis=0) for jump in pulses.jumps)
     slopes, slope = pulses.slopes, None
-    half = (
-        None
-        if pulses.sheds is None
-        else np.take_along_axis(np.repeat(0.5 * pulses.sheds, 2, axis=0), order[:, None, :], axis=0)
-    )
-    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), order[:, None, :], axis=0)
+    half = None if pulses.sheds is None else np.repeat(0.5 * pulses.sheds, 2, axis=0)
+    half = None if half is None else np.take_along_axis(half, of_each, axis=0)
+    bends = None if slopes is None else np.take_along_axis(_edgewise(slopes, -slopes), of_each, axis=0)
     now = np.zeros(rates.shape[1])
     torque = np.zeros_like(rates)
     for number, (edge, turn, kick) in enumerate(zip(edges, turns, kicks, strict=True)):
-        _pass(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
+        advance(MotionStretch(bodies, now, rates, quaternion, torque, slope), edge - now, watch)
         torque = torque + turn if slope is None else torque + slope * (edge - now) + turn
         now = edge
         if bends is not None:
@@ -442,22 +429,22 @@ def _fly_each(bodies: Bodies, rates: Array, quaternion: Array, pulses: Pulses, w
         rates += kick / bodies.moments
 
 
-def _pass(here: MotionStretch, duration: Array, watch: Observer | None) -> None:
-    """`advance`, with a call of ``watch`` before it."""
+def advance(here: MotionStretch, duration: Array, watch: Observer | None = None) -> None:
+    """Propagate rates and quaternion by ``duration`` (n,) s, in place; ``watch`` sees the motion before that."""
     if watch is not None:
         watch.motion(here, duration)
-    advance(here, duration)
-
-
-def advance(here: MotionStretch, duration: Array) -> None:
-    """Propagate rates and quaternion by ``duration`` (n,) s, in place."""
-    bodies = here.bodies
     if not duration.any():
         return
-    if here.torque is None and bodies.free:
-        _arc(bodies.moments, bodies.forcing, here.rates, here.quaternion, duration)
+    moments, forcing = here.bodies.moments, here.bodies.forcing
+    if here.torque is None and here.bodies.free:
+        _arc(moments, forcing, here.rates, here.quaternion, duration)
         return
-    _integrate(here, duration, *_pushed(here))
+    acceleration, jerk = _pushed(here)
+    if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
+        _integrate_symmetric(here, duration, acceleration)
+        return
+    for _ in _series(here, duration, acceleration, jerk):
+        pass
 
 
 def _pushed(here: MotionStretch) -> tuple[Array, Array | None]:
@@ -499,42 +486,26 @@ def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, dura
     # ω turns by minus the whole angle, whose cosine and sine follow from those of its half.
     cosine, sine = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
     rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
-    if growth != 0.0:
-        rates[2] += forcing.wheel / C  # dissipation acts on the whole of H3
-        _slip(growth, (1.0 - C / A) * rates[2], size, axial, rates, quaternion, duration)
-        rates[2] -= forcing.wheel / C
-
-
-def _slip(
-    growth: float, rate: Array, size: Array, axial: Array, rates: Array, quaternion: Array, duration: Array
-) -> None:
-    """Apply dissipation to the ends of free arcs, in place; ``rate`` is aH3/C, ``size`` |H|/A, ``axial`` H3/A."""
+    if growth == 0.0:
+        return
+    spin = rates[2] + forcing.wheel / C  # dissipation acts on the whole of H3
     moving = np.where(size > 0.0, size, 1.0)
     cosine = np.where(size > 0.0, axial / moving, 1.0)
     h1, h2 = rates[0] / moving, rates[1] / moving
     effect = energy_sink.courses(growth, cosine, h1 * h1 + h2 * h2, duration)
-    behind = rate * (effect.turned - duration)
+    behind = (1.0 - C / A) * spin * (effect.turned - duration)
     quaternion[:] = attitude.product(quaternion, energy_sink.slip(effect, h1, h2, behind, cos_sin))
     cosine, sine = cos_sin(behind)
     x, y = rates[0] * effect.transverse, rates[1] * effect.transverse
-    rates[0], rates[1], rates[2] = x * cosine + y * sine, y * cosine - x * sine, rates[2] * effect.axial
-
-
-def _integrate(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None = None) -> None:
-    """Taylor series over ``duration`` under a constant angular ``acceleration`` (3, n) in rad/s², in place.
-
-    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start.
-    """
-    forcing, moments = here.bodies.forcing, here.bodies.moments
-    if jerk is None and len(here.since) <= FEW and forcing.growth == 0.0 and np.array_equal(moments[0], moments[1]):
-        _integrate_symmetric(here, duration, acceleration)
-        return
-    for _ in _series(here, duration, acceleration, jerk):
-        pass
+    rates[0], rates[1] = x * cosine + y * sine, y * cosine - x * sine
+    rates[2] = spin * effect.axial - forcing.wheel / C
 
 
 def _series(here: MotionStretch, duration: Array, acceleration: Array, jerk: Array | None) -> Iterator[Series]:
-    """Series of `_integrate`, one after the other."""
+    """Taylor series over ``duration`` under an angular ``acceleration`` (3, n) in rad/s², in place, one by one.
+
+    With a ``jerk`` (3, n) rad/s³ the acceleration is that at the start; None: constant.
+    """
     forcing, moments = here.bodies.forcing, here.bodies.moments
     strength = np.sqrt(np.sum(acceleration * acceleration, axis=0))
     if jerk is not None:
@@ -561,7 +532,7 @@ def _expect_short(span: float) -> None:
 
 
 def _integrate_symmetric(here: MotionStretch, duration: Array, acceleration: Array) -> None:
-    """`_integrate` for I1 = I2 without dissipation: many steps at once, see `taylor.steps`."""
+    """`_series` for I1 = I2 without dissipation or jerk, at its end: many steps at once, see `taylor.steps`."""
     bodies, rates, quaternion = here.bodies, here.rates, here.quaternion
     A, _, C = bodies.moments
     drive = taylor.Drive(
@@ -586,14 +557,13 @@ def _step(
     here: MotionStretch, step: Array, acceleration: Array, jerk: Array | None, halvings: int = 12
 ) -> Iterator[Series]:
     """Series of one step of ``step`` (n,) s, in place; halved where it does not converge."""
-    bodies, now, rates, quaternion = here[:4]
-    series = Series(bodies.moments, bodies.forcing, rates, quaternion, now, step, acceleration, jerk)
+    series = Series(here, step, acceleration, jerk)
     if series.converges():
         yield series
-        rates[:], quaternion[:] = series.end()
+        here.rates[:], here.quaternion[:] = series.end()
         return
     if halvings == 0:
         raise Infeasible(TOO_FAST)
     for begin in (0.0, 0.5):
         push = acceleration if jerk is None else acceleration + jerk * (begin * step)
-        yield from _step(here._replace(since=now + begin * step), 0.5 * step, push, jerk, halvings - 1)
+        yield from _step(here._replace(since=here.since + begin * step), 0.5 * step, push, jerk, halvings - 1)

@@ -95,11 +95,6 @@ def inertial_period(A: float, C: float, omega: float, spin: float) -> float:
     return 2 * math.pi / inertial_rate(A, C, omega, spin)
 
 
-def half_turn(A: float, C: float, omega: float, spin: float) -> float:
-    """Half an inertial nutation period in s: the wait between two half pulses, Magnus 1970 (22)."""
-    return math.pi / inertial_rate(A, C, omega, spin)
-
-
 class HalfPulses(NamedTuple):
     """Two impulses (N m s), each against ω at its moment, and the wait between them (s)."""
 
@@ -124,12 +119,12 @@ def half_pulses(A: float, C: float, omega: float, spin: float) -> HalfPulses:
 
 
 def half_pulses_as_printed(A: float, C: float, omega: float, spin: float) -> HalfPulses:
-    """Two equal halves of Magnus 1970 (21), (22), with Δt from the motion before the first pulse.
+    """Two equal halves of Magnus 1970 (21), (22), with Δt, half an inertial period, from the motion before the first.
 
     A small-angle scheme: it leaves H displaced by 0.0016° at θ = 2°, 0.19° at 10°, 5.1° at 30°, whatever A/C.
     """
     half = 0.5 * A * omega
-    return HalfPulses(half, half, half_turn(A, C, omega, spin))
+    return HalfPulses(half, half, math.pi / inertial_rate(A, C, omega, spin))
 
 
 def turn_between_halves(A: float, C: float, omega: float, spin: float, wheel: float = 0.0) -> float:
@@ -193,9 +188,7 @@ def shape(A: float, C: float) -> str:
     return "prolate" if A > C else "oblate"
 
 
-def principal_axes(
-    tensor: NDArray[np.float64],
-) -> tuple[Moments, NDArray[np.float64]]:
+def principal_axes(tensor: Array) -> tuple[Moments, Array]:
     """Principal moments and axes of a symmetric 3×3 tensor (kg m²).
 
     Returns ((I1, I2, I3), axes): the columns of ``axes`` are the principal axes in the axes of the tensor, right
@@ -219,9 +212,7 @@ def principal_axes(
     return (first, second, third), axes
 
 
-def _nearest(
-    moments: NDArray[np.float64], vectors: NDArray[np.float64], direction: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _nearest(moments: Array, vectors: Array, direction: Array) -> Array:
     """Unit vector nearest to ``direction`` among the eigenspaces; coinciding moments span one space."""
     best, best_length = vectors[:, 0], -1.0
     for moment in moments:
@@ -280,16 +271,14 @@ def growth(moments: ArrayLike, spin: float, wheel: float = 0.0) -> Stability:
     With a wheel p² = -(H3 - I1ω3)(H3 - I2ω3)/(I1 I2).
     """
     first, second, third = (float(moment) for moment in np.asarray(moments, dtype=float))
+    kind = axis_class(moments)
     if wheel != 0.0:
         axial = third * spin + wheel
         square = -((axial - first * spin) / first) * ((axial - second * spin) / second)
-        return Stability(square, square < 0.0, 1.0 / math.sqrt(square) if square > 0.0 else math.inf)
-    kind = axis_class(moments)
-    if spin == 0.0 or kind == "sphere":
-        return Stability(0.0, True, math.inf)
-    if kind == "degenerate":
-        return Stability(0.0, False, math.inf)
-    square = -((third - first) / first) * ((third - second) / second) * spin**2
+    elif spin == 0.0 or kind in ("sphere", "degenerate"):
+        return Stability(0.0, spin == 0.0 or kind == "sphere", math.inf)
+    else:
+        square = -((third - first) / first) * ((third - second) / second) * spin**2
     return Stability(square, square < 0.0, 1.0 / math.sqrt(square) if square > 0.0 else math.inf)
 
 

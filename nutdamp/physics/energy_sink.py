@@ -45,7 +45,6 @@ FOR_EVER = 300.0
 TINY = 1e-200
 """Offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere."""
 
-
 SMALLEST = 1e-150
 """Least cosine of a nutation angle that is distinguished from zero: its square is still a number."""
 
@@ -65,44 +64,34 @@ class SinkEffect(NamedTuple):
     sine: Any
 
 
-class _Functions(NamedTuple):
-    exp: Callable[[Any], Any]
-    expm1: Callable[[Any], Any]
-    sinh: Callable[[Any], Any]
-    asinh: Callable[[Any], Any]
-    sqrt: Callable[[Any], Any]
-
-
-_OF_NUMBERS = _Functions(math.exp, math.expm1, math.sinh, math.asinh, math.sqrt)
-_OF_ARRAYS = _Functions(np.exp, np.expm1, np.sinh, np.arcsinh, np.sqrt)
-
-
 def course(growth: float, cosine: float, sine_squared: float, time: float) -> SinkEffect:
     """Effect of a sink of ``growth`` κ (1/s) after ``time`` s, from θ0 by its ``cosine`` and ``sine_squared``."""
     exponent = growth * time
-    return _course(_OF_NUMBERS, cosine, sine_squared, time, exponent, max(-FOR_EVER, min(exponent, FOR_EVER)))
+    clipped = max(-FOR_EVER, min(exponent, FOR_EVER))
+    return _course(math, math.asinh, cosine, sine_squared, time, exponent, clipped)
 
 
 def courses(growth: float, cosine: Any, sine_squared: Any, times: Any) -> SinkEffect:
     """`course` for arrays that broadcast, real or complex (a complex step gives derivatives)."""
     exponent = growth * np.asarray(times)
-    return _course(_OF_ARRAYS, cosine, sine_squared, times, exponent, np.clip(exponent, -FOR_EVER, FOR_EVER))
+    clipped = np.clip(exponent, -FOR_EVER, FOR_EVER)
+    return _course(np, np.arcsinh, cosine, sine_squared, times, exponent, clipped)
 
 
-def _course(of: _Functions, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> SinkEffect:
-    """`course` by elementary functions ``of`` a kind of number; ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`."""
-    growing, squared = of.exp(x), cosine * cosine
-    size = of.sqrt(squared + sine_squared * growing * growing)
-    grown = of.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
+def _course(module: Any, asinh: Any, cosine: Any, sine_squared: Any, time: Any, exponent: Any, x: Any) -> SinkEffect:
+    """`course` by the functions of a ``module``; ``x`` is ``exponent`` κt clipped to ±`FOR_EVER`."""
+    growing, squared = module.exp(x), cosine * cosine
+    size = module.sqrt(squared + sine_squared * growing * growing)
+    grown = module.sqrt(0.5 + 0.5 * (squared + sine_squared * growing) / size)
     moving = time * ((x + TINY) / (exponent + TINY))
-    stretched = moving * (of.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)  # asinh(c κ stretched)/(c κ)
-    swing = cosine * 2.0 * of.sinh(x) / (1.0 + size) + TINY
+    stretched = moving * (module.sinh(x) + TINY) / (x + TINY) * 2.0 / (1.0 + size)  # asinh(c κ stretched)/(c κ)
+    swing = cosine * 2.0 * module.sinh(x) / (1.0 + size) + TINY
     return SinkEffect(
         transverse=growing / size,
         axial=1.0 / size,
-        turned=stretched * of.asinh(swing) / swing + (time - moving) / size,
+        turned=stretched * asinh(swing) / swing + (time - moving) / size,
         cosine=grown,
-        sine=0.5 * cosine * of.expm1(x) / (size * grown),
+        sine=0.5 * cosine * module.expm1(x) / (size * grown),
     )
 
 
@@ -140,23 +129,29 @@ def slip(effect: SinkEffect, first: Any, second: Any, behind: Any, cos_sin: Call
 
 
 def arc(
-    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, times: Array, wheel: float = 0.0
-) -> tuple[ComplexArray, Array, Array]:
+    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, times: Any, wheel: float = 0.0
+) -> tuple[Any, Any, Array]:
     """Coast of a symmetric body, exact: ω (n,), ω3 (n,) rad/s and attitude (n, 4) at ``times`` (n,) s from its start.
 
     ``quaternion`` (4,) body -> inertial, ``omega`` = ω1 + iω2 and ``spin`` hold at its start; ``growth`` is κ in 1/s.
+    At one time that is a number, by plain numbers: a tenth of the cost of arrays.
     """
-    times = np.asarray(times, dtype=float)
+    many = isinstance(times, np.ndarray)
+    module, exp, effect_of = (np, np.exp, courses) if many else (math, cmath.exp, course)
     first, second, third = _direction(A, C, omega, spin, wheel)
-    effect = courses(growth, third, first * first + second * second, times)
+    effect = effect_of(growth, third, first * first + second * second, times)
     offset = wheel / C
     rate = (A - C) / A * (spin + offset)
-    free, behind = np.exp(-1j * (rate - offset) * times), rate * (effect.turned - times)
+    free, behind = exp(-1j * (rate - offset) * times), rate * (effect.turned - times)
     there = complex(first, second) * free
-    slipped = slip(effect, there.real, there.imag, behind, lambda angle: (np.cos(angle), np.sin(angle)))
-    turned = attitude.multiply(attitude.arc(A, C, quaternion, omega, spin, times, wheel), np.stack(slipped, axis=-1))
+    slipped = slip(effect, there.real, there.imag, behind, lambda angle: (module.cos(angle), module.sin(angle)))
+    motion = A, C, quaternion, omega, spin, times, wheel
+    if many:
+        turned = attitude.multiply(attitude.arc(*motion), np.stack(slipped, axis=-1))
+    else:
+        turned = np.array(attitude.product(attitude.arc_end(*motion).tolist(), slipped))
     spins = (spin + offset) * effect.axial - offset
-    return omega * free * effect.transverse * np.exp(-1j * behind), spins, turned
+    return omega * free * effect.transverse * exp(-1j * behind), spins, turned
 
 
 def rates_on_arc(
@@ -175,30 +170,6 @@ def rates_on_arc(
     effect = courses(growth, along / size, across / (size * size), times)
     turned = rate * effect.turned - offset * times
     return np.asarray(omega * np.exp(-1j * turned) * effect.transverse), (spin + offset) * effect.axial - offset
-
-
-def arc_end(
-    A: float, C: float, growth: float, quaternion: Array, omega: complex, spin: float, time: float, wheel: float = 0.0
-) -> tuple[complex, float, Array]:
-    """`arc` at one ``time`` in s after its start: plain numbers, a tenth of the cost of arrays."""
-    first, second, third = _direction(A, C, omega, spin, wheel)
-    effect = course(growth, third, first * first + second * second, time)
-    offset = wheel / C
-    rate = (A - C) / A * (spin + offset)
-    free, behind = cmath.exp(-1j * (rate - offset) * time), rate * (effect.turned - time)
-    there = complex(first, second) * free
-    p, a, b, c = slip(effect, there.real, there.imag, behind, lambda angle: (math.cos(angle), math.sin(angle)))
-    w, x, y, z = attitude.arc_end(A, C, quaternion, omega, spin, time, wheel).tolist()
-    turned = np.array(
-        [
-            w * p - x * a - y * b - z * c,
-            w * a + x * p + y * c - z * b,
-            w * b - x * c + y * p + z * a,
-            w * c + x * b - y * a + z * p,
-        ]
-    )
-    spins = (spin + offset) * effect.axial - offset
-    return omega * free * effect.transverse * cmath.exp(-1j * behind), spins, turned
 
 
 def _direction(A: float, C: float, omega: complex, spin: float, wheel: float) -> tuple[float, float, float]:

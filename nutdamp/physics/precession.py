@@ -20,21 +20,11 @@ from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude
 
 
-class RhumbEnd(NamedTuple):
-    """End of a rhumb line: angle from the Sun, growth of the longitude about it, and ``turn``.
+def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> tuple[Any, Any, Any]:
+    """End of a rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the Sun, right-handed.
 
-    ``turn`` is the angle by which the meridian of the Sun has turned about the axis against a parallel-transported
-    direction: ∫ cos γ dλ.
-    """
-
-    sun_angle: Any
-    longitude: Any
-    turn: Any
-
-
-def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> RhumbEnd:
-    """Rhumb line from ``sun_angle`` γ at a ``heading`` from the direction away from the Sun, right-handed about H.
-
+    Angle from the Sun, growth of the longitude about it, and the angle by which the meridian of the Sun has turned
+    about the axis against a parallel-transported direction, ∫ cos γ dλ:
     γ2 = γ + s cos χ, Δλ = tan χ ln[tan(γ2/2)/tan(γ/2)] and ∫ cos γ dλ = tan χ ln[sin γ2 / sin γ], written without
     the division by cos χ. Not a number where it passes the Sun or the point opposite to it.
     """
@@ -50,12 +40,11 @@ def rhumb_end(sun_angle: Any, heading: Any, length: Any) -> RhumbEnd:
             short, 1.0 / np.sin(middle), np.log(np.tan(0.5 * end) / np.tan(0.5 * sun_angle)) / safe
         )
         per_turn = np.where(short, 1.0 / np.tan(middle), np.log(np.sin(end) / np.sin(sun_angle)) / safe)
-    return RhumbEnd(end, aside * per_longitude, aside * per_turn)
+    return end, aside * per_longitude, aside * per_turn
 
 
 def rhumb_course(sun_angle: Any, goal_angle: Any, ahead: Any) -> tuple[Any, Any]:
     """Heading χ (as in `rhumb_end`) and length of the rhumb line to ``goal_angle``, ``ahead`` in longitude.
-    longitude.
 
     tan χ = Δλ/Δψ with ψ = ln tan(γ/2); the length is Δγ/cos χ, and sin γ |Δλ| along a parallel.
     """

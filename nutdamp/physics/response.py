@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,17 +108,14 @@ def _mean_of_phase(slope: Any, bend: float, half: float) -> Any:
     before, term = 0.0 * slope, 1.0 + 0.0 * slope  # terms c_k half^k of the series of the integrand
     total = term
     for order in range(SERIES_ORDERS):
-        if order >= 4 and _largest(abs(term) + abs(before)) <= 1e-18:
+        sizes = abs(term) + abs(before)
+        if order >= 4 and (sizes if isinstance(sizes, float) else sizes.max()) <= 1e-18:
             break
         after = 1j * half * (slope * term + 2 * bend * half * before) / (order + 1)
         before, term = term, after
         if order % 2 == 1:
             total = total + term / (order + 2)
     return total
-
-
-def _largest(sizes: float | Array) -> float:
-    return sizes if isinstance(sizes, float) else float(sizes.max())
 
 
 def on_time_for(impulse: float, torque: float, rate: float, slope: float, longest: float) -> float | None:
@@ -237,17 +234,10 @@ def steady_response(A: float, nutation: float, torque: complex, rate: float = 0.
     return -1j * torque / (A * detuning)
 
 
-class PermanentRotation(NamedTuple):
-    """Rotation that stays constant in body and space: ω (rad/s), its rate ψ̇0 = |ω_i|, Euler angles ϑ0, φ0 (rad)."""
+def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> tuple[complex, float, float, float]:
+    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), constant in body and space.
 
-    omega: complex
-    rate: float
-    theta: float
-    phi: float
-
-
-def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> PermanentRotation:
-    """The permanent rotation that a constant body torque allows, Magnus 1970 (13), and its Euler angles (14).
+    Returns ω (rad/s), its rate ψ̇0 = |ω_i| and the Euler angles ϑ0, φ0 (rad), (14).
 
     tan ϑ0 = |M|/(|A - C| ω3²), tan φ0 = ω1/ω2 by arctan2; ψ̇0 is |ω|, where the source prints |ω̇|. With
     ω1 = ψ̇0 sin ϑ0 sin φ0, ω2 = ψ̇0 sin ϑ0 cos φ0, ω3 = ψ̇0 cos ϑ0. Infinite for a sphere. The form of (14); plans
@@ -255,7 +245,7 @@ def permanent_rotation(A: float, C: float, spin: float, torque: complex) -> Perm
     """
     omega = steady_response(A, (A - C) / A * spin, torque)
     rate = math.hypot(abs(omega), spin)
-    return PermanentRotation(omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag))
+    return omega, rate, math.atan2(abs(omega), spin), math.atan2(omega.real, omega.imag)
 
 
 def beat(A: float, nutation: float, torque: complex, rate: float) -> tuple[float, float]:

@@ -116,7 +116,7 @@ class AxisWatch:
     def _arc(self, here: MotionStretch, duration: Array) -> None:
         """Record start and inner extremes of arcs; their ends are starts of others."""
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
-        axis, size = self._axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
+        axis, size = self.sense * _third_axis(here.quaternion), np.sqrt(np.sum(momentum * momentum, axis=0))
         momentum, way = momentum / size, size / here.bodies.moments[0] * duration
         theta = _angles(momentum, axis)
         for number, direction in enumerate(self._towards(momentum)):
@@ -138,7 +138,7 @@ class AxisWatch:
         last = here.moved(here.since + np.maximum(duration - turn, 0.0))
         momentum = _rotated(here.quaternion, here.bodies.momentum(here.rates))
         momentum /= np.sqrt(np.sum(momentum * momentum, axis=0))
-        before, after = (_angles(momentum, self._axis(stretch.quaternion)) for stretch in (here, last))
+        before, after = (_angles(momentum, self.sense * _third_axis(stretch.quaternion)) for stretch in (here, last))
         betas = np.array([_angles(momentum, direction) for direction in self._towards(momentum)])
         passed = [(before - other) * (after - other) <= 0.0 for other in (*betas, *(math.pi - betas))]
         whole = (duration <= 2.0 * turn) | np.any(passed, axis=0)
@@ -205,10 +205,6 @@ class AxisWatch:
         for number, directions in enumerate(self.directions[:, :, self.rows]):
             yield momentum if number == self.momentum else directions
 
-    def _axis(self, quaternion: Array) -> Array:
-        w, x, y, z = quaternion
-        return self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-
 
 def _extreme(rise: Array, before: Array, after: Array) -> Array:
     """Level point of a cubic from 0 to 1 that gains a ``rise``, with slopes ``before`` and ``after`` of either sign."""
@@ -245,6 +241,12 @@ def _rotated(quaternion: Array, vector: Array) -> Array:
     w, axis = quaternion[0], quaternion[1:]
     once = _cross(axis, vector)
     return np.asarray(vector + 2.0 * (w * once + _cross(axis, once)))
+
+
+def _third_axis(quaternion: Array) -> Array:
+    """Axis 3 of bodies (3, n), inertial, by their unit quaternions (4, n)."""
+    w, x, y, z = quaternion
+    return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
 def _angles(first: Array, second: Array) -> Array:
@@ -353,10 +355,7 @@ class SunPulseClock:
 
     def angle(self, here: MotionStretch) -> Array:
         """Angle between spin axis and Sun, (n,) rad."""
-        w, x, y, z = here.quaternion
-        axis = self.sense * np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-        across = np.linalg.norm(_cross(axis, self.sun), axis=0)
-        return np.asarray(np.arctan2(across, np.sum(axis * self.sun, axis=0)))
+        return _angles(self.sense * _third_axis(here.quaternion), self.sun)
 
     @property
     def _pace(self) -> Array:

@@ -336,7 +336,9 @@ def integrate(
     inertia = np.asarray(moments)
     acceleration = np.asarray(torque) / inertia
     jerk = None if slope is None else slope / inertia
-    strength = _strength(acceleration, jerk, forcing, min(moments), end - start)
+    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / min(moments)
+    if jerk is not None:
+        strength = max(strength, float(np.linalg.norm(acceleration + jerk * (end - start))))
     fastest = max((abs(rate) for _, rate in forcing.turning), default=0.0) + abs(forcing.wheel) / min(moments)
     turned = (float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest) * (end - start)
     even = jerk is None and falling is None
@@ -352,7 +354,7 @@ def integrate(
         # Unit of time for the coefficients: about one radian, so that none over- or underflows.
         pace = float(np.linalg.norm(rates)) + math.sqrt(strength) + fastest + abs(forcing.growth)
         if not pace * left <= LONGEST:
-            raise _too_long(now, end, pace * left)
+            raise _refused(now, end, pace * left)
         unit = 1.0 / pace if pace > 0.0 else left
         state = np.concatenate([rates, quaternion])
         here, bent = acceleration if jerk is None else acceleration + jerk * gone, jerk
@@ -369,28 +371,16 @@ def integrate(
         pieces.append(piece)
         rates, quaternion = piece.final
         gone = duration if step == left else gone + step
-    raise _too_many(start, end)
+    raise _refused(start, end)
 
 
-def _strength(acceleration: Array, jerk: Array | None, forcing: Forcing, least: float, duration: float) -> float:
-    """Largest acceleration by all torques in ``duration`` s, rad/s²; ``least`` is the smallest principal moment."""
-    strength = float(np.linalg.norm(acceleration)) + sum(abs(size) for size, _ in forcing.turning) / least
-    return strength if jerk is None else max(strength, float(np.linalg.norm(acceleration + jerk * duration)))
-
-
-def _refused(start: float, end: float, why: str) -> Infeasible:
+def _refused(start: float, end: float, angle: float | None = None) -> Infeasible:
+    """Error of a motion over too large an ``angle`` rad, or None of too many steps."""
+    why = "takes too many steps" if angle is None else f"runs over {angle:.2g} rad, too many"
     return Infeasible(
         f"the motion from {start:.4g} s to {end:.4g} s {why} to be integrated; shorten the time, or look for a torque "
         "or rate that is too large"
     )
-
-
-def _too_long(start: float, end: float, angle: float) -> Infeasible:
-    return _refused(start, end, f"runs over {angle:.2g} rad, too many")
-
-
-def _too_many(start: float, end: float) -> Infeasible:
-    return _refused(start, end, "takes too many steps")
 
 
 def _symmetric(
@@ -412,16 +402,13 @@ def _symmetric(
         tuple((np.array([size / A]), rate) for size, rate in forcing.turning),
         forcing.wheel / A,
     )
-    omega, spin, duration = (
-        np.array([complex(rates[0], rates[1])]),
-        np.array([float(rates[2])]),
-        np.array([end - start]),
-    )
+    omega, spin = np.array([complex(rates[0], rates[1])]), np.array([float(rates[2])])
+    duration = np.array([end - start])
     angle = float(drive.pace(omega, spin, duration)[0]) * (end - start)
     if angle > most * STRIDE and most < MOST_STEPS:
-        raise _too_many(start, end)
+        raise _refused(start, end)
     if not angle <= LONGEST:
-        raise _too_long(start, end, angle)
+        raise _refused(start, end, angle)
     count = count_for(drive, omega, spin, duration)
     pieces: list[TaylorPiece] = []
     try:
@@ -429,9 +416,9 @@ def _symmetric(
             pieces += _pieces(series, quaternion)
             quaternion = pieces[-1].final[1]
             if len(pieces) > most:
-                raise _too_many(start, end)
+                raise _refused(start, end)
     except NotConverged:
-        raise _too_many(start, end) from None
+        raise _refused(start, end) from None
     pieces[-1] = replace(pieces[-1], duration=end - pieces[-1].start)  # the same but for rounding
     return pieces
 

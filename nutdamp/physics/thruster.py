@@ -31,7 +31,6 @@ def possible(tank: Tank) -> Any:
 @dataclass(frozen=True, slots=True)
 class Cold:
     """Cold nozzle: the first pulse of each channel has ``first`` times the thrust; it decays to 1 over ``pulses``.
-    to 1.
 
     ``fired``: pulses by channel before t = 0. The first two may be arrays, of cases.
     """
@@ -51,13 +50,6 @@ class Cold:
 
 PIECES = 16
 """Parts of a pulse, each with the specific impulse of its middle."""
-
-
-def expanded(rise: Any, power: Any) -> Any:
-    """((1 + rise)^(1/power) - 1) power/rise, 1 at 0: numbers or arrays, complex too."""
-    still = rise == 0.0
-    safe = np.where(still, 1.0, rise)
-    return np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +112,9 @@ class Tank:
         grown = 1.0 + full * np.minimum(used, self.propellant) / self.propellant
         level = grown ** (-self.exponent)
         rise = power * full * flow * level * time / (grown * self.propellant)
-        share = expanded(rise, power)
+        still = rise == 0.0  # complex too: ((1 + rise)^(1/power) - 1) power/rise, 1 at 0
+        safe = np.where(still, 1.0, rise)
+        share = np.where(still, 1.0, np.expm1(np.log1p(safe) / power) * power / safe)[()]
         return flow * level * time * share, level * share
 
     def share(self, used: Any, more: Any) -> Any:
@@ -254,13 +248,8 @@ class Trapezoid:
         rising, falling = opened - flat, level * fall
         areas = (0.5 * level * rising, flat, 0.5 * level * falling)
         total = math.fsum(areas)
-        moment = math.fsum(
-            (
-                areas[0] * 2.0 * rising / 3.0,
-                areas[1] * (rising + 0.5 * flat),
-                areas[2] * (opened + falling / 3.0),
-            )
-        )
+        arms = (rising + 0.5 * flat), (opened + falling / 3.0)
+        moment = math.fsum((areas[0] * 2.0 * rising / 3.0, areas[1] * arms[0], areas[2] * arms[1]))
         ramps, begin = [], self.open_delay
         for length, first, last in ((rising, 0.0, level), (flat, 1.0, 1.0), (falling, level, 0.0)):
             if begin + length > begin:
@@ -361,7 +350,7 @@ class Measured:
         return Opened((begin, begin, end, end), 1.0)
 
     def _between(self, known: int, value: float, sought: int) -> float:
-        """Interpolated column ``sought`` where the column ``known`` has ``value``."""
+        """Column ``sought`` where the column ``known`` has ``value``."""
         places = [row[known] for row in self.rows]
         value = min(max(value, places[0]), places[-1])
         row = min(max(bisect_right(places, value) - 1, 0), len(places) - 2)

@@ -104,7 +104,8 @@ def nutation_period(moments: ArrayLike, rates0: ArrayLike) -> float:
     polhode = _polhode(moments, rates0)
     if polhode.pace == 0.0 or polhode.complement == 0.0:
         return math.inf
-    return 4.0 * _quarter(polhode.complement) / (polhode.pace * polhode.rate_unit)
+    quarter = 0.5 * math.pi / _means(polhode.complement)[1]
+    return 4.0 * quarter / (polhode.pace * polhode.rate_unit)
 
 
 def arc_cones(moments: ArrayLike, rates: ArrayLike, sense: float, wheel: float = 0.0) -> ConeAngles:
@@ -162,7 +163,6 @@ class _ScaledPolhode(NamedTuple):
     pace: float  # p; zero where the rates are constant
     complement: float  # 1 - m
     about_c: float  # P
-    balance: float  # Q
 
 
 def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
@@ -172,7 +172,10 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
     rates /= rate_unit
     rates[np.abs(rates) < NEGLIGIBLE] = 0.0
     least, b, most = (int(axis) for axis in np.argsort(inertia, kind="stable"))
-    balance = _balance(inertia, rates, least, b, most)
+    # H² - 2T I_b, positive about the axis of the largest moment, zero on the separatrix: rational, to keep all digits.
+    i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, b, most))
+    w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
+    balance = float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
     a, c = (least, most) if balance >= 0.0 else (most, least)
     d_ca, d_cb, d_ba = (abs(float(inertia[x] - inertia[y])) for x, y in ((c, a), (c, b), (b, a)))
     about_c = float(inertia[a] * d_ca * rates[a] ** 2 + inertia[b] * d_cb * rates[b] ** 2)
@@ -182,23 +185,13 @@ def _polhode(moments: ArrayLike, rates0: ArrayLike) -> _ScaledPolhode:
         largest = math.sqrt(rates[c] ** 2 + inertia[b] * d_ba / (inertia[c] * d_ca) * rates[b] ** 2)
         pace = largest * math.sqrt(d_ca / inertia[a] * (d_cb / inertia[b]))
         complement = min(abs(balance) / (inertia[c] * d_cb * largest**2), 1.0)
-    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c, abs(balance))
+    return _ScaledPolhode((a, b, c), inertia, rates, rate_unit, largest, pace, complement, about_c)
 
 
 def _unit(values: Array) -> float:
     """Power of two near the largest value: dividing by it rounds nothing."""
     largest = float(np.max(np.abs(values)))
     return math.ldexp(1.0, math.frexp(largest)[1] - 1) if largest > 0.0 else 1.0
-
-
-def _balance(inertia: Array, rates: Array, least: int, middle: int, most: int) -> float:
-    """H² - 2T I_b, positive for motion about the axis of the largest moment.
-
-    It vanishes on the separatrix; rational numbers keep all its digits.
-    """
-    i_least, i_middle, i_most = (Fraction(float(inertia[axis])) for axis in (least, middle, most))
-    w_least, w_most = Fraction(float(rates[least])), Fraction(float(rates[most]))
-    return float(i_most * (i_most - i_middle) * w_most**2 - i_least * (i_middle - i_least) * w_least**2)
 
 
 def _rates(polhode: _ScaledPolhode, times: Array) -> Array:
@@ -226,10 +219,11 @@ def _swing(polhode: _ScaledPolhode, size: float, times: Array) -> Array:
     if polhode.complement == 0.0:
         return _swing_on_separatrix(polhode, size, times)
     c = polhode.axes[2]
-    period = 2.0 * _quarter(polhode.complement) / polhode.pace
+    mean = _means(polhode.complement)[1]
+    period = 2.0 * (0.5 * math.pi / mean) / polhode.pace
     # The integrand is regular within K' of the real axis, so that its coefficients fall like exp(-π k K'/K).
     parameter_agm = _means(1.0 - polhode.complement)[1] if polhode.complement < 1.0 else 0.0
-    modes = 2 + math.ceil(MODES_REACH / math.pi * parameter_agm / _means(polhode.complement)[1])
+    modes = 2 + math.ceil(MODES_REACH / math.pi * parameter_agm / mean)
     count = 2 * modes + 1
     rate = np.abs(_rates(polhode, np.linspace(0.0, period, count, endpoint=False))[:, c])
     coefficients = np.fft.rfft(rate / (size + polhode.moments[c] * rate)) / count
@@ -276,7 +270,7 @@ def _turn(rates: Array, times: Array) -> Array:
 
 
 def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
-    """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit."""
+    """Arithmetic and geometric means from 1 and sqrt(1 - m) on, and their limit, π/2 over the quarter period K."""
     arithmetic, geometric = 1.0, math.sqrt(complement)
     pairs = [(arithmetic, geometric)]
     for _ in range(MEANS):
@@ -285,11 +279,6 @@ def _means(complement: float) -> tuple[list[tuple[float, float]], float]:
         arithmetic, geometric = 0.5 * (arithmetic + geometric), math.sqrt(arithmetic * geometric)
         pairs.append((arithmetic, geometric))
     return pairs, 0.5 * (arithmetic + geometric)
-
-
-def _quarter(complement: float) -> float:
-    """Quarter period K of Jacobi's functions from 1 - m > 0."""
-    return 0.5 * math.pi / _means(complement)[1]
 
 
 def _jacobi(u: Array, complement: float) -> tuple[Array, Array, Array]:

@@ -204,7 +204,7 @@ def _growing(decision: Decision) -> Iterator[Note]:
     body, flight = decision.plan.spacecraft, decision.flight
     cases = decision.cases
     left = decision.final.nutation if cases is None else cases.levels[Part.NUTATION]
-    again = requirements.outgrown(body, left)
+    again = requirements.to_required(body, left, growing=True)
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
         limit = _limit_of(body, Part.NUTATION)
@@ -221,7 +221,7 @@ def _unaided(decision: Decision) -> Iterator[Note]:
     if not requirements.only_nutation(body):
         return
     now, limit = math.degrees(body.nutation), _limit_of(body, Part.NUTATION)
-    idle, damped = requirements.outgrown(body, body.nutation), requirements.subsides(body)
+    idle, damped = (requirements.to_required(body, body.nutation, growing=growing) for growing in (True, False))
     if damped is not None and damped < body.horizon:
         yield note("met-without-pulse-from", from_s=damped, nutation_deg=now, limit_deg=limit)
     if idle:
@@ -373,7 +373,8 @@ def reasons(compared: Comparison) -> Iterator[Note]:
         if any(plan.feasible for plan in compared.plans):
             yield note("no-blocks")
             return
-        damped = requirements.subsides(body) if requirements.only_nutation(body) else None
+        waiting = requirements.only_nutation(body)
+        damped = requirements.to_required(body, body.nutation, growing=False) if waiting else None
         yield note("none-feasible") if damped is None else note("none-needed-from", from_s=damped)
         if optimal_untried(compared) and (body.goal.spin is None or any(entry.axial for entry in body.channels)):
             yield note("optimal-not-tried")

@@ -18,7 +18,7 @@ import numpy as np
 
 from nutdamp import units
 from nutdamp.common import results, work
-from nutdamp.common.numerics import cleaned_change
+from nutdamp.common.numerics import cleaned
 from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import end_state, propagation
@@ -245,7 +245,7 @@ class Plan(results.Data, results.Tabled):
         if self.schedule is None:
             raise Infeasible(f"{self.scheme} is infeasible: {self.why}")
         end = units.end_of_flight(self.end + self.spacecraft.inertial_period if until is None else until)
-        count = units.rows(samples)
+        count = units.count("samples", samples, 2)
         fly = propagation.by_impulses if by_impulses else propagation.flown
         return replace(seen_at(fly(self.spacecraft, self.schedule, end), end), samples=count, scheme=self.scheme)
 
@@ -339,7 +339,7 @@ class Plan(results.Data, results.Tabled):
     def spin_change(self) -> float | None:
         """ω3 at the end minus at the start, rad/s, flown."""
         before, after = self.spacecraft.spin, self.flight.settled.spin
-        return cleaned_change(after - before, before) if self.feasible else None
+        return float(cleaned([after - before, before])[0]) if self.feasible else None
 
     @cached_property
     def delta_v(self) -> Vector | None:

@@ -492,10 +492,10 @@ class BlockModel:
         spin = state.spin + 0.5 * full * gained  # on average along the block
         step = self.turned_by(channel, trial.width, spin)
         heading = self.heading(channel, trial.delay, trial.width)
-        rhumb = precession.rhumb_end(state.sun_angle, heading, full * step)
+        sun_angle, longitude, turned = precession.rhumb_end(state.sun_angle, heading, full * step)
         turn = self.turn * np.abs(self.body.spin / spin)
         # As H goes round the Sun, its meridian turns about H, and the Sun pulse comes later by as much.
-        interval = trial.every * turn + rhumb.turn / trial.count * turn / (2.0 * math.pi)
+        interval = trial.every * turn + turned / trial.count * turn / (2.0 * math.pi)
         first = state.sun_pulse + trial.wait * self.turn * np.abs(self.body.spin / state.spin)
         following = first + (trial.count - 1) * interval + turn
         rate = self.rate(spin)
@@ -504,8 +504,8 @@ class BlockModel:
         kicks = self.kicks(state, channel, trial, rate * interval, back=True)
         gathered = kick * np.exp(-1j * rate * since_last) * kicks
         return BlockState(
-            sun_angle=rhumb.sun_angle,
-            longitude=state.longitude + rhumb.longitude,
+            sun_angle=sun_angle,
+            longitude=state.longitude + longitude,
             phasor=state.phasor * np.exp(-1j * rate * (following - state.sun_pulse)) + gathered,
             sun_pulse=following,
             spin=state.spin + full * gained,

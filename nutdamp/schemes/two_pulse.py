@@ -28,7 +28,7 @@ from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, 
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
 DEAREST = 2.0
 """Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
@@ -139,8 +139,10 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
     to_second = wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
     ends = np.array([end for _, end in windows.limits.blackout])
     tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
-    starts = windows.ticks_after(tried[tried >= earliest])
-    seconds, (long, longer) = windows.nearest_ticks(starts + to_second), (np.full(len(starts), on) for on in on_times)
+    starts, tick = tried[tried >= earliest], windows.limits.tick
+    starts = starts if tick is None else np.ceil((starts - 0.5 * TOUCHING) / tick) * tick
+    seconds = starts + to_second if tick is None else np.rint((starts + to_second) / tick) * tick
+    long, longer = (np.full(len(starts), on) for on in on_times)
     allowed = windows.allowed(starts, long, earliest) & (seconds > starts)  # not on one tick, however long that is
     allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
     return [float(start) for start in starts[allowed]]

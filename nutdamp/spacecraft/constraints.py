@@ -97,20 +97,10 @@ class Windows:
         tick = self.limits.tick
         return time if tick is None else round(time / tick) * tick
 
-    def nearest_ticks(self, times: Vector) -> Vector:
-        """`nearest_tick` of many times (n,)."""
-        tick = self.limits.tick
-        return times if tick is None else np.rint(times / tick) * tick
-
     def tick_after(self, time: float) -> float:
         """First commandable time not before ``time``, but for rounding."""
         tick = self.limits.tick
         return time if tick is None else math.ceil((time - 0.5 * TOUCHING) / tick) * tick
-
-    def ticks_after(self, times: Vector) -> Vector:
-        """`tick_after` of many times (n,)."""
-        tick = self.limits.tick
-        return times if tick is None else np.ceil((times - 0.5 * TOUCHING) / tick) * tick
 
     def on_time(self, needed: float, shortest: float, longest: float) -> float:
         """Commandable on-time nearest to ``needed`` s within the bounds, and not zero."""
@@ -162,23 +152,21 @@ def usable(spacecraft: Spacecraft, *, axial: bool = False) -> list[Channel]:
     One whose torques cancel is none of them.
     """
     time = spacecraft.horizon - spacecraft.limits.earliest
-
-    def has_on_time(channel: Channel) -> bool:
-        return shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
-
-    turning = [channel for channel in spacecraft.channels if channel.damps or (axial and channel.torque.any())]
-    return [channel for channel in turning if has_on_time(channel)]
+    return [
+        channel
+        for channel in spacecraft.channels
+        if (channel.damps or (axial and channel.torque.any()))
+        and shortest_on_time(spacecraft, channel) <= min(channel.max_on_time, time) + TOUCHING
+    ]
 
 
 def commandable_widths(commands: Commands, channel: Channel) -> Vector:
     """Widths (n,) s that a command block of a channel may have: those that give thrust."""
     widths = commands.widths
     widths = widths[(widths >= channel.min_on_time - 1e-12) & (widths <= channel.max_on_time + 1e-12)]
-    return (
-        widths
-        if channel.valve is None
-        else widths[[effective_on_time(channel, width) > 0.0 for width in widths.tolist()]]
-    )
+    if channel.valve is None:
+        return widths
+    return widths[[effective_on_time(channel, width) > 0.0 for width in widths.tolist()]]
 
 
 def rounded_off(spacecraft: Spacecraft, pulses: Iterable[Pulse]) -> list[float]:
@@ -234,13 +222,9 @@ def for_pairs(spacecraft: Spacecraft) -> list[Channel]:
         return channels
     cheapest: dict[int, Channel] = {}
     for channel in sorted(channels, key=lambda channel: (channel.price, -abs(channel.transverse))):
-        cheapest.setdefault(_about(channel), channel)
-    return [channel for channel in channels if cheapest.get(_about(channel)) is channel]
-
-
-def _about(channel: Channel) -> int:
-    """Number of the direction that a channel is about."""
-    return round(cmath.phase(channel.transverse) / (2.0 * math.pi) * PAIRED) % PAIRED
+        about = round(cmath.phase(channel.transverse) / (2.0 * math.pi) * PAIRED) % PAIRED
+        cheapest.setdefault(about, channel)
+    return [channel for channel in channels if any(channel is other for other in cheapest.values())]
 
 
 def channel_of(spacecraft: Spacecraft, pulse: Pulse) -> Channel | None:

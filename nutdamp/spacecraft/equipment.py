@@ -55,24 +55,16 @@ class Commands:
     every: tuple[int, ...]
     width_step: float | None = None
 
-    def delay_counts(self, delay: float) -> int:
-        """Steps of a ``delay`` s."""
-        return round(delay / self.delay_step)
+    def counts(self, name: str, time: float) -> int:
+        """Steps of a ``delay`` or ``width``, s; in a list of widths the number of the nearest entry, 1 the shortest."""
+        step = self.delay_step if name == "delay" else self.width_step
+        return 1 + int(np.abs(self.widths - time).argmin()) if step is None else round(time / step)
 
-    def width_counts(self, width: float) -> int:
-        """Steps of a ``width`` s; with a list of widths the number of the nearest entry, 1 the shortest."""
-        if self.width_step is not None:
-            return round(width / self.width_step)
-        return 1 + int(np.abs(self.widths - width).argmin())
-
-    def delay_of(self, counts: float) -> float:
-        """Delay of so many ``steps``, s."""
-        return counts * self.delay_step
-
-    def width_of(self, counts: float) -> float | None:
-        """Width of so many ``steps``, or of that number in the list, s; None where the list has no such number."""
-        if self.width_step is not None:
-            return counts * self.width_step
+    def time(self, name: str, counts: float) -> float | None:
+        """Inverse of `counts`, s; None where the list has no such number."""
+        step = self.delay_step if name == "delay" else self.width_step
+        if step is not None:
+            return counts * step
         return float(self.widths[int(counts) - 1]) if 1 <= counts <= len(self.widths) else None
 
 
@@ -131,7 +123,7 @@ class Sensor:
 
     @property
     def scales(self) -> tuple[float, ...]:
-        """Scale of each column of the signal."""
+        """Scale of each column of the signal: axis 1, and of a gyro axis 2."""
         return self._each(self.scale, 0)
 
     @property

@@ -43,8 +43,7 @@ class Part(Enum):
     @property
     def label(self) -> str:
         """Name in texts."""
-        names = {Part.SHIFT: "momentum shift", Part.DISTANCE: "axis error", Part.SPIN: "spin error"}
-        return names.get(self, "nutation")
+        return "spin error" if self is Part.SPIN else self.value.replace("_", " ")
 
 
 class Bound(NamedTuple):
@@ -189,26 +188,15 @@ def only_nutation(spacecraft: Spacecraft) -> bool:
     return there and spacecraft.goal.spin is None and not spacecraft.keep and not unaided(spacecraft)
 
 
-def outgrown(spacecraft: Spacecraft, nutation: float) -> float | None:
-    """Time, s, until the ``nutation`` (rad) of an uncontrolled prolate body exceeds the required one.
+def to_required(spacecraft: Spacecraft, nutation: float, *, growing: bool) -> float | None:
+    """Time, s, until the ``nutation`` (rad) of an uncontrolled body is the required one, ``growing`` or decaying.
 
-    None where it does not grow, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
+    None where it does not, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
     """
-    required = spacecraft.requirement
+    required, growth = spacecraft.requirement, spacecraft.growth
     if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
         return None
-    return reached(spacecraft, required.nutation, nutation) if spacecraft.growth > 0.0 else None
-
-
-def subsides(spacecraft: Spacecraft) -> float | None:
-    """Time, s, until the nutation of an uncontrolled oblate body has decayed to the required one.
-
-    None where it does not decay, where none is required, and where it is not known: with disturbances or I1 ≠ I2.
-    """
-    required = spacecraft.requirement
-    if required is None or required.nutation is None or spacecraft.disturbances or not spacecraft.inertia.symmetric:
-        return None
-    return reached(spacecraft, required.nutation) if spacecraft.growth < 0.0 else None
+    return reached(spacecraft, required.nutation, nutation) if growth != 0.0 and (growth > 0.0) == growing else None
 
 
 def missed(spacecraft: Spacecraft, nutation: Any, aim: Any) -> Any:
@@ -225,19 +213,14 @@ def severity(spacecraft: Spacecraft, left: Left, used: Sequence[Any] = ()) -> An
     Without such bounds what is `missed`, rad. Where more than all of a cone, or of the propellant, is ``used`` (shares)
     on the way, it is no less than that.
     """
-    shares = np.asarray(_severity_at_end(spacecraft, left), dtype=float)
+    parts: list[Any] = [left_of(bound.part, left, spacecraft) / bound.most for bound in required(spacecraft)]
+    if not parts:
+        parts = [missed(spacecraft, left.nutation, left.aim)]
+    shares = np.asarray(np.maximum.reduce(np.broadcast_arrays(*parts)), dtype=float)
     if not len(used):
         return shares
     worst = np.maximum.reduce(np.broadcast_arrays(*used))
     return np.where(worst > 1.0, np.maximum(worst, shares), shares)
-
-
-def _severity_at_end(spacecraft: Spacecraft, left: Left) -> Any:
-    limits = required(spacecraft)
-    if not limits:
-        return missed(spacecraft, left.nutation, left.aim)
-    shares = [left_of(bound.part, left, spacecraft) / bound.most for bound in limits]
-    return shares[0] if len(shares) == 1 else np.maximum.reduce(np.broadcast_arrays(*shares))
 
 
 LOOP = """the spacecraft file has no loop: it names no sensor to fire by. For example:

@@ -193,15 +193,8 @@ def channel_pulse(channel: Channel, t: float, on_time: float) -> Pulse:
 
 def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
     flow = channel.mass_flow
-    return Pulse(
-        t=t,
-        on_time=on_time,
-        channel=channel.name,
-        impulse=channel.torque * on_time,
-        torque=channel.torque,
-        force=channel.force,
-        propellant=None if flow is None else flow * on_time,
-    )
+    propellant = None if flow is None else flow * on_time
+    return Pulse(t, on_time, channel.name, channel.torque * on_time, channel.torque, channel.force, propellant)
 
 
 def steerable_pulse(
@@ -212,21 +205,16 @@ def steerable_pulse(
     Either ``impulse`` N m s is given, or ``on_time`` s where the torquer has a torque; else it gives ideal impulses.
     """
     direction = np.array([math.cos(angle), math.sin(angle), 0.0])
+    torque: Vector | None = None
     if steerable.torque is None:
-        on_time = 0.0
-    elif impulse is not None:
-        on_time = impulse / steerable.torque
-    if impulse is None:
-        impulse = 0.0 if steerable.torque is None else steerable.torque * on_time
+        on_time, impulse = 0.0, impulse or 0.0
+    else:
+        on_time = on_time if impulse is None else impulse / steerable.torque
+        impulse = steerable.torque * on_time if impulse is None else impulse
+        torque = steerable.torque * direction
     rate = steerable.propellant_per_impulse
-    return Pulse(
-        t=t,
-        on_time=on_time,
-        channel=STEERABLE,
-        impulse=impulse * direction,
-        torque=None if steerable.torque is None else steerable.torque * direction,
-        propellant=None if rate is None else rate * impulse,
-    )
+    propellant = None if rate is None else rate * impulse
+    return Pulse(t, on_time, STEERABLE, impulse * direction, torque, propellant=propellant)
 
 
 class Bounds(NamedTuple):
@@ -277,11 +265,6 @@ class Schedule:
     def idealised(self) -> bool:
         """True if any of the pulses is an ideal impulse."""
         return any(pulse.on_time == 0.0 for pulse in self.pulses)
-
-    @property
-    def through_valves(self) -> bool:
-        """True if any of the pulses differs in length from its command."""
-        return any(pulse.through_valve for pulse in self.pulses)
 
     @property
     def shaped(self) -> bool:

@@ -79,7 +79,7 @@ def _date(row: PulseRow) -> str | None:
 
 
 def _valves(schedule: Schedule) -> bool:
-    return schedule.through_valves
+    return any(pulse.through_valve for pulse in schedule)
 
 
 PULSES = (
@@ -169,7 +169,7 @@ def _counts(name: str) -> Callable[[BlockRow], int | None]:
         commands = row.body.commands
         if commands is None:
             return None
-        return commands.delay_counts(row.block.delay) if name == "delay" else commands.width_counts(row.block.width)
+        return commands.counts(name, getattr(row.block, name))
 
     return counted
 

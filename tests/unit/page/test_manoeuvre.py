@@ -115,7 +115,7 @@ def test_rows_of_command_blocks_are_blocks_with_counts_and_the_sun_phase() -> No
     assert (row["block"], row["pulses"], row["first Sun pulse"]) == ("1", str(block.count), str(block.first))
     delay, counts = numbers(row["delay s (counts)"])
     assert body.commands is not None
-    assert (delay, counts) == (block.delay, body.commands.delay_counts(block.delay))
+    assert (delay, counts) == (block.delay, body.commands.counts("delay", block.delay))
     # Without nutation the Sun phase is the delay times the spin.
     assert float(row["Sun phase deg"]) == pytest.approx(math.degrees(block.delay * body.spin) % 360.0, abs=0.3)
     assert row["start UTC"] == body.utc(fired.pulses[0].loaded[0], 3)

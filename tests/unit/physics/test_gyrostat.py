@@ -66,7 +66,7 @@ def test_arcs_with_dissipation(A: float, C: float, spin: float, wheel: float) ->
             np.array([m.rates for m in flown]), abs=1e-10
         )
         assert apart(turned, flown) < 1e-10
-        end = energy_sink.arc_end(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel)
+        end = energy_sink.arc(A, C, growth, quaternion, OMEGA, spin, 20.0, wheel)
         assert end[0] == pytest.approx(omega[-1], abs=1e-12)
         assert end[2] == pytest.approx(turned[-1], abs=1e-12)
         rates = energy_sink.rates_on_arc(A, C, growth, OMEGA, spin, TIMES, wheel)

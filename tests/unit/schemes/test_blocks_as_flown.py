@@ -116,7 +116,7 @@ def test_a_rhumb_line_is_the_solution_of_its_equations(heading: float) -> None:
 
     expected = solve_ivp(slope, (0.0, 0.7), [1.2, 0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     assert [float(one) for one in precession.rhumb_end(1.2, heading, 0.7)] == pytest.approx(expected, abs=1e-10)
-    assert math.isnan(float(precession.rhumb_end(0.3, math.pi, 0.4).sun_angle))
+    assert math.isnan(float(precession.rhumb_end(0.3, math.pi, 0.4)[0]))
 
 
 def test_phasors_of_a_train_add_up() -> None:

@@ -364,7 +364,7 @@ def test_what_is_rounding_beside_its_neighbours_is_zero(run: Run) -> None:
     assert cleaned.tolist() == [[1.0, 0.0, 0.0], [1e-20, 2e-20, 0.0], [5.0, 6e-13, 0.0]]
     assert not np.signbit(cleaned).any()
     assert vector([4.484e-18, -0.0, 8.0]) == "(0, 0, 8)"
-    assert [numerics.cleaned_change(change, 3.0) for change in (4e-16, -4e-12)] == [0.0, -4e-12]
+    assert [numerics.cleaned([change, 3.0])[0] for change in (4e-16, -4e-12)] == [0.0, -4e-12]
     tilted = str(case("tensor-microsat.yaml"))
     rows = list(csv.reader(io.StringIO(run("simulate", tilted, "--scheme", "none", "--csv", "-").stdout)))
     file = json.loads(run("check", tilted, "--json", "-").stdout)["files"][0]
