@@ -195,9 +195,6 @@ class Consequence(NamedTuple):
 MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
 """Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
 
-RESONANT = 3.0
-"""Beat period over horizon from which a disturbance counts as resonant."""
-
 
 def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
     """Effect of each disturbance, in the order of the file."""
@@ -211,7 +208,7 @@ def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequenc
         return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
     largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
-    if period > RESONANT * spacecraft.horizon:
+    if period > 3.0 * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
             (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))

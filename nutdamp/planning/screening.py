@@ -1,11 +1,10 @@
 """Sequential screening of plans in dispersed cases, and on-times trimmed to what enough cases need.
 
-Few cases of all plans are flown, all cases of those that may be chosen after a few. All plans fly the same draws, the
-first cases first. The complying share of all cases is bounded by an exact interval from the first ones (Clopper &
-Pearson 1934), so wide that it errs once in a million times; a plan that could not be chosen even at the favourable end
-of its interval is flown no further. Trimming shortens the on-times of a plan as far as enough cases comply, in cases of
-a fresh seed too. Which comply with shorter on-times is predicted: their flown ends move by the slopes of the closed
-form. What comes out is flown; where too few cases comply then, fewer are predicted to the next time.
+All plans fly the same draws, the first cases first. The complying share of all cases is bounded by an exact interval
+from the first ones (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that could not be
+chosen even at the favourable end of its interval is flown no further. Which cases comply with shorter on-times is
+predicted: their flown ends move by the slopes of the closed form. What comes out is flown, in fresh cases too; where
+too few cases comply then, fewer are predicted to the next time.
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ from nutdamp.montecarlo.statistics import EXACT_CASES, OUTPUTS, ROWS, binomial_i
 from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study, run, study_of, threads_here
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Share
+from nutdamp.planning.plan import Plan, Share
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
@@ -41,11 +39,9 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 STAGES = (2_048, 8_192)
 """Numbers of cases after which plans are screened."""
 
-CERTAIN = 1.0 - 1e-6
-"""Confidence of the intervals by which plans are left out."""
-
-LIKELIER = 0.01
-"""Least possible gain in the complying share for a plan to be flown further, where too few cases comply with each."""
+CERTAIN, LIKELIER = 1.0 - 1e-6, 0.01
+"""Confidence of the intervals by which plans are left out; least possible gain in the complying share for a plan to be
+flown further, where too few cases comply with each."""
 
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
@@ -151,9 +147,9 @@ class PlanCandidate:
 def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    made = PlanCandidate(plan, variant, cases_of(results, samples), results)
-    _bound(made, samples)
-    return made
+    candidate = PlanCandidate(plan, variant, cases_of(results, samples), results)
+    _bound(candidate, samples)
+    return candidate
 
 
 def _run(results: Results) -> Results:
@@ -233,12 +229,10 @@ def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dic
 
 
 def _bound(candidate: PlanCandidate, samples: int) -> None:
-    if candidate.met is not None:
-        known = candidate.cases.samples >= samples
-        count = round(candidate.met * candidate.cases.samples)
-        candidate.low, candidate.high = (
-            (candidate.met, candidate.met) if known else binomial_interval(count, candidate.cases.samples, CERTAIN)
-        )
+    met, done = candidate.met, candidate.cases.samples
+    if met is not None:
+        known = done >= samples
+        candidate.low, candidate.high = (met, met) if known else binomial_interval(round(met * done), done, CERTAIN)
 
 
 def _stage(done: int, samples: int) -> int:
@@ -269,25 +263,23 @@ def fly_all(
     those that comply as often as the best but for the sampling error. Those that have a case that cannot be flown
     leave the ``candidates``.
     """
+
+    def promise(candidate: PlanCandidate) -> tuple[bool, bool, float]:
+        may = candidate.high is not None and candidate.high >= probability
+        return candidate not in always, not may, candidate.plan.pulses.cost if may else candidate.rank
+
     while candidates:
-        some = [candidate for candidate in always if candidate in candidates] + _hopeful(
-            candidates, samples, probability
-        )
+        some = [candidate for candidate in always if candidate in candidates]
+        some += _hopeful(candidates, samples, probability)
         some = [candidate for candidate in some if candidate.cases.samples < samples]
         if not some:
             return
-        first = min(some, key=lambda candidate: (candidate not in always, *_promise(candidate, probability)))
+        first = min(some, key=promise)
         try:
             _further(first, samples)
         except Infeasible:
             candidates.remove(first)
         watch()
-
-
-def _promise(candidate: PlanCandidate, probability: float) -> tuple[bool, float]:
-    """Sort key of the next candidate to fly."""
-    may = candidate.high is not None and candidate.high >= probability
-    return not may, candidate.plan.pulses.cost if may else candidate.rank
 
 
 def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
@@ -299,9 +291,8 @@ def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) 
     if sure:
         comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
         most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
-        return [
-            candidate for candidate, _, high in bounds if high >= probability and candidate.plan.pulses.cost <= most
-        ]
+        may = [candidate for candidate, _, high in bounds if high >= probability]
+        return [candidate for candidate in may if candidate.plan.pulses.cost <= most]
     least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
     return [candidate for candidate, _, high in bounds if high >= least]
 
@@ -311,41 +302,33 @@ def _as_near(candidates: list[PlanCandidate], samples: int, probability: float) 
     ranks = [candidate.rank for candidate in candidates if candidate.cases.samples >= samples]
     if not ranks:
         return candidates
-    most = AS_GOOD * min(ranks)
-    return [candidate for candidate in candidates if _share_within(candidate, most) >= probability]
 
+    def largest_share(candidate: PlanCandidate) -> float:
+        """Of all cases, that may leave that little."""
+        body, results = candidate.plan.spacecraft, candidate.results
+        if results is None or results.values is None:
+            return 1.0
+        parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, requirements.aim(body)]
+        rows = results.values[[OUTPUTS.index(part.value) for part in parts], : results.done]
+        count = min(int(np.count_nonzero(row <= AS_GOOD * min(ranks))) for row in rows)
+        return binomial_interval(count, results.done, CERTAIN)[1]
 
-def _share_within(candidate: PlanCandidate, most: float) -> float:
-    """Largest share of all cases that may leave at most ``most`` rad."""
-    body = candidate.plan.spacecraft
-    if candidate.results is None or candidate.results.values is None:
-        return 1.0
-    parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, requirements.aim(body)]
-    rows = candidate.results.values[[OUTPUTS.index(part.value) for part in parts], : candidate.results.done]
-    count = min(int(np.count_nonzero(row <= most)) for row in rows)
-    return binomial_interval(count, candidate.results.done, CERTAIN)[1]
+    return [candidate for candidate in candidates if largest_share(candidate) >= probability]
 
 
 FRESH = 211
 """Seed of cases that nothing was chosen by."""
 
-SHORTEST = 0.8
-"""Least share of on-times when they are shortened: together, and then each alone once more."""
-
-HALVINGS, FINER = 7, 5
-"""Steps in which all on-times are shortened together, and then each alone."""
-
-FEW = 8
-"""Pulses up to which each is shortened alone."""
+SHORTEST, HALVINGS, FINER, FEW = 0.8, 7, 5, 8
+"""Least share of on-times when they are shortened; steps in which all are shortened together, and then each alone once
+more; pulses up to which that is done."""
 
 PASSES, NEARLY = 3, 2.0
 """Times that on-times are shortened, and standard deviations of complying cases to spare up to which once will do."""
 
-WORST, THIN = 20.0, 8
-"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands."""
-
-SMALL = 0.02
-"""Share of on-times of difference quotients."""
+WORST, THIN, SMALL = 20.0, 8, 0.02
+"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands; share of
+on-times of difference quotients."""
 
 TRIMS, RESERVE = 4, 0.2
 """Plans that are flown in each pass, and the standard deviations by which fewer cases than may are predicted to fail.
@@ -457,9 +440,8 @@ class FlownPlan:
     @cached_property
     def failing(self) -> list[int]:
         """Number of cases of each draw that fail."""
-        return [
-            round((1.0 - met) * self.candidate.cases.samples) for met in (self.candidate.met or 0.0, self.fresh.met)
-        ]
+        shares, samples = (self.candidate.met or 0.0, self.fresh.met), self.candidate.cases.samples
+        return [round((1.0 - met) * samples) for met in shares]
 
     @cached_property
     def _slopes(self) -> list[tuple[Vector, Vector, NDArray[np.int_]]]:

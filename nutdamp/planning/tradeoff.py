@@ -33,19 +33,11 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Bounds
 
-SCHEME = "optimal"
-
 ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
 """Subjects of the equations."""
 
-SAME = 1e-9
-"""Relative difference up to which a bound is that of the plan."""
-
-LOOKS = 32
-"""Moments of the primer curve in a turn of the faster of its two parts."""
-
-MOST_LOOKS = 6_000
-"""Moments of the whole curve."""
+LOOKS, MOST_LOOKS = 32, 6_000
+"""Moments of the primer curve in a turn of the faster of its two parts, and of all of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +52,6 @@ class Certificate:
     program: Program
     burns: tuple[Burn, ...]
     proof: Proof
-
-    @property
-    def bound(self) -> float:
-        """Proved lower bound of the cost."""
-        return self.proof.bound
 
     @property
     def rows(self) -> list[str]:
@@ -108,11 +95,11 @@ class Certificate:
 def certificate(plan: Plan) -> Certificate:
     """Certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
     known = plan.pulses.bounds
-    if plan.scheme != SCHEME:
-        raise BadRequest(f"a certificate is of a plan of {SCHEME}, not of {plan.scheme}")
+    if plan.scheme != OPTIMAL.name:
+        raise BadRequest(f"a certificate is of a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
-        raise BadRequest(f"{SCHEME} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
-    chosen = planner.options_of(catalogue.SCHEMES[SCHEME], plan.options)
+        raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
+    chosen = planner.options_of(catalogue.SCHEMES[OPTIMAL.name], plan.options)
     body = planning.known(plan.spacecraft, chosen)
     if body.thrust_laws:
         chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)
@@ -123,9 +110,9 @@ def certificate(plan: Plan) -> Certificate:
         program = problem.program()
         solution = program.solve()
     except Infeasible as reason:
-        raise BadRequest(f"{SCHEME} has no least cost to prove here: {reason}") from None
+        raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {reason}") from None
     proof = bounds.first_order(program, solution.prices)
-    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(known.first_order):
+    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > 1e-9 * abs(known.first_order):
         raise BadRequest("the plan is put together from several programs, and none of them proves what all of it costs")
     return Certificate(plan, problem, program, solution.burns, proof)
 
@@ -166,11 +153,8 @@ class Front:
         """First-order lower bound for a ``point``; no more than those of points that have less time."""
         first, within = point.bounds.first_order, point.bounds.within
         known = [point.bounds for point in self.points if point.bounds.within <= within]
-        return (
-            None
-            if first is None
-            else min([first, *(bounds.first_order for bounds in known if bounds.first_order is not None)])
-        )
+        known_orders = (bounds.first_order for bounds in known if bounds.first_order is not None)
+        return None if first is None else min(first, *known_orders, math.inf)
 
 
 def fronts(
@@ -197,7 +181,9 @@ def fronts(
     with work.budget("the fronts", work.FRONTS) as spent:
         searches = _Searches(count * len(ordered), spent, progress)
         for number, shift in enumerate(ordered, start=1):
-            searched = _searched(spacecraft, _allowing(options, shift), count, searches)
+            anywhere = math.isinf(shift)
+            allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+            searched = _searched(spacecraft, allowing, count, searches)
             if isinstance(searched, str):
                 why[shift] = searched
             else:
@@ -218,7 +204,8 @@ def fronts(
         if not points:
             points = [Point(plan, spacecraft.horizon, unit) for plan in others if _keeps(plan, shift)]
         kept = undominated(points, result[-1].points if result else ())
-        result.append(Front(shift, kept, why.get(shift) if _by_others(kept) else None))
+        by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
+        result.append(Front(shift, kept, why.get(shift) if by_others else None))
     return tuple(result)
 
 
@@ -226,11 +213,6 @@ def _unit(plans: Sequence[Plan]) -> str:
     """Unit in which all costs and bounds are known."""
     bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
     return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
-
-
-def _by_others(points: Sequence[Point]) -> bool:
-    """True if no point is of the scheme optimal."""
-    return all(point.plan.scheme != OPTIMAL.name for point in points)
 
 
 def _keeps(plan: Plan, shift: float) -> bool:
@@ -273,11 +255,6 @@ class _Searches:
         self.done += 1
         self.progress(self.done)
         return planned
-
-
-def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
-    anywhere = math.isinf(shift)
-    return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
 
 
 def _searched(

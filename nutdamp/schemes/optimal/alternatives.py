@@ -36,14 +36,9 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-STARTS = 8
-"""Starts in a nutation period that are tried of a channel that has a transverse torque, too."""
-
-CORRECTED = 4
-"""Flights by which the length is corrected."""
-
-MOST_PULSES = 200
-"""Pulses at most."""
+STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
+"""Starts in a nutation period that are tried of a channel that has a transverse torque, too; flights by which the
+length is corrected; pulses at most."""
 
 
 def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iterator[Schedule]:
@@ -96,51 +91,16 @@ def _schedule(
     return schedule if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule) else None
 
 
-CLEARLY = 0.8
-"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for."""
+CLEARLY, ABOUT = 0.8, 0.002
+"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for, and the share
+by which it may be more: it is not that of the true motion."""
 
-ABOUT = 0.002
-"""Share by which their cost may be more: it is not that of the true motion."""
+BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
+"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
+are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-BISECTIONS = 3
-"""Steps in which the earliest end is found that they allow."""
-
-ROUNDS = 3
-"""Earlier ends that are looked for one after the other."""
-
-PARTS = (0.2, 0.4, 0.6)
-"""Horizons that are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
-
-EARLIER = 300.0
-"""Units of `work` after which no other one is looked for."""
-
-MOST_ENDS = 900.0
-"""Units that may be spent on all of them."""
-
-ELSEWHERE = (0.85, 0.7, 0.55, 0.4)
-"""Shares of the horizon that are tried in turn where a schedule is dear or was not found."""
-
-MOST_ELSEWHERE = 1500.0
-"""Units that may be spent on them."""
-
-
-def elsewhere(
-    problem: Problem, best: Schedule | None, first: Solution, cheapest: Callable[[float], Schedule | None]
-) -> Schedule | None:
-    """The ``best``; where there is none, or a dear one, the cheapest with shorter horizons.
-
-    ``first`` and ``cheapest`` as in `hastened`.
-    """
-    if first.unmet > UNMET:
-        return best
-    begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    with work.budget("other ends", MOST_ELSEWHERE):
-        for share in ELSEWHERE:
-            sooner = begin + share * (horizon - begin)
-            if work.exhausted() or not problem.dear(best, first.cost) or not problem.feasible(sooner):
-                break
-            best = problem.cheaper(best, cheapest(sooner))
-    return best
+EARLIER, MOST_ENDS = 300.0, 900.0
+"""Units of `work` after which no other one is looked for, and that may be spent on all of them."""
 
 
 def hastened(
@@ -179,10 +139,8 @@ def hastened(
 
 
 def _least_share(problem: Problem, span: float, most: float) -> float | None:
-    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`.
-
-    Nor may it cost them more than `ABOUT` over what they cost in all of the span.
-    """
+    """The least share of the ``span`` s that small angles allow at a cost of ``most``, and of `ABOUT` over that of all
+    of the span; None for one above `CLEARLY`."""
 
     def cost(share: float) -> float:
         horizon = problem.spacecraft.limits.earliest + share * span
@@ -197,10 +155,6 @@ def _least_share(problem: Problem, span: float, most: float) -> float | None:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if cost(middle) <= most else (middle, high)
     return high
-
-
-CONES = (12, 6, 3)
-"""Half cones in a row that are tried beside the number that the scheme takes."""
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
@@ -221,7 +175,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
         if body.spin != 0.0:
             plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
-        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
+        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
     for plan in plans:
         if work.exhausted():
             return
@@ -239,23 +193,14 @@ SLOTS, MOST_SLOTS = 40, 320
 LINES = 4
 """Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
 
-NEWTON_STEPS = 25
-"""Newton steps for the lengths of the burns."""
-
-CONVERGED = 1e-12
-"""Largest end error, over |H|."""
+NEWTON_STEPS, CONVERGED = 25, 1e-12
+"""Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
 
 SHORTEST = 0.02
 """Share of a slot below which a burn is left out before the lengths are found."""
 
-HALVINGS = 10
-"""Steps in which the earliest end is found, from what small angles allow."""
-
-LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""Shares added to the earliest end by small angles, tried in turn."""
-
-PROGRAM = 4.0
-"""Units of work of a program."""
+HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
+"""Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
 
 
 class Piece(NamedTuple):
@@ -265,7 +210,7 @@ class Piece(NamedTuple):
     time: float
 
 
-def possible(problem: Problem) -> bool:
+def _possible(problem: Problem) -> bool:
     """True where burns may follow each other without a gap, begin at any time and be of any number."""
     limits = problem.spacecraft.limits
     return limits.gap == 0.0 and limits.tick is None and limits.max_pulses is None and bool(problem.channels)
@@ -273,17 +218,18 @@ def possible(problem: Problem) -> bool:
 
 def earliest(problem: Problem) -> Schedule | None:
     """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
-    if not possible(problem):
+    if not _possible(problem):
         return None
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    if _pieces(problem, _small_angles(problem), horizon) is None:
+    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    if _pieces(problem, influence, horizon) is None:
         return None
     low, high = begin, horizon
     for _ in range(HALVINGS):
         if work.exhausted():
             return None
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _pieces(problem, _small_angles(problem), middle) else (middle, high)
+        low, high = (low, middle) if _pieces(problem, influence, middle) else (middle, high)
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
         schedule = within(problem, end)
@@ -294,9 +240,9 @@ def earliest(problem: Problem) -> Schedule | None:
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
-    if not possible(problem):
+    if not _possible(problem):
         return None
-    influence = _small_angles(problem)
+    influence = refinement.small_angles(problem.spacecraft, problem.equations)
     for _ in range(LINES):
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
@@ -306,19 +252,12 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
             flown = problem.flown(schedule)
         except Infeasible:
             return None
-        if (
-            problem.left(flown) <= LEFT
-            and schedule.end <= horizon
-            and keeps_limits(problem.spacecraft, schedule.pulses)
-        ):
+        in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
+        if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
         first = _burns(problem, pieces, np.array([piece.time for piece in pieces]))
         influence = refinement.along(problem.flown(first), problem.equations, _slot(problem))
     return None
-
-
-def _small_angles(problem: Problem) -> Influence:
-    return refinement.small_angles(problem.spacecraft, problem.equations)
 
 
 def _slot(problem: Problem) -> float:
@@ -336,7 +275,7 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     width = float(edges[1] - edges[0])
     if not len(free):
         return None
-    work.spend(PROGRAM)
+    work.spend(4.0)
     centres = 0.5 * (edges[1:] + edges[:-1])[free]
     lost = influence.widths(np.array([width]))[0]
     torques = np.array([channel.torque for channel in channels])
@@ -362,11 +301,11 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
 def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.intp], times: Vector) -> list[Piece]:
     """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
     width = float(edges[1] - edges[0])
-    pieces, place = list[Piece](), {int(slot): number for number, slot in enumerate(free)}
-    before: Channel | None = None
+    pieces, before = list[Piece](), None
+    every = np.zeros((len(channels), len(edges)))  # and one slot more, in which nothing fires
+    every[:, free] = times
     for slot in range(len(edges) - 1):
-        mine = times[:, place[slot]] if slot in place else np.zeros(len(channels))
-        following = times[:, place[slot + 1]] if slot + 1 in place else np.zeros(len(channels))
+        mine, following = every[:, slot], every[:, slot + 1]
         firing = [number for number in range(len(channels)) if mine[number] > SHORTEST * width]
         firing.sort(key=lambda number: (channels[number] is not before, following[number] > 0.0))
         for number in firing:

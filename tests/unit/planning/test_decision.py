@@ -159,7 +159,7 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
         for asked in (False, True):
             aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
             made = Decision(Plan(aimed, "trial", Schedule((fired,))))
-            assert made.final.spin == pytest.approx(up.spin * (1.0 + share))
+            assert made.flight.final.spin == pytest.approx(up.spin * (1.0 + share))
             assert ("spin-change" in codes(decision_notes(made))) == (change and not asked)
             if change and not asked:
                 values = one_of(decision_notes(made), "spin-change")

@@ -29,8 +29,8 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare, decide, usual
 from nutdamp.planning.notes import alternatives, reasons
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Gain, Ground, Standing, cheapest, recommend
+from nutdamp.planning.plan import Plan, Standing
+from nutdamp.planning.recommendation import Gain, Ground, cheapest, recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Block

@@ -19,8 +19,8 @@ from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import SEED
 from nutdamp.planning import screening
 from nutdamp.planning.decision import Comparison, compare, decide
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Share, recommend
+from nutdamp.planning.plan import Plan, Share
+from nutdamp.planning.recommendation import recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
 
 SHORT, LONG, ALL = 2_048, 8_192, 20_000
