@@ -419,12 +419,8 @@ def infeasibility(plan: Plan) -> str:
 
 def strays(aspect: Aspect) -> str:
     """Message on a broken cone."""
-    keep = aspect.keep
-    angle, at, bound = (
-        (aspect.least, aspect.least_at, f"min = {math.degrees(keep.least):.6g}°")
-        if aspect.too_near
-        else (aspect.largest, aspect.largest_at, f"max = {math.degrees(keep.most):.6g}°")
-    )
+    keep, (angle, at, limit) = aspect.keep, aspect.broken_at
+    bound = f"{'min' if aspect.too_near else 'max'} = {math.degrees(limit):.6g}°"
     seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
     if math.isinf(at):
         return f"the target is {seen} from {keep.name} ({bound})"

@@ -100,19 +100,9 @@ def remaining(plan: Plan) -> Note:
 
 def broken_cone(aspect: Aspect) -> Note:
     """A cone about a direction that the spin axis breaks."""
-    keep = aspect.keep
-    angle, at, limit = (
-        (aspect.least, aspect.least_at, keep.least)
-        if aspect.too_near
-        else (aspect.largest, aspect.largest_at, keep.most)
-    )
-    return note(
-        "cone-broken",
-        angle_deg=math.degrees(angle),
-        direction=keep.name,
-        at_s=at,
-        limit_deg=math.degrees(limit),
-    )
+    angle, at, limit = aspect.broken_at
+    angle, limit = math.degrees(angle), math.degrees(limit)
+    return note("cone-broken", angle_deg=angle, direction=aspect.keep.name, at_s=at, limit_deg=limit)
 
 
 def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note]:

@@ -136,11 +136,8 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
         to_go = _length((here.momentum, point, *route[number:]))
         share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
         spin = goal.spin if number == len(route) else None
-        leg = replace(
-            here,
-            goal=replace(goal, axis=point, spin=spin),
-            limits=replace(here.limits, horizon=share * here.horizon),
-        )
+        limits = replace(here.limits, horizon=share * here.horizon)
+        leg = replace(here, goal=replace(goal, axis=point, spin=spin), limits=limits)
         legs.fire(planner.schedule(scheme, leg, options))
     names = ", ".join(keep.name for keep in spacecraft.keep)
     return legs.schedule(note("goes-round", points=len(route) - 1, directions=names))

@@ -94,16 +94,14 @@ def equal_from(share: float, samples: int) -> float:
 class PlanCandidate:
     """Plan and its dispersed ``results``.
 
-    ``variant`` says how it differs from what its scheme plans. Of all cases the share that complies lies between
-    ``low`` and ``high``; these are None where nothing is required.
+    ``variant`` says how it differs from what its scheme plans. ``share``: of all cases; None where nothing is required.
     """
 
     plan: Plan
     variant: str
     cases: Cases
     results: Results | None = None
-    low: float | None = field(init=False, default=None)
-    high: float | None = field(init=False, default=None)
+    share: Share | None = field(init=False, default=None)
 
     @property
     def nutation(self) -> float:
@@ -119,13 +117,6 @@ class PlanCandidate:
     def met(self) -> float | None:
         """Complying share; None where nothing is required."""
         return self.cases.complying
-
-    @property
-    def share(self) -> Share | None:
-        """Share of all cases; None where nothing is required."""
-        if self.low is None or self.high is None:
-            return None
-        return Share(self.low, self.high, self.cases.probability)
 
     @property
     def left(self) -> float:
@@ -231,8 +222,8 @@ def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dic
 def _bound(candidate: PlanCandidate, samples: int) -> None:
     met, done = candidate.met, candidate.cases.samples
     if met is not None:
-        known = done >= samples
-        candidate.low, candidate.high = (met, met) if known else binomial_interval(round(met * done), done, CERTAIN)
+        bounds = (met, met) if done >= samples else binomial_interval(round(met * done), done, CERTAIN)
+        candidate.share = Share(*bounds, candidate.cases.probability)
 
 
 def _stage(done: int, samples: int) -> int:
@@ -265,7 +256,7 @@ def fly_all(
     """
 
     def promise(candidate: PlanCandidate) -> tuple[bool, bool, float]:
-        may = candidate.high is not None and candidate.high >= probability
+        may = candidate.share is not None and candidate.share.high >= probability
         return candidate not in always, not may, candidate.plan.pulses.cost if may else candidate.rank
 
     while candidates:
@@ -284,9 +275,9 @@ def fly_all(
 
 def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
     """Candidates that may still be chosen."""
-    if any(candidate.low is None for candidate in candidates):
+    bounds = [(each, each.share.low, each.share.high) for each in candidates if each.share is not None]
+    if len(bounds) < len(candidates):
         return _as_near(candidates, samples, probability)
-    bounds = [(candidate, candidate.low or 0.0, candidate.high or 0.0) for candidate in candidates]
     sure = [candidate.plan.pulses.cost for candidate, low, _ in bounds if low >= probability]
     if sure:
         comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
@@ -369,21 +360,15 @@ def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks) or not len(plan.pulses)
     if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
-    everywhere = list(range(len(plan.pulses)))
-    best = _shortened(plan, everywhere, HALVINGS, complies)
-    for index in everywhere if len(everywhere) <= FEW else ():
-        best = _shortened(best, [index], FINER, complies)
-    return best
-
-
-def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[Plan], bool]) -> Plan:
-    """Pulses with the indices ``which`` shortened alike, by bisection."""
-    low, high, best = SHORTEST, 1.0, plan
-    for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        ratios = [middle if index in which else 1.0 for index in range(len(plan.pulses))]
-        shorter = _scaled(plan, ratios, complies)
-        best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
+    every = range(len(plan.pulses))
+    alone = [((index,), FINER) for index in every] if len(every) <= FEW else []
+    best = plan
+    for which, halvings in ((every, HALVINGS), *alone):
+        low, high, long = SHORTEST, 1.0, best
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            shorter = _scaled(long, [middle if index in which else 1.0 for index in every], complies)
+            best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
     return best
 
 
@@ -451,7 +436,11 @@ class FlownPlan:
         in the closed form, of which the nutation is exact too; it errs by what it takes wide pulses for, nearly alike
         in all cases.
         """
-        heads = np.array([_heading(self.plan.spacecraft, schedule) for schedule in self._schedules])
+        body = self.plan.spacecraft
+        # Directions of H at the end of nominal flights, in body axes at t = 0.
+        flights, back = (propagation.flown(body, each) for each in self._schedules), body.initial.quaternion
+        momenta = [attitude.rotate(attitude.conjugate(back), flight.last_momentum) for flight in flights]
+        heads = np.array([momentum / np.linalg.norm(momentum) for momentum in momenta])
         wide = np.tile((heads[0] - heads[1:]) / SMALL, 2)[:, :, None] - self._nominal[1][:, 2:8]
         slopes = []
         for flown in (self.candidate.results, self.fresh.results):
@@ -515,12 +504,6 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
     ends = np.empty((ROWS, number_of(cases)))
     vectors(model, ClosedForm(model)(cases), ends)
     return ends
-
-
-def _heading(body: Spacecraft, schedule: Schedule) -> Vector:
-    """Direction (3,) of H at the end of the nominal flight, in body axes at t = 0."""
-    axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), propagation.flown(body, schedule).last_momentum)
-    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def shortest(chosen: PlanCandidate, fresh: Fresh) -> FlownPlan:

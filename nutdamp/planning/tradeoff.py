@@ -175,38 +175,51 @@ def fronts(
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
-    ordered = sorted(set(shifts))
+    ordered, done = sorted(set(shifts)), 0
     entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
+
+    def search(body: Spacecraft, chosen: OptimalOptions) -> Plan:
+        # The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may;
+        # of what they leave, all searches to come have equal shares.
+        nonlocal done
+        share = 1 if chosen.least == "time" else count * len(ordered) - done
+        with work.budget("a point", (spent.most - spent.done) / share):
+            planned = plan(body, OPTIMAL.name, chosen)
+        done += 1
+        progress(done)
+        return planned
+
     with work.budget("the fronts", work.FRONTS) as spent:
-        searches = _Searches(count * len(ordered), spent, progress)
         for number, shift in enumerate(ordered, start=1):
             anywhere = math.isinf(shift)
             allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
-            searched = _searched(spacecraft, allowing, count, searches)
+            searched = _searched(spacecraft, allowing, count, search)
             if isinstance(searched, str):
                 why[shift] = searched
             else:
                 entries += [(shift, *entry) for entry in searched]
-            searches.done = count * number
+            done = count * number
     others = _others(spacecraft, options) if why else []
     unit = "N m s" if options.least == "impulse" else _unit([*(plan for _, plan, _ in entries), *others])
-    result: list[Front] = []
     made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
-    for shift in ordered:
-        own = [point for kept, point in made_for if kept <= shift]
-        others_too = [
-            point
-            for kept, point in made_for
-            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, rival) for rival in own))
+    return tuple(_fronts(ordered, made_for, [Point(plan, spacecraft.horizon, unit) for plan in others], why))
+
+
+def _fronts(
+    shifts: Sequence[float], made_for: Sequence[tuple[float, Point]], others: Sequence[Point], why: dict[float, str]
+) -> Iterator[Front]:
+    """Fronts of the ``shifts``, the strictest first, of points ``made_for`` one of them; of the ``others`` without."""
+    kept: tuple[Point, ...] = ()
+    for shift in shifts:
+        own = [point for asked, point in made_for if asked <= shift]
+        looser = [point for asked, point in made_for if asked > shift]
+        points = own + [
+            point for point in looser if _keeps(point.plan, shift) or any(_serves(point, rival) for rival in own)
         ]
-        points = [*own, *others_too]
-        if not points:
-            points = [Point(plan, spacecraft.horizon, unit) for plan in others if _keeps(plan, shift)]
-        kept = undominated(points, result[-1].points if result else ())
+        kept = undominated(points or [point for point in others if _keeps(point.plan, shift)], kept)
         by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
-        result.append(Front(shift, kept, why.get(shift) if by_others else None))
-    return tuple(result)
+        yield Front(shift, kept, why.get(shift) if by_others else None)
 
 
 def _unit(plans: Sequence[Plan]) -> str:
@@ -235,40 +248,18 @@ def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
     return [plan for plan in plans if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
 
 
-@dataclass(eq=False)
-class _Searches:
-    """Searches of all fronts, within their ``budget``.
-
-    The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may; of
-    what they leave, all searches to come have equal shares.
-    """
-
-    count: int
-    budget: work.WorkBudget
-    progress: Callable[[int], None]
-    done: int = 0
-
-    def __call__(self, spacecraft: Spacecraft, options: OptimalOptions) -> Plan:
-        left = self.budget.most - self.budget.done
-        with work.budget("a point", left if options.least == "time" else left / (self.count - self.done)):
-            planned = plan(spacecraft, OPTIMAL.name, options)
-        self.done += 1
-        self.progress(self.done)
-        return planned
-
-
 def _searched(
-    spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
+    spacecraft: Spacecraft, options: OptimalOptions, count: int, search: Callable[[Spacecraft, OptimalOptions], Plan]
 ) -> list[tuple[Plan, float]] | str:
     """Schedules of the whole horizon, the fastest, and of horizons between, evenly by their ratios.
 
     Each with its horizon, s; or why there is none.
     """
-    whole = searches(spacecraft, options)
+    whole = search(spacecraft, options)
     if whole.schedule is None or whole.schedule.bounds is None:
         return infeasibility(whole) or "there is nothing to do"
     entries = [(whole, spacecraft.horizon)]
-    fastest = searches(spacecraft, replace(options, least="time")) if count > 1 else whole
+    fastest = search(spacecraft, replace(options, least="time")) if count > 1 else whole
     if fastest.schedule is None or not len(fastest.schedule):
         return entries
     entries.append((fastest, spacecraft.horizon))
@@ -276,7 +267,7 @@ def _searched(
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        planned = searches(body, options)
+        planned = search(body, options)
         if planned.schedule is not None and planned.schedule.bounds is not None:
             entries.append((planned, horizon))
     return entries

@@ -1,9 +1,8 @@
 """Schedules beside those of the linear program: simple spin changes, other ends, other schemes as starts.
 
 And firing almost without a pause, one channel after another: the earliest end, and the least cost in a short horizon.
-The program of `linear_program` lets channels fire at once. Here they share each slot of time: what one channel after
-another can supply is the convex hull of what each can, so that within a horizon the program has a solution where, to
-first order, there is a schedule. Its slots become burns without gaps, whose lengths are then found on the true motion.
+Channels share each slot of time: what one after another can supply is the convex hull of what each can. The slots
+become burns without gaps, whose lengths are then found on the true motion.
 """
 
 from __future__ import annotations
@@ -210,16 +209,8 @@ class Piece(NamedTuple):
     time: float
 
 
-def _possible(problem: Problem) -> bool:
-    """True where burns may follow each other without a gap, begin at any time and be of any number."""
-    limits = problem.spacecraft.limits
-    return limits.gap == 0.0 and limits.tick is None and limits.max_pulses is None and bool(problem.channels)
-
-
 def earliest(problem: Problem) -> Schedule | None:
     """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
-    if not _possible(problem):
-        return None
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
     influence = refinement.small_angles(problem.spacecraft, problem.equations)
     if _pieces(problem, influence, horizon) is None:
@@ -240,8 +231,6 @@ def earliest(problem: Problem) -> Schedule | None:
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
-    if not _possible(problem):
-        return None
     influence = refinement.small_angles(problem.spacecraft, problem.equations)
     for _ in range(LINES):
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
@@ -267,8 +256,10 @@ def _slot(problem: Problem) -> float:
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:
     """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
-    body, channels = problem.spacecraft, problem.channels
-    begin = body.limits.earliest
+    body, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
+    if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
+        return None  # burns may not follow each other without a gap, begin at any time and be of any number
+    begin = limits.earliest
     count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
     edges = np.linspace(begin, horizon, count + 1)
     free = np.flatnonzero(~Windows(body).blocked(edges[:-1], edges[1:]))

@@ -180,7 +180,11 @@ def rigorous(
     if spacecraft.goal.spin is not None:
         lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
     if shift and not axial:
-        lower_bounds.append(_turn(spacecraft, torques, costs, allowed))
+        # The way of H to the direction of the target, round the sphere of radius |H3|.
+        nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
+        way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
+        dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
+        lower_bounds.append(abs(spacecraft.axial) * way / dearest * (1.0 - ROUNDING))
     best = max(lower_bounds)
     return best if math.isfinite(best) else None
 
@@ -233,14 +237,6 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, a
         return _ratio(gain, abs(goal), (points @ toward).max(axis=0), float(np.abs(points).max()))
 
     return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
-
-
-def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of the way of H to the direction of the target, round the sphere of radius |H3|."""
-    nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
-    way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
-    dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
-    return abs(spacecraft.axial) * way / dearest * (1.0 - ROUNDING)
 
 
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:

@@ -8,7 +8,6 @@ program has tangents of the cones, added where its solution breaks them (Kelley 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -55,7 +54,7 @@ class ChanceLimit(NamedTuple):
 class Tangent(NamedTuple):
     """A tangent of a cone: direction ``u``; unit vector ``shared`` (d,) along the inputs and ``own`` (pulses, 1 + d).
 
-    ``own`` begins with the number of the pulse, see `ChanceModel.pulse`.
+    ``own`` begins with the number of the pulse, see `ChanceProgram.pulse`.
     """
 
     limit: ChanceLimit
@@ -78,15 +77,42 @@ class Spread(NamedTuple):
         return np.sqrt(np.maximum(0.5 * (size + (np.conj(directions) ** 2 * double).real), 0.0))
 
 
-class ChanceModel:
-    """The cones of a ``program`` of small angles."""
+DIRECTIONS, BEGUN = 72, 16
+"""Directions in which the cones of two equations are looked at, and of the first tangents of one, without margin."""
 
-    def __init__(self, program: Program, uncertain: Uncertain) -> None:
-        self.program, self.uncertain, body = program, uncertain, program.spacecraft
+WORST, ROUNDS = 3, 40
+"""Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
+
+BEST, PRICE = 200, 1e-6
+"""Columns taken in at a time, and the relative reduced cost below which none enters."""
+
+TIGHT = 1e-3
+"""Share of a limit by which a solution may pass it."""
+
+
+class Sure(NamedTuple):
+    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
+
+    burns: tuple[Burn, ...]
+    excess: float
+    left: Vector
+
+
+class ChanceProgram:
+    """The program of margins for the channels and slots of a ``program`` of small angles; ``size`` of the goal."""
+
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], size: float) -> None:
+        self.program, self.limits, self.uncertain, body = program, limits, uncertain, program.spacecraft
         self.pace = np.array([body.nutation_rate, body.spin])
         self.turn = 2.0 * np.pi / max(abs(self.pace[0]), abs(self.pace[1]))
         self.count = int(self.turn_of(np.array([program.end]))[0]) + 1
         self.effects, self.changes, self.rates = uncertain.effects, uncertain.changes, uncertain.rates
+        self.scale = max(size, max(limit.most for limit in limits))
+        self.unit: Vector = self.scale / np.hypot(np.abs(uncertain.effects[0]), uncertain.effects[2].real)
+        self.cost = program.costs * self.unit
+        self.dearest = float(self.cost.max())
+        self.strong = self.unit < program.width
+        self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
 
     def turn_of(self, times: Vector) -> NDArray[np.int_]:
         """Number from 0 of the turn, of the faster of both rates, in which ``times`` (n,) s lie."""
@@ -148,69 +174,13 @@ class ChanceModel:
         np.add.at(own, at, np.where(shared, 0.0, each * changed))
         return Spread(total, pulses, own)
 
-    def weights(
-        self, kind: int, channel: int, priced: Sequence[tuple[Tangent, float]], margin: float
-    ) -> tuple[complex, complex, Complex]:
-        """Worth of a second of a channel by tangents of one kind and their prices.
-
-        It is Re(E(t) (fixed + rate t + own of the turn)), with E by `turns` and the last (turns,).
-        """
-        effects, changes = self.effects[kind, channel], self.changes[kind, channel]
-        fixed = rate = 0j
-        own = np.zeros(self.count, dtype=complex)
-        for tangent, price in priced:
-            if tangent.limit.kind != kind:
-                continue
-            weight = price * np.conj(tangent.u)
-            fixed += weight * (effects + margin * changes @ tangent.shared)
-            rate += weight * margin * 1j * (self.rates[kind] @ tangent.shared) * effects
-            pulses = tangent.own[:, 0].astype(int)
-            mine = pulses // TURNS == channel
-            own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
-        return complex(fixed), complex(rate), own
-
-
-DIRECTIONS, BEGUN = 72, 16
-"""Directions in which the cones of two equations are looked at, and of the first tangents of one, without margin."""
-
-WORST, ROUNDS = 3, 40
-"""Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
-
-BEST, PRICE = 200, 1e-6
-"""Columns taken in at a time, and the relative reduced cost below which none enters."""
-
-TIGHT = 1e-3
-"""Share of a limit by which a solution may pass it."""
-
-
-class Sure(NamedTuple):
-    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
-
-    burns: tuple[Burn, ...]
-    excess: float
-    left: Vector
-
-
-class ChanceProgram:
-    """The program of margins for the channels and slots of a ``program`` of small angles; ``size`` of the goal."""
-
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], size: float) -> None:
-        self.program, self.limits = program, limits
-        self.model = ChanceModel(program, uncertain)
-        self.scale = max(size, max(limit.most for limit in limits))
-        self.unit: Vector = self.scale / np.hypot(np.abs(uncertain.effects[0]), uncertain.effects[2].real)
-        self.cost = program.costs * self.unit
-        self.dearest = float(self.cost.max())
-        self.strong = self.unit < program.width
-        self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
-
     def solve(self, margin: float) -> Sure:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
-        inputs = len(self.model.uncertain.own)
+        inputs = len(self.uncertain.own)
         plain = np.zeros(inputs), np.zeros((0, 1 + inputs))  # tangents that know of no dispersion
         tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
-        rights = np.array([self.model.right(tangent, margin) for tangent in tangents]) / self.scale
+        rights = np.array([self.right(tangent, margin) for tangent in tangents]) / self.scale
         master = highs.GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
@@ -227,7 +197,7 @@ class ChanceProgram:
             new = self._broken(columns, on_times, margin, float(best.x[0]))
             for tangent in new:
                 row = np.concatenate([[-tangent.limit.most / self.scale], self._coefficients(tangent, columns, margin)])
-                master.limit(row, self.model.right(tangent, margin) / self.scale)
+                master.limit(row, self.right(tangent, margin) / self.scale)
             priced = self._priced(tangents, best.shadows, columns, margin)
             tangents += new
             if not len(priced.t) and not new:
@@ -238,7 +208,7 @@ class ChanceProgram:
         if best is None:
             return Sure((), np.inf, np.zeros(5))
         on_times = self._on_times(taken, best.x[1:])
-        used, left = on_times > 0.0, self.model.left(taken, on_times)
+        used, left = on_times > 0.0, self.left(taken, on_times)
         return Sure(
             burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
             float(best.x[0]),
@@ -251,15 +221,15 @@ class ChanceProgram:
 
     def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Coefficients of a tangent for one unit of each column, over the scale."""
-        return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
+        return self.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
-        left, tangents = self.model.left(columns, on_times), []
+        left, tangents = self.left(columns, on_times), []
         for limit in self.limits:
-            spread = self.model.spread(limit.kind, columns, on_times)
+            spread = self.spread(limit.kind, columns, on_times)
             directions = directions_of(limit, DIRECTIONS)
             along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
             by = along - (1.0 + excess + TIGHT) * limit.most
@@ -273,9 +243,8 @@ class ChanceProgram:
 
     def _begin(self) -> ProgramColumns:
         """Columns to begin with: those that pull along the goal, or back."""
-        model = self.model
-        toward = np.conj(model.uncertain.goal[0] or model.uncertain.goal[1] or 1.0)
-        worth = np.abs((toward * model.turns(0, self._all())[None, :] * model.effects[0][:, None]).real)
+        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
+        worth = np.abs((toward * self.turns(0, self._all())[None, :] * self.effects[0][:, None]).real)
         worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
         channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
         some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
@@ -312,9 +281,18 @@ class ChanceProgram:
         for kind in {limit.kind for limit in self.limits}:
             if (kind, channel) not in self._kept:
                 every = self._all(channel)
-                self._kept[kind, channel] = self.model.turns(kind, every), self.model.turn_of(every.t)
+                self._kept[kind, channel] = self.turns(kind, every), self.turn_of(every.t)
             turned, turn = self._kept[kind, channel]
-            fixed, rate, own = self.model.weights(kind, channel, active, margin)
+            effect, changes = self.effects[kind, channel], self.changes[kind, channel]
+            fixed, rate, own = 0j, 0j, np.zeros(self.count, dtype=complex)
+            for tangent, price in active:
+                if tangent.limit.kind == kind:
+                    weight = price * np.conj(tangent.u)
+                    fixed += weight * (effect + margin * changes @ tangent.shared)
+                    rate += weight * margin * 1j * (self.rates[kind] @ tangent.shared) * effect
+                    pulses = tangent.own[:, 0].astype(int)
+                    mine = pulses // TURNS == channel
+                    own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
             worth += (turned * (fixed + rate * self.program.centres + own[turn])).real
         return np.asarray(worth * (self.unit[channel] / self.scale))
 

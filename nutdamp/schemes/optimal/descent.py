@@ -209,16 +209,11 @@ class Task:
         count, n = sequences.which.shape
         identity, zero = np.eye(n), np.zeros((n, n))
         after = identity - np.eye(n, k=-1)
-        rows = [
-            np.hstack([after, -np.eye(n, k=-1)])[1:],
-            np.hstack([identity, zero]),
-            np.hstack([-identity, -identity]),
-            np.hstack([zero, identity]),
-            np.hstack([zero, -identity]),
-        ]
+        matrix = np.block(
+            [[after, -np.eye(n, k=-1)], [identity, zero], [-identity, -identity], [zero, identity], [zero, -identity]]
+        )[1:]
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
-        matrix = np.vstack(rows)
         if self.loose:
             angles = 2 * math.pi / SIDES * np.arange(SIDES)
             sides = np.hstack([np.zeros((SIDES, 2 * n)), -np.column_stack([np.cos(angles), np.sin(angles)])])

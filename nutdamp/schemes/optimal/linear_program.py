@@ -76,21 +76,6 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
     return tuple(sorted(result, key=lambda burn: burn.t))
 
 
-def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
-    """Moments (n,) s of the largest worth, and that worth, from ``worth`` (n, 5) at even ``times`` (n, 5) s.
-
-    By the parabola through the best of the five and those beside it; at an end of them, that end.
-    """
-    best = np.argmax(worth, axis=1)
-    every, inner = np.arange(len(best)), np.clip(best, 1, 3)
-    low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
-    bend = low - 2.0 * top + high
-    aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
-    aside = np.where(best == inner, aside, best - inner)
-    most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
-    return times[every, inner] + aside * (times[:, 1] - times[:, 0]), most
-
-
 SLOTS, MOST_SLOTS = 64, 600_000
 """Slots in the faster of the two turns, at ω3 and at aω3; and of all channels together: a horizon of more is looked at
 as far as they reach."""
@@ -363,8 +348,15 @@ class Program:
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
         cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
         worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
-        t, most = peaks(times, worth)
-        good = most > PEAK
+        # By the parabola through the best of the five and those beside it; at an end of them, that end.
+        best = np.argmax(worth, axis=1)
+        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+        low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+        bend = low - 2.0 * top + high
+        aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+        aside = np.where(best == inner, aside, best - inner)
+        most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
+        t, good = times[every, inner] + aside * (times[:, 1] - times[:, 0]), most > PEAK
         return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:

@@ -92,8 +92,7 @@ def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
 
     Its sequence of channels stays, and what it leaves too.
     """
-    which, t, on = _moments_of(task, schedule)
-    every = Moments(which[None], t[None], on[None])
+    every = Moments._make(part[None] for part in _moments_of(task, schedule))
     starts = laid_out(task, every, task.shortest[every.which])
     if not len(starts.x):
         return None

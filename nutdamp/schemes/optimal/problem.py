@@ -39,10 +39,6 @@ THRIFT, GAIN = 0.004, 0.0005
 worth another search."""
 
 
-class Unrepairable(Exception):
-    """No burns were found that keep on-times, gap and max_pulses all at once."""
-
-
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
     """Fewest burns that hardly cost more than ``cost``, or at any cost: the longest are kept and may grow.
 
@@ -65,38 +61,32 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
     return best
 
 
-def repaired(program: Program, solution: Solution) -> Solution:
+def repaired(program: Program, solution: Solution) -> Solution | None:
     """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden.
 
-    Where that leaves too little, burns longer than their channel may be on become several side by side.
-    Raises Unrepairable.
+    Where that leaves too little, burns longer than their channel may be on become several side by side. None where no
+    burns were found that keep on-times, gap and max_pulses all at once.
     """
     allowed = program.forbidden.copy()
-    try:
-        return _repaired(program, solution)
-    except Unrepairable:
+    kept = _repaired(program, solution)
+    if kept is None:
         program.forbidden = allowed
-        if not _divide(program, solution.burns):
-            raise
-    return _repaired(program, program.solve())
+        kept = _repaired(program, program.solve()) if _divide(program, solution.burns) else None
+    return kept
 
 
-def _repaired(program: Program, solution: Solution) -> Solution:
-    """The solution with what breaks a limit moved to other slots. Raises Unrepairable."""
-    if solution.unmet > UNMET:
-        raise Unrepairable
+def _repaired(program: Program, solution: Solution) -> Solution | None:
+    """The solution with what breaks a limit moved to other slots."""
     for _ in range(REPAIRS):
-        if work.exhausted():
-            raise Unrepairable
+        if solution.unmet > UNMET or work.exhausted():
+            return None
         broken = next(broken_by(program, solution.burns), None)
         if broken is None:
             return solution
         program.forbid(*broken)
         near = program.solve(program.about(solution.burns))
         solution = near if near.unmet <= UNMET else program.solve()
-        if solution.unmet > UNMET:
-            raise Unrepairable
-    raise Unrepairable
+    return None
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
@@ -181,13 +171,12 @@ class Problem:
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible(NO_AXIAL)
         self.equations = EndEquations(shift=not options.free_axis, spin=requested)
-        flows = [channel.mass_flow for channel in self.channels]
-        known = [flow for flow in flows if flow is not None]
-        if options.least != "impulse" and len(known) == len(flows):
-            self.costs, self.unit = np.array(known), "kg"
-        else:
-            self.costs = np.array([channel.strength for channel in self.channels])
-            self.unit = "N m s"
+        in_kg = options.least != "impulse" and all(channel.mass_flow is not None for channel in self.channels)
+        self.unit = "kg" if in_kg else "N m s"
+        prices = {channel.name: channel.mass_flow if in_kg else channel.strength for channel in spacecraft.channels}
+        # Cost per second of every channel of which it is known.
+        self.prices = {name: price for name, price in prices.items() if price is not None}
+        self.costs = np.array([self.prices[channel.name] for channel in self.channels])
         self._dynamics = make_dynamics(spacecraft).remembering()
 
     def flown(self, schedule: Schedule) -> Flight:
@@ -251,16 +240,12 @@ class Problem:
 
     def rigorous(self, schedule: Schedule) -> float | None:
         """Lower bound of the cost of schedules that leave no more than this one; None where none is known."""
-        body, in_kg = self.spacecraft, self.unit == "kg"
-        prices = {channel.name: channel.mass_flow if in_kg else channel.strength for channel in body.channels}
-        known = {name: price for name, price in prices.items() if price is not None}
-        left = self.leaves(self.flown(schedule))
-        return bounds.rigorous(body, known, self.price(schedule), left, shift=self.equations.shift)
+        left, cost = self.leaves(self.flown(schedule)), self.price(schedule)
+        return bounds.rigorous(self.spacecraft, self.prices, cost, left, shift=self.equations.shift)
 
     def price(self, schedule: Schedule) -> float:
         """Cost of a schedule by the program's own prices."""
-        price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
-        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in schedule)
+        return math.fsum(self.prices[pulse.channel] * pulse.on_time for pulse in schedule)
 
     def worth(self, schedule: Schedule) -> float:
         """Quantity to be least: the cost, or the number of pulses."""

@@ -240,7 +240,7 @@ class Refinement:
         return replace(self.original, pulses=tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs))
 
     def left(self, schedule: Schedule) -> tuple[Vector, Flight]:
-        """What a schedule leaves (equations,), over |H|, and its flight."""
+        """Misses of a schedule beyond what is to be left, (equations,), over |H|, and its flight."""
         flown = self.fly(schedule)
         return (misses(flown, self.equations) - self.aside) / self.size, flown
 

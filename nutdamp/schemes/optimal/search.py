@@ -1,10 +1,8 @@
 """The search for the least-cost schedule: no nutation left, H on its target, the spin as requested.
 
-The program of `linear_program` chooses burns, at first with small angles. The schedule is flown, the equations of the
-program are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres and
-on-times are refined on it. Where that fails, where the horizon is no longer than a few nutation periods and where the
-schedule is dear, `multistart` looks for a cheaper one from very many starts. Two bounds go with the plan: the first
-least cost of the program, of first order, and a rigorous one.
+The program of `linear_program` chooses burns, at first with small angles. The schedule is flown, the program is aimed
+anew along that flight at its true angles, and so on until little is left; then centres and on-times are refined on it.
+Where that fails, where the horizon is short and where the schedule is dear, `multistart` looks for a cheaper one.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from nutdamp.schemes.optimal import alternatives, multistart, refinement
 from nutdamp.schemes.optimal.alternatives import by_other_schemes, hastened, spin_changes
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, Unrepairable, as_pulses, repaired, thinned
+from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
 from nutdamp.schemes.optimal.refinement import EndEquations, Refinement
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
@@ -475,22 +473,21 @@ class _LeastCostSearch(Problem):
         for turn in range(AIMS):
             if solution.unmet > LOST or not solution.burns or work.exhausted():
                 break
-            try:
-                solution = repaired(program, solution)
-            except Unrepairable:
+            kept = repaired(program, solution)
+            if kept is None:
                 break
-            schedule = as_pulses(self.spacecraft, solution.burns)
+            solution, schedule = kept, as_pulses(self.spacecraft, kept.burns)
             flown = self.flown(schedule)
             program.aim(refinement.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
                 aside = self.equations.beside(solution.off)
                 moving = Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
                 schedule = moving.refined()
-                left, price, _ = corrected = self.candidate(self.flown(schedule), self.price(schedule))
-                candidates.append(corrected)
-                if left == 0.0 and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
+                there = self.candidate(self.flown(schedule), self.price(schedule))
+                candidates.append(there)
+                if there.left == 0.0 and (there.price <= least * (1.0 + DEAR) or there.price > (1.0 - GAIN) * last):
                     break
-                last = price if left == 0.0 else math.inf
+                last = there.price if there.left == 0.0 else math.inf
             solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
         return candidates
 

@@ -27,7 +27,7 @@ from nutdamp.montecarlo.study import Results, study_of
 from nutdamp.montecarlo.study import run as fly
 from nutdamp.planning.decision import Comparison, Decision, compare, decide
 from nutdamp.planning.notes import comparison_warnings, decision_notes, reasons
-from nutdamp.planning.plan import Plan, plan
+from nutdamp.planning.plan import Plan, Share, plan
 from nutdamp.planning.screening import Cases, PlanCandidate, cases_of
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Goal, Inertia, Keep, Requirement, Spacecraft
@@ -113,7 +113,8 @@ def with_cases(scheme: str, cases: Cases | None) -> Comparison:
     if cases is not None:
         known = cases.decided and cases.complying is not None
         flown[one] = PlanCandidate(one, "", cases)
-        flown[one].low, flown[one].high = (cases.complying,) * 2 if known else (0.9, 1.0)
+        low, high = (cases.complying or 0.0,) * 2 if known else (0.9, 1.0)
+        flown[one].share = Share(low, high, cases.probability)
     return Comparison(example().spacecraft, (one,), flown)
 
 
