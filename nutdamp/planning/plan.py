@@ -148,8 +148,10 @@ NO_NUTATION, ROUNDING = 1e-12, 1e-11
 
 
 class Standing(Enum):
-    """Standing of a plan, from the best down: meets the requirement, and damps the parts that it does not bound;
-    meets it but leaves other parts undamped; does not meet it (without one: does not damp).
+    """Standing of a plan, from the best down.
+
+    It meets the requirement, and damps the parts that it does not bound; it leaves other parts undamped; it does not
+    meet it, or, without one, does not damp.
     """
 
     COMPLIES = "complies"

@@ -138,8 +138,7 @@ def hastened(
 
 
 def _least_share(problem: Problem, span: float, most: float) -> float | None:
-    """The least share of the ``span`` s that small angles allow at a cost of ``most``, and of `ABOUT` over that of all
-    of the span; None for one above `CLEARLY`."""
+    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`."""
 
     def cost(share: float) -> float:
         horizon = problem.spacecraft.limits.earliest + share * span
@@ -147,6 +146,7 @@ def _least_share(problem: Problem, span: float, most: float) -> float | None:
         return solution.cost if solution.unmet <= UNMET else math.inf
 
     clearly = cost(CLEARLY)
+    # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
     if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
         return None
     low, high = 0.0, CLEARLY
@@ -189,9 +189,6 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 SLOTS, MOST_SLOTS = 40, 320
 """Slots in the faster of the two turns, at ω3 and at aω3, and in all."""
 
-LINES = 4
-"""Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
-
 NEWTON_STEPS, CONVERGED = 25, 1e-12
 """Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
 
@@ -232,7 +229,7 @@ def earliest(problem: Problem) -> Schedule | None:
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
     influence = refinement.small_angles(problem.spacecraft, problem.equations)
-    for _ in range(LINES):
+    for _ in range(4):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None

@@ -86,9 +86,6 @@ WORST, ROUNDS = 3, 40
 BEST, PRICE = 200, 1e-6
 """Columns taken in at a time, and the relative reduced cost below which none enters."""
 
-TIGHT = 1e-3
-"""Share of a limit by which a solution may pass it."""
-
 
 class Sure(NamedTuple):
     """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
@@ -232,7 +229,7 @@ class ChanceProgram:
             spread = self.spread(limit.kind, columns, on_times)
             directions = directions_of(limit, DIRECTIONS)
             along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
-            by = along - (1.0 + excess + TIGHT) * limit.most
+            by = along - (1.0 + excess + 1e-3) * limit.most  # a little more passes
             peaked = np.flatnonzero((by > 0.0) & (by >= np.roll(by, 1)) & (by >= np.roll(by, -1)))
             for index in peaked[np.argsort(-by[peaked])][:WORST].tolist():
                 u = complex(directions[index])

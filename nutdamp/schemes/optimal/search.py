@@ -54,9 +54,6 @@ PROVED, EQUAL = 0.002, 1e-6
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
 
-MOST_LOOSE = 5000.0
-"""Units that may be spent where H may move, so that some are left for schedules that keep it."""
-
 HASTE = 0.0008
 """Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
 
@@ -253,9 +250,9 @@ class _LeastCostSearch(Problem):
         if overtaxed := self.overtaxed(first):
             schedule = self.without(overtaxed).schedule()
             return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
-        # Where H may end elsewhere a schedule that keeps it, or reaches the target, will do too.
+        # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
-        with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
+        with work.budget("a schedule as asked", 5000.0 if looser else math.inf):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
