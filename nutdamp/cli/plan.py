@@ -300,10 +300,11 @@ def _certified(compared: Comparison, paths: Sequence[str]) -> tuple[Certificate 
     if not paths:
         return None, []
     from nutdamp.errors import CannotWrite
-    from nutdamp.planning.tradeoff import SCHEME, certificate
+    from nutdamp.planning.tradeoff import certificate
+    from nutdamp.schemes.catalogue import OPTIMAL
 
     try:
-        return certificate(next(plan for plan in compared if plan.scheme == SCHEME)), []
+        return certificate(next(plan for plan in compared if plan.scheme == OPTIMAL.name)), []
     except BadRequest as reason:
         return None, [CannotWrite(path, f"there is no certificate: {reason}") for path in paths]
 

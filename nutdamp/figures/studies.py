@@ -369,7 +369,7 @@ def certificate_figure(proof: Certificate) -> Figure:
     axes.set_title(text, loc="left", color=INK, **style.NOTE)
     axes.grid()
     style.legend(figure, [axes])
-    bound = written(proof.bound, proof.problem.unit)
+    bound = written(proof.proof.bound, proof.problem.unit)
     style.heading(figure, proof.spacecraft, f"primer by the linear program of small angles\nsmall-angle bound {bound}")
     return figure
 

@@ -168,6 +168,13 @@ class Aspect(NamedTuple):
         return self.least < self.keep.least - SLACK
 
     @property
+    def broken_at(self) -> tuple[float, float, float]:
+        """Angle, rad, its time, s, and the bound, rad, where a cone is broken."""
+        if self.too_near:
+            return self.least, self.least_at, self.keep.least
+        return self.largest, self.largest_at, self.keep.most
+
+    @property
     def kept(self) -> bool:
         """True if the axis keeps both bounds."""
         return bool(self.keep.used(self.least, self.largest) <= 1.0)

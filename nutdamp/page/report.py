@@ -55,8 +55,7 @@ from nutdamp.page.manoeuvre import manoeuvre_blocks
 from nutdamp.page.moving import moving_of
 from nutdamp.planning.decision import Comparison, Decision, broken_limits, decide
 from nutdamp.planning.notes import plan_notes, reasons
-from nutdamp.planning.plan import Plan, unrounded
-from nutdamp.planning.recommendation import Standing
+from nutdamp.planning.plan import Plan, Standing, unrounded
 from nutdamp.planning.tradeoff import Front
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions, glance, guide

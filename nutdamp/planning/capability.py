@@ -105,7 +105,10 @@ def channel_steps(spacecraft: Spacecraft) -> tuple[ChannelSteps, ...]:
     for channel in spacecraft.channels:
         shortest = effective_on_time(channel, shortest_on_time(spacecraft, channel))
         longest = longest_useful(effective_on_times(channel)[1], period)
-        most = max(_step(spacecraft, channel, on_time) for on_time in _on_times(channel, shortest, longest))
+        on_times = [longest]  # where the spin changes during the pulse, another one may do more
+        if channel.axial != 0.0 and 0.0 < longest < math.inf and longest > shortest:
+            on_times += np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist()
+        most = max(_step(spacecraft, channel, on_time) for on_time in on_times)
         steps.append(ChannelSteps(channel, _step(spacecraft, channel, shortest), most))
     return tuple(steps)
 
@@ -135,13 +138,6 @@ def acting(spacecraft: Spacecraft) -> tuple[Acting, ...]:
                 impulse = channel.strength * thrust.on_time
                 pulses.append(Acting(channel, on_time, thrust.on_time, impulse, thrust.centroid))
     return tuple(pulses)
-
-
-def _on_times(channel: Channel, shortest: float, longest: float) -> list[float]:
-    """On-times that include that of the largest step, s: the longest, but where the spin changes during the pulse."""
-    if channel.axial == 0.0 or math.isinf(longest) or not 0.0 < longest > shortest:
-        return [longest]
-    return [*np.geomspace(max(shortest, SHORTEST * longest), longest, GRID).tolist(), longest]
 
 
 def _step(spacecraft: Spacecraft, channel: Channel, on_time: float) -> float:
@@ -195,9 +191,6 @@ class Consequence(NamedTuple):
 MARKS = tuple(math.radians(mark) for mark in (10.0, 30.0, 60.0))
 """Nutation angles for which the time is given that a resonant disturbance takes to drive it there."""
 
-RESONANT = 3.0
-"""Beat period over horizon from which a disturbance counts as resonant."""
-
 
 def consequences(spacecraft: Spacecraft) -> tuple[Consequence, ...]:
     """Effect of each disturbance, in the order of the file."""
@@ -211,7 +204,7 @@ def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequenc
         return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
     largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
-    if period > RESONANT * spacecraft.horizon:
+    if period > 3.0 * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
             (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))

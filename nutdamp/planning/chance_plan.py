@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,11 @@ from nutdamp.montecarlo.study import CONFIDENCE, SAMPLES, SEED, Results, Study, 
 from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.schemes import catalogue, planner, valve_commands
-from nutdamp.schemes.catalogue import OptimalOptions, Options
+from nutdamp.schemes.catalogue import OPTIMAL, OptimalOptions, Options
 from nutdamp.schemes.optimal.chance import ChanceLimit, ChanceProgram, Sure, Uncertain
 from nutdamp.schemes.optimal.linear_program import SLOTS
 from nutdamp.schemes.optimal.problem import Problem, as_pulses, broken_by
-from nutdamp.schemes.optimal.refinement import EndEquations, refine, small_angles
+from nutdamp.schemes.optimal.refinement import EndEquations, Refinement, small_angles
 from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
@@ -37,23 +38,17 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
-MOST_TOLERANCES = 4
-"""Tolerances that may have to shrink together."""
+MOST_TOLERANCES, ALLOCATION_HALVINGS = 4, 6
+"""Tolerances that may have to shrink together, and halvings of the sizes between too few complying cases and enough."""
 
-ALLOCATION_HALVINGS = 6
-"""Of what is between the size with which too few cases comply and the one with which enough do."""
-
-CASES = 8_192
-"""Drawn cases in which each allocation is tried."""
+CASES, MOST_CASES = 8_192, 100_000
+"""Drawn cases in which each allocation is tried, and the most of one check."""
 
 FRESH = 20_011
 """Seed of the first draws in which what was found is checked, which nothing was chosen by; each check has its own."""
 
 CHECKS, SMALLER = 12, 0.96
 """Checks at most, and by what the tolerances shrink after one that fails."""
-
-MOST_CASES = 100_000
-"""Of one check."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,58 +150,40 @@ def _scaled(value: Any, factor: float) -> Any:
     return None if value is None else tuple(_scaled(item, factor) for item in value)
 
 
-SCHEME = "optimal"
-
 STEP = 1e-30
 """Imaginary step of derivatives."""
 
-MARGINS = (1.0, 1.3, 0.75, 0.5)
-"""Over the sigmas of the probability required: margins that are tried first, until enough cases comply."""
+MARGINS, LESSER = (1.0, 1.3, 0.75, 0.5), (1.0, 0.8, 0.6)
+"""Over the sigmas of the probability required: margins that are tried first, until enough cases comply; and multiples
+of the largest feasible margin, where that is not enough."""
 
 CLOSE = 0.983, 0.998
 """Severities of the last case that must comply with a margin that is no larger than need be, nor by luck."""
 
-LESSER = (1.0, 0.8, 0.6)
-"""Multiples of the largest feasible margin, where that is not enough."""
-
 KEPT, HALVINGS = 1e-2, 6
 """Tolerance of a limit in that search, and its number of steps."""
 
-TRIED = 4_096
-"""Cases in which a plan is tried while its margin is adapted, of a seed of its own."""
+TRIED, TRYING = 4_096, 101
+"""Cases in which a plan is tried while its margin is adapted, and their seed."""
 
-TRYING = 101
-"""Seed of the trial cases."""
-
-ROUNDS = 4
-"""Times that the margin is adapted."""
+ROUNDS, REPAIRS = 4, 24
+"""Times that the margin is adapted, and that a burn which breaks a limit is moved elsewhere."""
 
 TRIES, AIMED, NEAREST, FACTOR, STEEP = 4, 0.99, 0.1, 0.8, 0.15
 """Margins tried once enough cases comply with one; the level aimed at; how near the next one comes to those before, of
 their distance; and where no lower one is known, its least share of the least one, and the fall of the level by a
 sigma of margin."""
 
-ROUNDING = 1e-9
-"""Of a number of cases."""
+STRAIGHT, TURNS = 0.3, 2.5
+"""rad by which one sigma may turn what a pulse does: for later pulses first order is no good; nutation periods that
+are looked at in any case."""
 
-REPAIRS = 24
-"""Times that a burn which breaks a limit is moved elsewhere."""
-
-STRAIGHT = 0.3
-"""rad by which one sigma may turn what a pulse does: for later pulses first order is no good."""
-
-TURNS = 2.5
-"""Nutation periods that are looked at in any case."""
-
-MOST_BURNS = 8
-"""Burns that are kept, the longest: the program has very short ones besides."""
-
-LARGEST = 60_000
-"""Slots of all channels up to which a plan is looked for."""
+MOST_BURNS, LARGEST = 8, 60_000
+"""Burns that are kept, the longest: the program has very short ones besides; slots up to which a plan is sought."""
 
 
-def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[DispersedInput, ...]]:
-    """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s; the inputs.
+def uncertain(body: Spacecraft, on_times: Vector, goal: Vector) -> Uncertain:
+    """First-order effect of the dispersions of a symmetric ``body`` on pulses of ``on_times`` (K,) s.
 
     Derivatives are by complex steps through `dispersion.cases`, per second of on-time.
     """
@@ -216,15 +193,11 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Disp
     ]
     model = DispersedModel(body, Schedule(tuple(pulses)))
     drawn = [entry for entry in model.inputs.drawn if entry.kind != "bias"]
-    biases: dict[str, np.ndarray | float] = {
-        entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex)
-        for entry in model.inputs.drawn
-        if entry.kind == "bias"
-    }
-    draws = dict(biases)
+    biases = (entry for entry in model.inputs.drawn if entry.kind == "bias")
+    draws = {entry.name: np.full(len(drawn) + 1, entry.size, dtype=complex) for entry in biases}
     for at, entry in enumerate(drawn):
         draws[entry.name] = np.zeros(len(drawn) + 1, dtype=complex)
-        draws[entry.name][at] = 1j * STEP * entry.sigma  # type: ignore[index]
+        draws[entry.name][at] = 1j * STEP * entry.sigma
     cases = model.cases(draws)
 
     def parts(value: object) -> tuple[float, Vector]:
@@ -243,34 +216,29 @@ def uncertain(body: Spacecraft, on_times: Vector) -> tuple[Uncertain, tuple[Disp
     tilt = parts(cases.tilt[0])[1], parts(cases.tilt[1])[1]
     pointed = start + axial * (tilt[1] - 1j * tilt[0]) if body.goal.axis is not None else np.zeros(len(drawn))
     impulses = [[parts(part) for part in impulse] for impulse in cases.impulses]
+    on, nominal = np.asarray(on_times), np.array([[value for value, _ in impulse] for impulse in impulses])
+    changes = np.array([[change for _, change in impulse] for impulse in impulses])
     begun = [parts(start) for start in cases.starts]
-    on = np.asarray(on_times)
-    torque = np.array([impulse[0][1] + 1j * impulse[1][1] for impulse in impulses]) / on[:, None]
-    axial_torque = np.array([impulse[2][1] for impulse in impulses]) / on[:, None]
-    late = np.array([start[1] for start in begun])
-    delay = np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)])
     mixed = mixing(drawn, model.groups)
-    effects = Uncertain(
-        effect=np.asarray(
-            np.array([complex(impulse[0][0], impulse[1][0]) for impulse in impulses]) / on, dtype=np.complex128
-        ),
-        axial=np.array([impulse[2][0] for impulse in impulses]) / on,
-        begin=np.asarray(np.array([start, pointed]) @ mixed, dtype=np.complex128),
-        rates=np.array([dnutation, dspin]) @ mixed,
-        torque=np.asarray(torque @ mixed, dtype=np.complex128),
-        axial_torque=axial_torque @ mixed,
-        late=late @ mixed,
+    effect = np.asarray((nominal[:, 0] + 1j * nominal[:, 1]) / on, dtype=np.complex128)
+    torque = (changes[:, 0] + 1j * changes[:, 1]) / on[:, None] @ mixed
+    late, less = np.array([change for _, change in begun]) @ mixed, daxial / axial @ mixed
+    before, to_do = np.array([start, pointed]) @ mixed, goal[:4:2] + 1j * goal[1:4:2]
+    turned = [torque + (1j * pace * late - less) * effect[:, None] for pace in (body.nutation_rate, body.spin)]
+    return Uncertain(
+        effects=np.array([effect, effect, nominal[:, 2] / on]),
+        changes=np.array([*turned, changes[:, 2] / on[:, None] @ mixed]),
+        rates=np.array([*(np.array([dnutation, dspin]) @ mixed), np.zeros(len(drawn))]),
+        start=np.array([*(before + less * to_do[:, None]), C * dspin @ mixed]),
         own=np.array([" pulse " in entry.name for entry in drawn], dtype=bool),
-        spin=C * dspin @ mixed,
-        delay=delay,
-        less=daxial / axial @ mixed,
+        delay=np.array([value - pulse.start for (value, _), pulse in zip(begun, pulses, strict=True)]),
+        goal=np.array([*to_do, goal[4]]),
     )
-    return effects, tuple(drawn)
 
 
 def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tuple[str, Plan]]:
     """Plans that keep the requirement with margins, each with a label; none where nothing is required."""
-    body = planning.known(spacecraft, planner.options_of(catalogue.SCHEMES[SCHEME], options))
+    body = planning.known(spacecraft, planner.options_of(catalogue.SCHEMES[OPTIMAL.name], options))
     if not requirements.required(spacecraft) or not spacecraft.channels or body.dispersions is None:
         return
     try:
@@ -282,7 +250,7 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
 
 def level(results: Results) -> float:
     """Severity of the last case that must comply: 1 or less where enough do, as far as it is known."""
-    last = int((1.0 - results.probability) * results.done + ROUNDING)
+    last = int((1.0 - results.probability) * results.done + 1e-9)
     severities = results.worst.severities
     if results.study.model.spacecraft.keep or last >= len(severities):
         return 1.0 if results.meets_requirement else math.inf
@@ -294,52 +262,39 @@ class _MarginSearch:
 
     def __init__(self, spacecraft: Spacecraft, body: Spacecraft) -> None:
         self.spacecraft, self.body = spacecraft, body
-        plain = valve_commands.plain(body) if body.thrust_laws else body
-        self.model = model_of(plain)
-        bounds = requirements.required(spacecraft)
-        parts = {bound.part: bound.most for bound in bounds}
-        aimed = requirements.aim(spacecraft) in parts or body.goal.axis is not None
+        self.plain = valve_commands.plain(body) if body.thrust_laws else body
+        self.model = model_of(self.plain)
+        parts = {bound.part: bound.most for bound in requirements.required(spacecraft)}
+        aim = requirements.aim(spacecraft)
+        aimed = aim in parts or body.goal.axis is not None
         self.equations = EndEquations(shift=aimed, spin=body.goal.spin is not None)
         self.options = OptimalOptions(free_axis=not aimed)
-        self.problem = Problem(self.model.body, self.options)
-        self.program = self.problem.program()
+        self.program = Problem(self.model.body, self.options).program()
         if self.program.forbidden.size > LARGEST:
             raise Infeasible("too many slots")
         flat = self.model.body
         axial = abs(flat.inertia.axial(flat.spin if flat.goal.spin is None else flat.goal.spin))
-        self.limits = tuple(
-            ChanceLimit(kind, most)
-            for part, kind, most in (
-                (Part.NUTATION, 0, axial * math.tan(min(parts.get(Part.NUTATION, 0.0), 1.4))),
-                (
-                    requirements.aim(spacecraft),
-                    1,
-                    axial * math.sin(min(parts.get(requirements.aim(spacecraft), 0.0), 1.5)),
-                ),
-                (Part.SPIN, 2, flat.inertia.C * parts.get(Part.SPIN, 0.0)),
-            )
-            if part in parts
-        )
-        first = self.program.solve()
-        longest = max((burn.on_time for burn in first.burns), default=0.1)
-        ons = np.array(
-            [min(max(longest, channel.min_on_time, 1e-3), channel.max_on_time) for channel in self.program.channels]
-        )
-        flat = replace(flat, channels=self.program.channels, dispersions=body.dispersions)
-        dispersed, _ = uncertain(flat, ons)
+        limits = []
+        if Part.NUTATION in parts:
+            limits.append(ChanceLimit(0, axial * math.tan(min(parts[Part.NUTATION], 1.4))))
+        if aim in parts:
+            limits.append(ChanceLimit(1, axial * math.sin(min(parts[aim], 1.5))))
+        if Part.SPIN in parts:
+            limits.append(ChanceLimit(2, flat.inertia.C * parts[Part.SPIN]))
+        self.limits = tuple(limits)
+        longest = max((burn.on_time for burn in self.program.solve().burns), default=0.1)
+        channels = self.program.channels
+        ons = np.array([min(max(longest, channel.min_on_time, 1e-3), channel.max_on_time) for channel in channels])
+        flat = replace(flat, channels=channels, dispersions=body.dispersions)
+        every, goal = EndEquations(True, True), np.zeros(5)
+        goal[every.chosen] = small_angles(flat, every).goal
+        dispersed = uncertain(flat, ons, goal)
         drift = float(np.linalg.norm(dispersed.rates, axis=1).max())
         last = max(STRAIGHT / max(drift, 1e-12), flat.limits.earliest + TURNS * flat.nutation_period)
         self.program.forbid(None, last, math.inf)
-        every = EndEquations(True, True)
-        goal = np.zeros(5)
-        goal[every.chosen] = small_angles(flat, every).goal
-        self.chance = ChanceProgram(self.program, dispersed, self.limits, goal)
-        self.probability = required_share(spacecraft.requirement)
-
-    @property
-    def sigmas(self) -> float:
-        """Sigmas of a plane normal distribution within which the required share lies."""
-        return math.sqrt(-2.0 * math.log(max(1.0 - self.probability, 1e-9)))
+        self.chance = ChanceProgram(self.program, dispersed, self.limits, float(np.linalg.norm(goal)))
+        # Within so many of a plane normal distribution the required share lies.
+        self.sigmas = math.sqrt(-2.0 * math.log(max(1.0 - required_share(spacecraft.requirement), 1e-9)))
 
     def plans(self) -> Iterator[tuple[str, Plan]]:
         """Plans by margins between which the least lies with which enough cases comply, or the most cases do."""
@@ -353,16 +308,19 @@ class _MarginSearch:
             else:
                 return
             seen[margin] = 0.0, math.inf
-            for variant, plan, results in self.tried(margin):
+            schedule = self.schedule(margin)
+            plan = None if schedule is None else planning.judged(self.spacecraft, OPTIMAL.name, schedule, self.options)
+            if plan is not None and plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
+                trial = Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED)
+                results = run(trial, threads=threads_here())
                 seen[margin] = results.met_fraction or 0.0, level(results)
-                yield variant, plan
+                yield f"against dispersions, {margin:.3g} σ", plan
             if CLOSE[0] <= seen[margin][1] <= CLOSE[1]:
                 return
 
     def _first(self) -> list[float]:
         """First margins: about that of the probability, or up to the largest that can be kept."""
-        chance = self.chance
-        low, high = 0.0, max(MARGINS) * self.sigmas
+        chance, low, high = self.chance, 0.0, max(MARGINS) * self.sigmas
         if chance.solve(high).excess <= KEPT:
             return [factor * self.sigmas for factor in MARGINS]
         for _ in range(HALVINGS):
@@ -386,16 +344,6 @@ class _MarginSearch:
         below = max((margin for margin in seen if margin < best), default=0.5 * best)
         above = min((margin for margin in seen if margin > best), default=1.5 * best)
         return 0.5 * (best + (below if best - below > above - best else above))
-
-    def tried(self, margin: float) -> Iterator[tuple[str, Plan, Results]]:
-        """Plan of a margin, if there is one, in the trial cases."""
-        schedule = self.schedule(margin)
-        if schedule is None:
-            return
-        plan = planning.judged(self.spacecraft, SCHEME, schedule, self.options)
-        if plan.feasible and keeps_limits(self.spacecraft, plan.pulses):
-            results = run(Results(study_of(self.spacecraft, plan.pulses, seed=TRYING), TRIED), threads=threads_here())
-            yield f"against dispersions, {margin:.3g} σ", plan, results
 
     def _few(self, solution: Sure) -> None:
         """Forbid all slots that are not about the longest burns."""
@@ -422,9 +370,7 @@ class _MarginSearch:
 
     def schedule(self, margin: float) -> Schedule | None:
         """Schedule of a margin, refined on the true motion; None where its burns cannot be fired."""
-        allowed = self.program.forbidden.copy()
-        chance = self.chance
-        solution: Sure | None = None
+        allowed, chance = self.program.forbidden.copy(), self.chance
         try:
             self._few(chance.solve(margin))
             for _ in range(REPAIRS):
@@ -442,12 +388,11 @@ class _MarginSearch:
         finally:
             self.program.forbidden = allowed
         schedule = self.model.translate(as_pulses(self.model.body, solution.burns))
-        plain = valve_commands.plain(self.body) if self.body.thrust_laws else self.body
-        aside = solution.left[self.equations.chosen]
-        schedule = refine(
-            plain, schedule, self.equations, aside, self.program.width, lambda flown: propagation.flown(plain, flown)
-        )
+        aside, fly = solution.left[self.equations.chosen], partial(propagation.flown, self.plain)
+        schedule = Refinement(self.plain, schedule, self.equations, aside, self.program.width, fly).refined()
+        if not self.body.thrust_laws:
+            return schedule
         try:
-            return planner.as_commands(SCHEME, self.body, schedule, self.options) if self.body.thrust_laws else schedule
+            return planner.as_commands(OPTIMAL.name, self.body, schedule, self.options)
         except Infeasible:
             return None

@@ -16,9 +16,9 @@ from nutdamp.common import results, work
 from nutdamp.errors import NutdampError
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
-from nutdamp.flight.propagation import Extremes, Final, Flight, Track, extremes
-from nutdamp.planning.plan import Plan, plan, reaches_spin, spinning
-from nutdamp.planning.recommendation import Recommendation, Share, Standing, recommend
+from nutdamp.flight.propagation import Extremes, Flight, Track, extremes
+from nutdamp.planning.plan import Plan, Share, Standing, plan, reaches_spin, spinning
+from nutdamp.planning.recommendation import Recommendation, recommend
 from nutdamp.schemes import catalogue, planner
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Breach, Limit, breaches
@@ -73,7 +73,7 @@ class Comparison(results.Data, results.Tabled):
         return tuple(results.view(self, "sentences"))
 
     @cached_property
-    def recommendation(self) -> Recommendation[Plan]:
+    def recommendation(self) -> Recommendation:
         """Recommended plan and deciding ground."""
         return recommend(self.eligible, self.shares)
 
@@ -89,11 +89,6 @@ class Comparison(results.Data, results.Tabled):
     def eligible(self) -> tuple[Plan, ...]:
         """Feasible plans that may be recommended."""
         return tuple(plan for plan in self.plans if plan.feasible and (plan.commandable or not self.only_commanded))
-
-    @property
-    def restricted(self) -> bool:
-        """True if feasible plans were left out because they cannot be commanded."""
-        return len(self.eligible) < sum(plan.feasible for plan in self.plans)
 
     @property
     def needless(self) -> bool:
@@ -206,27 +201,24 @@ def compare_plans(
     plans: Sequence[Plan], *, named: bool = True, samples: int | None = None, timed: bool = False
 ) -> Comparison:
     """Comparison of plans of one spacecraft, as the schedule of a file, in the dispersed cases of `compare`."""
-    spacecraft = plans[0].spacecraft
-    nominal = Comparison(spacecraft, tuple(plans), named=named, timed=timed)
-    return replace(nominal, flown=_dispersed(nominal, samples)) if _flies(spacecraft, samples) else nominal
+    nominal = Comparison(plans[0].spacecraft, tuple(plans), named=named, timed=timed)
+    if not _flies(nominal.spacecraft, samples):
+        return nominal
+    from nutdamp.montecarlo.study import SAMPLES
+    from nutdamp.planning.screening import fly_compared
+
+    feasible = [plan for plan in plans if plan.feasible]
+    count = SAMPLES if samples is None else samples
+    most = work.CASES * max(1.0, count / SAMPLES)
+    with work.budget("the dispersed cases", most), work.steps(len(feasible) + 1.0, SEARCH):
+        flown = fly_compared(feasible, count, lambda shares: recommend(nominal.eligible, shares).plan)
+    return replace(nominal, flown=flown)
 
 
 def _flies(spacecraft: Spacecraft, samples: int | None) -> bool:
     """True if plans fly dispersed cases."""
     wanted = requirements.judged(spacecraft) if samples is None else samples > 0
     return spacecraft.dispersions is not None and wanted
-
-
-def _dispersed(compared: Comparison, samples: int | None) -> dict[Plan, PlanCandidate]:
-    """Feasible plans in dispersed cases."""
-    from nutdamp.montecarlo.study import SAMPLES
-    from nutdamp.planning.screening import fly_compared
-
-    feasible = [plan for plan in compared.plans if plan.feasible]
-    count = SAMPLES if samples is None else samples
-    most = work.CASES * max(1.0, count / SAMPLES)
-    with work.budget("the dispersed cases", most), work.steps(len(feasible) + 1.0, SEARCH):
-        return fly_compared(feasible, count, lambda shares: recommend(compared.eligible, shares).plan)
 
 
 def attempt(spacecraft: Spacecraft, scheme: str, options: planner.Choice) -> Plan:
@@ -337,11 +329,6 @@ class Decision:
         """True if the file gives dispersions and no such cases were flown."""
         return self.cases is None and not self.unknown and self.plan.spacecraft.dispersions is not None
 
-    @property
-    def final(self) -> Final:
-        """Final spin axis, H and spin."""
-        return self.flight.final
-
 
 def decide(compared: Comparison) -> Decision | None:
     """Decision on the recommended plan, by its dispersed cases where they were flown; None without one."""
@@ -351,10 +338,6 @@ def decide(compared: Comparison) -> Decision | None:
     cases, share = compared.cases(plan), compared.shares.get(plan)
     undecided = share is not None and share.met is None
     return Decision(plan, None if undecided else cases, undecided)
-
-
-PICTURED = 100_000
-"""Largest number of rows of the track of a picture."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -406,8 +389,8 @@ class Simulation(results.Data, results.Tabled):
 
     @cached_property
     def pictured(self) -> Track:
-        """Track of pictures."""
-        return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)
+        """Track of pictures, of at most 100,000 rows."""
+        return self._both[self.real].sampled(min(self.samples, 100_000), self.drawn_to)
 
 
 TELLING = math.radians(1e-6)
@@ -418,37 +401,26 @@ CUT = "the search ended at its limit of work"
 
 def infeasibility(plan: Plan) -> str:
     """Reason for the lack of a schedule; empty where there is one."""
-    why = _infeasibility(plan)
-    return f"{why}; {CUT}" if why and plan.cut else why
-
-
-def _infeasibility(plan: Plan) -> str:
     if plan.breach is not None:
-        return f"the only schedule found breaks a limit: {_broken(plan.breach)}"
-    if plan.astray is not None and math.isinf(plan.astray.least_at):
-        return strays(plan.astray)
-    if plan.astray is not None:
-        return f"{strays(plan.astray)}; no way round it was found within the limits"
-    if plan.worse is not None:
-        return f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation{_by_itself(plan)}"
-    return plan.refusal or ""
-
-
-def _by_itself(plan: Plan) -> str:
-    decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
-    if decayed >= plan.spacecraft.nutation:
-        return ""
-    return f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
+        why = f"the only schedule found breaks a limit: {_broken(plan.breach)}"
+    elif plan.astray is not None:
+        why = strays(plan.astray)
+        if math.isfinite(plan.astray.least_at):
+            why += "; no way round it was found within the limits"
+    elif plan.worse is not None:
+        why = f"the best schedule found would leave {math.degrees(plan.worse):.3g}° of nutation"
+        decayed = requirements.decayed(plan.spacecraft, plan.worse_at)
+        if decayed < plan.spacecraft.nutation:
+            why += f" at {plan.worse_at:.4g} s; without a pulse it decays to {math.degrees(decayed):.3g}° by then"
+    else:
+        why = plan.refusal or ""
+    return f"{why}; {CUT}" if why and plan.cut else why
 
 
 def strays(aspect: Aspect) -> str:
     """Message on a broken cone."""
-    keep = aspect.keep
-    angle, at, bound = (
-        (aspect.least, aspect.least_at, f"min = {math.degrees(keep.least):.6g}°")
-        if aspect.too_near
-        else (aspect.largest, aspect.largest_at, f"max = {math.degrees(keep.most):.6g}°")
-    )
+    keep, (angle, at, limit) = aspect.keep, aspect.broken_at
+    bound = f"{'min' if aspect.too_near else 'max'} = {math.degrees(limit):.6g}°"
     seen = f"{math.degrees(angle) if angle > NEGLIGIBLE else 0.0:.4g}°"
     if math.isinf(at):
         return f"the target is {seen} from {keep.name} ({bound})"
@@ -463,11 +435,8 @@ def broken_limits(spacecraft: Spacecraft, schedule: Schedule) -> list[str]:
     grouped: dict[tuple[Limit, tuple[float, float] | None], list[Breach]] = {}
     for breach in breaches(spacecraft, schedule):
         grouped.setdefault((breach.limit, breach.window), []).append(breach)
-    return [_broken(first) + _likewise(len(others)) for first, *others in grouped.values()]
-
-
-def _likewise(others: int) -> str:
-    return f"; likewise {others} more pulse{'s' * (others > 1)}" if others else ""
+    counts = [(_broken(broken[0]), len(broken) - 1) for broken in grouped.values()]
+    return [text + f"; likewise {more} more pulse{'s' * (more > 1)}" * (more > 0) for text, more in counts]
 
 
 def _broken(breach: Breach) -> str:

@@ -14,10 +14,11 @@ from nutdamp.flight import end_state
 from nutdamp.flight.end_state import Aspect, at_start
 from nutdamp.flight.propagation import Flight
 from nutdamp.planning.decision import TELLING, Comparison, Decision, infeasibility
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Gain, Ground, Obstacle, Standing
+from nutdamp.planning.plan import Obstacle, Plan, Standing
+from nutdamp.planning.recommendation import Gain, Ground
 from nutdamp.schemes import catalogue
 from nutdamp.schemes.catalogue import OPTIMAL
+from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
@@ -32,7 +33,7 @@ def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
         return (note("infeasible", scheme=plan.scheme, why=infeasibility(plan)),)
     notes = [*plan.pulses.notes, *[note("search-ended")] * plan.cut]
     if plan.flown is not None and len(plan.pulses):
-        notes += [*_bounds(plan), *_remainder(plan), *_asymmetry(plan), *_fixed_length(plan)]
+        notes += [*_bounds(plan), *_left(plan)]
         notes += [broken_cone(aspect) for aspect in plan.aspects if cones and not aspect.kept]
     return tuple(entry.of(plan.scheme) for entry in notes)
 
@@ -57,27 +58,38 @@ def _bounds(plan: Plan) -> Iterator[Note]:
         yield note("cost-of-keeping", keeping=scale * bounds.keeping, unit=unit)
 
 
-def _remainder(plan: Plan) -> Iterator[Note]:
-    """Reason for remaining nutation."""
-    left = plan.flight.residual.nutation
-    if left < TELLING or plan.options.uncorrected:
-        return
-    if plan.spacecraft.goal.spin is not None and plan.meets_requirement:
-        yield note("remains-allowed", nutation_deg=math.degrees(left))
-    else:
-        yield remaining(plan)
+def _left(plan: Plan) -> Iterator[Note]:
+    """Reasons for remaining nutation: unequal moments and equal pulses of a given length among them."""
+    body, options, left, inertia = plan.spacecraft, plan.options, plan.left, plan.spacecraft.inertia
+    nutation, symmetric = plan.flight.residual.nutation, plan.left_if_symmetric
+    if nutation >= TELLING and not options.uncorrected:
+        allowed = body.goal.spin is not None and plan.meets_requirement
+        yield note("remains-allowed", nutation_deg=math.degrees(nutation)) if allowed else remaining(plan)
+    if symmetric is not None:  # what the same pulses would leave
+        yield note(
+            "unequal-moments",
+            inequality_percent=100.0 * abs(inertia.moments[0] - inertia.moments[1]) / inertia.A,
+            nutation_deg=math.degrees(nutation),
+            symmetric_deg=math.degrees(symmetric),
+        )
+    simple = inertia.symmetric and not body.disturbances and body.growth == 0.0
+    if left is not None and not simple and options.equal and not options.resizable and not options.uncorrected:
+        off = float(requirements.missed(body, left.nutation, left.aim))
+        if off >= TELLING:
+            yield note("fixed-length", off_deg=math.degrees(off))
 
 
 def remaining(plan: Plan) -> Note:
     """Nutation that remains, and the obstacle to less of it."""
-    hindrance, left = plan.hindrance, math.degrees(plan.flight.residual.nutation)
+    body, hindrance, left = plan.spacecraft, plan.hindrance, math.degrees(plan.flight.residual.nutation)
     obstacle = hindrance.obstacle
     if obstacle is Obstacle.UNPLANNED_DISTURBANCES:
         return note("remains-unplanned", nutation_deg=left)
     if obstacle is Obstacle.STEADY_TILT:
-        return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(hindrance.steady_tilt))
+        tilt = math.atan(body.inertia.A * abs(steady_omega(body, plan.pulses.end)) / abs(body.axial))
+        return note("remains-steady-tilt", nutation_deg=left, tilt_deg=math.degrees(tilt))
     if obstacle is Obstacle.MAX_PULSES:
-        return note("remains-max-pulses", nutation_deg=left, pulses=plan.spacecraft.limits.max_pulses)
+        return note("remains-max-pulses", nutation_deg=left, pulses=body.limits.max_pulses)
     if obstacle is Obstacle.RESOLUTION:
         return note("remains-rounding", nutation_deg=left, rounding_deg=math.degrees(hindrance.rounding))
     if obstacle is Obstacle.LIMITS:
@@ -86,49 +98,11 @@ def remaining(plan: Plan) -> Note:
     return note("remains-scheme", nutation_deg=left)
 
 
-def _asymmetry(plan: Plan) -> Iterator[Note]:
-    """Nutation left by the same pulses if I1 and I2 were their mean."""
-    without, inertia = plan.left_if_symmetric, plan.spacecraft.inertia
-    if without is not None:
-        first, second, _ = inertia.moments
-        yield note(
-            "unequal-moments",
-            inequality_percent=100.0 * abs(first - second) / inertia.A,
-            nutation_deg=math.degrees(plan.flight.residual.nutation),
-            symmetric_deg=math.degrees(without),
-        )
-
-
-def _fixed_length(plan: Plan) -> Iterator[Note]:
-    """Note on equal pulses of a given length, which do not end exactly."""
-    options, body, left = plan.options, plan.spacecraft, plan.left
-    simple = body.inertia.symmetric and not body.disturbances and body.growth == 0.0
-    if left is None or simple or not options.equal or options.resizable or options.uncorrected:
-        return
-    off = float(requirements.missed(body, left.nutation, left.aim))
-    if off >= TELLING:
-        yield note("fixed-length", off_deg=math.degrees(off))
-
-
 def broken_cone(aspect: Aspect) -> Note:
     """A cone about a direction that the spin axis breaks."""
-    keep = aspect.keep
-    angle, at, limit = (
-        (aspect.least, aspect.least_at, keep.least)
-        if aspect.too_near
-        else (aspect.largest, aspect.largest_at, keep.most)
-    )
-    return note(
-        "cone-broken",
-        angle_deg=math.degrees(angle),
-        direction=keep.name,
-        at_s=at,
-        limit_deg=math.degrees(limit),
-    )
-
-
-TURNED = math.radians(0.1)
-"""Turn of H, rad, from which it is mentioned."""
+    angle, at, limit = aspect.broken_at
+    angle, limit = math.degrees(angle), math.degrees(limit)
+    return note("cone-broken", angle_deg=angle, direction=aspect.keep.name, at_s=at, limit_deg=limit)
 
 
 def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note]:
@@ -147,22 +121,19 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
     yield from _unaided(decision)
     yield from _growing(decision)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
-    if not limited and final.momentum_shift > TURNED:
+    if not limited and final.momentum_shift > math.radians(0.1):
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
     yield from _spin_change(decision)
     if body.loop is not None:
         yield note("loop-not-judged")
 
 
-SPIN_DIGITS = 5
-"""Digits of a spin rate in rpm, of which one has to change."""
-
-
 def _spin_change(decision: Decision) -> Iterator[Note]:
     """Change of the spin that nobody asked for, and its causes: axial impulses of channels, then what else acts."""
     plan, body = decision.plan, decision.plan.spacecraft
-    before, after = RPM * body.spin, RPM * decision.final.spin
-    resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) + 1 - SPIN_DIGITS)
+    before, after = RPM * body.spin, RPM * decision.flight.final.spin
+    # One of five digits has to change.
+    resolution = 10.0 ** (math.floor(math.log10(max(abs(before), abs(after), 1e-9))) - 4)
     if body.goal.spin is not None or abs(after - before) <= resolution:
         return
     pulses, causes, explained = decision.flight.schedule, list[str](), 0.0
@@ -203,7 +174,7 @@ def _growing(decision: Decision) -> Iterator[Note]:
         return
     body, flight = decision.plan.spacecraft, decision.flight
     cases = decision.cases
-    left = decision.final.nutation if cases is None else cases.levels[Part.NUTATION]
+    left = decision.flight.final.nutation if cases is None else cases.levels[Part.NUTATION]
     again = requirements.to_required(body, left, growing=True)
     if again and left > TELLING:
         after = flight.schedule.end if flight.until is None else flight.until
@@ -321,15 +292,6 @@ def optimal_untried(compared: Comparison) -> bool:
     return able and OPTIMAL.name not in {plan.scheme for plan in compared.plans}
 
 
-GAINS = {
-    Gain.STEADIER: "smaller-shift",
-    Gain.SIMPLER: "fewer-pulses",
-    Gain.SOONER: "ends-sooner",
-    Gain.REAL: "real-widths",
-    Gain.COMMANDED: "as-blocks",
-}
-
-
 def alternatives(compared: Comparison) -> Iterator[Note]:
     """Plans that the reader may prefer: much better in some way for little more, each once, with its figures."""
     recommendation = compared.recommendation
@@ -342,7 +304,7 @@ def alternatives(compared: Comparison) -> Iterator[Note]:
         assert chosen.flown is not None
         assert other.flown is not None
         yield note(
-            GAINS[gain],
+            gain.value,
             scheme=other.scheme,
             pulses=len(other.pulses),
             than_pulses=len(chosen.pulses),

@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,11 +26,10 @@ from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import Aspect, left_by, seen_at
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.physics import attitude, precession
-from nutdamp.planning.recommendation import Hindrance, Standing
 from nutdamp.schemes import catalogue, planner, valve_commands
 from nutdamp.schemes.block_legs import Legs
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Breach, breaches
+from nutdamp.spacecraft.constraints import Breach, breaches, rounded_off
 from nutdamp.spacecraft.model import Keep, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Held, Left
 from nutdamp.spacecraft.schedule import Schedule
@@ -43,17 +43,11 @@ MARGINS = tuple(math.radians(margin) for margin in (0.5, 2.0, 5.0, 10.0))
 BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sign in (1.0, -1.0))
 """rad to either side of the great circle at which way points may lie, up to 87 deg, the smallest first."""
 
-PLACES = ((0.5,), (0.25, 0.75))
-"""Way points of one and of two dog-legs, as shares of the way to the target."""
+PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
+"""Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of parts of each leg."""
 
-PARTS = (1, 2, 4)
-"""Numbers of parts of each leg of a route."""
-
-ROUTES = 16
-"""Routes that are tried, at most."""
-
-STEPS = 64
-"""Points of a leg at which the cones are looked at."""
+ROUTES, STEPS = 16, 64
+"""Routes that are tried, at most, and points of a leg at which the cones are looked at."""
 
 Route = tuple[Vector, ...]
 
@@ -80,13 +74,12 @@ def routes(spacecraft: Spacecraft) -> list[Route]:
     """Way points from H at t = 0, the target last, at most `ROUTES`; the shortest first."""
     start = spacecraft.momentum / np.linalg.norm(spacecraft.momentum)
     shortest: dict[tuple[float, ...], Route] = {}
-    for parts in PARTS:
-        for margin in MARGINS:
-            for places in ((), *PLACES):
-                bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
-                if bent is not None and len(bent) * parts > 1:
-                    route = _divided(start, bent, parts)
-                    shortest.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
+    for parts, margin, places in product(PARTS, MARGINS, PLACES):
+        bent = _bent(start, spacecraft.target_axis, places, spacecraft.keep, margin)
+        if bent is not None and len(bent) * parts > 1:
+            shares = np.arange(1, parts + 1) / parts
+            route = tuple(point for leg in pairwise((start, *bent)) for point in _along(*leg, shares))
+            shortest.setdefault(tuple(np.concatenate(route).round(9).tolist()), route)
     return sorted(shortest.values(), key=lambda route: (round(_length((start, *route)), 3), len(route)))[:ROUTES]
 
 
@@ -98,22 +91,15 @@ def _bent(
     start: Vector, target: Vector, places: tuple[float, ...], keeps: Sequence[Keep], margin: float
 ) -> Route | None:
     """Least bent route with way points at ``places`` that is clear by ``margin`` rad; None where there is none."""
-    if not places:
-        return (target,) if _clear((start, target), keeps, margin) else None
-    for bend in BENDS:
-        route = (*(_aside(start, target, place, bend) for place in places), target)
-        if _clear((start, *route), keeps, margin):
-            return route
-    return None
-
-
-def _aside(start: Vector, target: Vector, place: float, bend: float) -> Vector:
-    """Point at a share of the way, ``bend`` rad to the left of the great circle."""
-    on_the_way = _along(start, target, np.array([place]))[0]
+    on_the_way = [_along(start, target, np.array([place]))[0] for place in places]
     normal = np.cross(start, target)
     size = float(np.linalg.norm(normal))
     left = normal / size if size > 0.0 else precession.square_to(start)
-    return np.asarray(math.cos(bend) * on_the_way + math.sin(bend) * left)
+    for bend in BENDS if places else BENDS[:1]:
+        route = (*(math.cos(bend) * point + math.sin(bend) * left for point in on_the_way), target)
+        if _clear((start, *route), keeps, margin):
+            return route
+    return None
 
 
 def _along(start: Vector, end: Vector, shares: Vector) -> Vector:
@@ -139,12 +125,6 @@ def _clear(corners: Route, keeps: Sequence[Keep], margin: float) -> bool:
     return True
 
 
-def _divided(start: Vector, route: Route, parts: int) -> Route:
-    """Copy of the ``route`` with each leg in ``parts``."""
-    shares = np.arange(1, parts + 1) / parts
-    return tuple(point for leg in pairwise((start, *route)) for point in _along(*leg, shares))
-
-
 def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions, route: Route) -> Schedule:
     """Schedule of a ``scheme`` by way of the points of a ``route``; raises Infeasible with the reason.
 
@@ -156,21 +136,120 @@ def _over(spacecraft: Spacecraft, scheme: str, options: catalogue.SchemeOptions,
         to_go = _length((here.momentum, point, *route[number:]))
         share = _length((here.momentum, point)) / to_go if to_go > 0.0 else 1.0
         spin = goal.spin if number == len(route) else None
-        leg = replace(
-            here,
-            goal=replace(goal, axis=point, spin=spin),
-            limits=replace(here.limits, horizon=share * here.horizon),
-        )
+        limits = replace(here.limits, horizon=share * here.horizon)
+        leg = replace(here, goal=replace(goal, axis=point, spin=spin), limits=limits)
         legs.fire(planner.schedule(scheme, leg, options))
     names = ", ".join(keep.name for keep in spacecraft.keep)
     return legs.schedule(note("goes-round", points=len(route) - 1, directions=names))
 
 
-NO_NUTATION = 1e-12
-"""Nutation angle in rad below which there is nothing to plan."""
+NO_NUTATION, ROUNDING = 1e-12, 1e-11
+"""Nutation angle in rad below which there is nothing to plan; relative decrease of it that may be rounding."""
 
-ROUNDING = 1e-11
-"""Relative decrease of the remaining nutation that may be rounding."""
+
+class Standing(Enum):
+    """Standing of a plan, from the best down.
+
+    It meets the requirement, and damps the parts that it does not bound; it leaves other parts undamped; it does not
+    meet it, or, without one, does not damp.
+    """
+
+    COMPLIES = "complies"
+    MEETS = "meets"
+    MISSES = "misses"
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
+
+    ``probability``: the share that must.
+    """
+
+    low: float
+    high: float
+    probability: float
+
+    @property
+    def exact(self) -> float | None:
+        """Share; None where not all cases have flown."""
+        return self.low if self.low == self.high else None
+
+    @property
+    def met(self) -> bool | None:
+        """Compliance in enough cases; None where the flown ones do not decide it."""
+        return True if self.low >= self.probability else False if self.high < self.probability else None
+
+
+class Obstacle(Enum):
+    """Obstacle to less nutation."""
+
+    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
+    STEADY_TILT = "disturbances, under which a tilt stays"
+    MAX_PULSES = "limits.max_pulses"
+    RESOLUTION = "limits.tick"
+    LIMITS = "limits of the file that bind"
+    SCHEME = "the scheme"
+
+
+@dataclass(frozen=True, eq=False)
+class Hindrance:
+    """Limiting factors of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
+
+    spacecraft: Spacecraft
+    pulses: Schedule
+    aware: bool
+    nutation: float
+
+    @property
+    def obstacle(self) -> Obstacle:
+        """Dominant obstacle."""
+        body, limits = self.spacecraft, self.spacecraft.limits
+        if self.full and self.to_the_end:
+            return Obstacle.LIMITS
+        if body.disturbances:
+            return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
+        if self.nutation <= self.rounding:
+            return Obstacle.RESOLUTION
+        if len(self.pulses) == limits.max_pulses:
+            return Obstacle.MAX_PULSES
+        return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
+
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Keys of the file for the limits that certainly end the schedule."""
+        ends = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
+        if not any(ends.values()):
+            least = {channel.name: channel.min_on_time * (1.0 + 1e-9) for channel in self.spacecraft.channels}
+            ends["min_on_time"] = any(0.0 < pulse.loaded[1] <= least.get(pulse.channel, 0.0) for pulse in self.pulses)
+        return tuple(key for key in ends if ends[key])
+
+    @property
+    def suspected(self) -> tuple[str, ...]:
+        """Keys of the file for limits that may end it: certainty takes a plan without them."""
+        limits = self.spacecraft.limits
+        ticks = limits.tick is not None and not self.full and not self.to_the_end
+        suspects = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
+        return tuple(key for key in suspects if suspects[key])
+
+    @property
+    def full(self) -> bool:
+        """True if every pulse is as long as its channel may be on; False without such a limit."""
+        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
+        full = [pulse.loaded[1] >= longest.get(pulse.channel, math.inf) * (1.0 - 1e-9) for pulse in self.pulses]
+        return bool(full) and all(full)
+
+    @property
+    def to_the_end(self) -> bool:
+        """True if less than one nutation period is left of the horizon after the last pulse."""
+        body = self.spacecraft
+        return body.horizon - self.pulses.end < body.nutation_period
+
+    @property
+    def rounding(self) -> float:
+        """Largest effect, rad, of half a tick in starts and on-times, to first order; 0 without ticks."""
+        # Worst over root mean square: the centre is off by half the on-time's error and the start's.
+        return math.hypot(1.0, 1.5) * math.fsum(rounded_off(self.spacecraft, self.pulses))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -347,7 +426,16 @@ class Plan(results.Data, results.Tabled):
         mass = self.spacecraft.mass
         if not self.feasible or mass is None or any(pulse.force is None for pulse in self.pulses):
             return None
-        return end_state.momentum_gained(_lightening(self.flight)) / mass
+        flown = self.flight
+        if self.spacecraft.tank is not None:  # forces accelerate more as the mass falls
+            used, pulses = 0.0, []
+            for pulse in flown.schedule:
+                taken = pulse.propellant or 0.0
+                scale = mass / (mass - used - 0.5 * taken)
+                pulses.append(replace(pulse, force=None if pulse.force is None else pulse.force * scale))
+                used += taken
+            flown = replace(flown, schedule=Schedule(tuple(pulses)))
+        return end_state.momentum_gained(flown) / mass
 
     @cached_property
     def left_if_symmetric(self) -> float | None:
@@ -375,20 +463,6 @@ class Plan(results.Data, results.Tabled):
         return Hindrance(self.spacecraft, self.pulses, self.options.with_disturbances, left)
 
 
-def _lightening(flown: Flight) -> Flight:
-    """Flight with forces that grow as the mass falls with the propellant of a tank."""
-    body = flown.spacecraft
-    if body.tank is None or body.mass is None:
-        return flown
-    used, pulses = 0.0, []
-    for pulse in flown.schedule:
-        taken = pulse.propellant or 0.0
-        scale = body.mass / (body.mass - used - 0.5 * taken)
-        pulses.append(replace(pulse, force=None if pulse.force is None else pulse.force * scale))
-        used += taken
-    return replace(flown, schedule=Schedule(tuple(pulses)))
-
-
 def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) -> Plan:
     """Plan one scheme and judge it; an infeasible plan gives the reason.
 
@@ -414,19 +488,10 @@ def plan(spacecraft: Spacecraft, scheme: str, options: planner.Choice = None) ->
         except Infeasible as reason:
             result = Plan(spacecraft, scheme, None, str(reason))
         if result.astray is not None and (catalogue.SCHEMES[scheme].points or catalogue.SCHEMES[scheme].reads_commands):
-            result = _routed(result, chosen)
+            rerouted = schedules(known(spacecraft, chosen), scheme, chosen)
+            others = (judged(spacecraft, scheme, schedule, chosen) for schedule in rerouted)
+            result = next((other for other in others if other.feasible), result)
     return replace(result, cut=True) if spent.exhausted else result
-
-
-def _routed(astray: Plan, options: catalogue.SchemeOptions) -> Plan:
-    """A plan of the same scheme by another way, on which the spin axis keeps its cones; else the one that does not."""
-
-    body = astray.spacecraft
-    for schedule in schedules(known(body, options), astray.scheme, options):
-        plan_ = judged(body, astray.scheme, schedule, options)
-        if plan_.feasible:
-            return plan_
-    return astray
 
 
 def reaches_spin(spacecraft: Spacecraft) -> bool:
@@ -461,18 +526,18 @@ def known(spacecraft: Spacecraft, options: catalogue.SchemeOptions) -> Spacecraf
     A spin that nothing can change, and that is the one of the goal, is no goal for them.
     """
     body = spacecraft if options.with_disturbances else replace(spacecraft, disturbances=())
-    if (
-        body.goal.spin is None
-        or not reaches_spin(body)
-        or body.spin_drift
-        or any(channel.axial for channel in body.channels)
-    ):
-        return body
-    return replace(body, goal=replace(body.goal, spin=None))
+    axial = any(channel.axial for channel in body.channels)
+    if body.goal.spin is not None and reaches_spin(body) and not body.spin_drift and not axial:
+        return replace(body, goal=replace(body.goal, spin=None))
+    return body
 
 
 def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: catalogue.SchemeOptions) -> Plan:
-    """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin."""
+    """Plan of a schedule: infeasible where it breaks a limit or does not help. Raises Infeasible on flat spin.
+
+    It helps where nutation, distance from the target axis or from the requested spin is less than without pulses;
+    nutation that decays by itself must be less than what it has decayed to by the last pulse.
+    """
     if spacecraft.disturbances:  # which the scheme need not have known
         schedule = schedule.without_proof
     flown = Plan(spacecraft, scheme, schedule, options=options)
@@ -484,14 +549,17 @@ def judged(spacecraft: Spacecraft, scheme: str, schedule: Schedule, options: cat
         astray = end_state.broken(spacecraft, flown.flight)
         if astray is not None:
             return Plan(spacecraft, scheme, None, astray=astray)
-    if scheme in catalogue.PLANNED and left is not None and not _helps(flown, left):
-        return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
+    if scheme in catalogue.PLANNED and left is not None:
+        spin, least = spacecraft.goal.spin, requirements.decayed(spacecraft, flown.end) * (1.0 - ROUNDING)
+        respun = spin is not None and abs(flown.flight.settled.spin - spin) < abs(spacecraft.spin - spin)
+        if not respun and left.nutation >= least and left.axis_error >= spacecraft.to_turn:
+            return Plan(spacecraft, scheme, None, worse=left.nutation, worse_at=flown.end)
     return flown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Verified(results.Data):
-    """Schedule of a ``plan`` flown by independent methods: ``core`` holds them, conserved quantities, error budget."""
+    """A ``plan`` flown by independent methods: ``core`` holds them, conserved quantities and the error budget."""
 
     core: Verification
     plan: Plan
@@ -513,20 +581,6 @@ def feasible(plan: Plan) -> Plan:
     return plan
 
 
-def _helps(judged: Plan, left: Residual) -> bool:
-    """True if nutation, distance from the target axis or from the requested spin is less than without pulses.
-
-    Nutation that decays by itself must be less than what it has decayed to by the last pulse.
-    """
-    body = judged.spacecraft
-    if body.goal.spin is not None and abs(judged.flight.settled.spin - body.goal.spin) < abs(
-        body.spin - body.goal.spin
-    ):
-        return True
-    least = requirements.decayed(body, judged.end) * (1.0 - ROUNDING)
-    return left.nutation < least or left.axis_error < body.to_turn
-
-
 def unrounded(plan_: Plan) -> Schedule | None:
     """Schedule with commands of any resolution.
 
@@ -535,5 +589,4 @@ def unrounded(plan_: Plan) -> Schedule | None:
     body = plan_.spacecraft
     if body.limits.tick is None or plan_.from_file:
         return None
-    smooth = plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options)
-    return smooth.schedule
+    return plan(replace(body, limits=replace(body.limits, tick=None)), plan_.scheme, plan_.options).schedule

@@ -1,83 +1,17 @@
-"""Recommendation among plans, by flown residuals and cost, and factors that limit a schedule.
-
-It gives data; `nutdamp.planning.decision` and `nutdamp.views.decisions` have the words.
-"""
+"""Recommendation among plans, by flown residuals and cost."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Generic, Protocol, TypeVar
 
-from nutdamp.flight.propagation import Residual
-from nutdamp.schemes.sequential import steady_omega
-from nutdamp.spacecraft.constraints import rounded_off
-from nutdamp.spacecraft.model import Spacecraft, Vector
+from nutdamp.planning.plan import Plan, Share, Standing
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
-from nutdamp.spacecraft.schedule import Schedule
 
-SAME_ANGLE = 1e-9
-"""rad by which shifts of H may differ and be equal: the rounding of a flight."""
-
-SAME_SPEED = 1e-5
-"""m/s by which ΔV may differ and be equal."""
-
-STEADIER_SHIFT = 0.2
-"""Share of the recommended plan's momentum shift below which another plan keeps H so much better..."""
-
-STEADIER_COST = 1.1
-"""Largest cost ratio at which that is worth a note."""
-
-FEWER_PULSES = 0.5
-"""Share of the recommended plan's pulses up to which another one is so much simpler..."""
-
-FEWER_COST = 1.05
-"""Largest cost ratio at which that is worth a note."""
-
-SOONER_END = 0.5
-"""Share of the recommended plan's end up to which another one, a nutation period earlier at least, is so much sooner...
-"""
-
-SOONER_COST = 1.05
-"""Largest cost ratio at which that is worth a note."""
-
-REAL_COST = 1.1
-"""Largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note."""
-
-
-class Standing(Enum):
-    """Standing of the recommended plan, and of those it was chosen among; from the best down."""
-
-    COMPLIES = "complies"
-    """Meets the requirement, and damps the parts that it does not bound."""
-    MEETS = "meets"
-    """Meets the requirement, but leaves other parts undamped."""
-    MISSES = "misses"
-    """Does not meet the requirement; without one: does not damp."""
-
-
-@dataclass(frozen=True, slots=True)
-class Share:
-    """Share of all dispersed cases that comply with a plan: from ``low`` to ``high``, equal where all have flown.
-
-    ``probability``: the share that must.
-    """
-
-    low: float
-    high: float
-    probability: float
-
-    @property
-    def exact(self) -> float | None:
-        """Share; None where not all cases have flown."""
-        return self.low if self.low == self.high else None
-
-    @property
-    def met(self) -> bool | None:
-        """Compliance in enough cases; None where the flown ones do not decide it."""
-        return True if self.low >= self.probability else False if self.high < self.probability else None
+SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
+"""rad and m/s by which shifts of H and ΔV may differ and be equal: the rounding of a flight."""
 
 
 class Ground(Enum):
@@ -97,64 +31,17 @@ class Ground(Enum):
 
 
 class Gain(Enum):
-    """Advantage of another plan over the recommended one."""
+    """Advantage of another plan over the recommended one, by the code of its note."""
 
-    STEADIER = "steadier"
-    """Keeps H."""
-    SIMPLER = "simpler"
-    """Far fewer pulses."""
-    SOONER = "sooner"
-    """Ends far sooner."""
-    REAL = "real"
-    """Real pulse widths, where the recommended one fires ideal impulses."""
-    COMMANDED = "commanded"
-    """Command blocks, where the recommended one is fired pulse by pulse."""
-
-
-class Judged(Hashable, Protocol):
-    """Interface of a plan for the ranking."""
-
-    @property
-    def spacecraft(self) -> Spacecraft:
-        """Spacecraft of the plan."""
-        ...
-
-    @property
-    def pulses(self) -> Schedule:
-        """Schedule."""
-        ...
-
-    @property
-    def flown(self) -> Residual | None:
-        """Flown residual; None where it is infeasible."""
-        ...
-
-    @property
-    def standing(self) -> Standing:
-        """Standing."""
-        ...
-
-    @property
-    def kept(self) -> bool | None:
-        """True if the spin axis keeps its cones; None where there are none."""
-        ...
-
-    @property
-    def delta_v(self) -> Vector | None:
-        """Velocity change, (3,) m/s; None where unknown."""
-        ...
-
-    @property
-    def severity(self) -> float:
-        """See `nutdamp.spacecraft.requirements.severity`."""
-        ...
-
-
-Plan = TypeVar("Plan", bound=Judged)
+    STEADIER = "smaller-shift"
+    SIMPLER = "fewer-pulses"
+    SOONER = "ends-sooner"
+    REAL = "real-widths"
+    COMMANDED = "as-blocks"
 
 
 @dataclass(frozen=True, eq=False)
-class Recommendation(Generic[Plan]):
+class Recommendation:
     """Recommended plan; None, as ``standing`` and ``ground``, where none is feasible.
 
     It was chosen among ``count`` plans of its ``standing``, by propellant or, not ``by_propellant``, by impulse.
@@ -169,7 +56,7 @@ class Recommendation(Generic[Plan]):
     alternatives: Mapping[Gain, Plan] = field(default_factory=dict)
 
 
-def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation[Plan]:
+def recommend(plans: Sequence[Plan], shares: Mapping[Plan, Share] | None = None) -> Recommendation:
     """Recommendation among plans.
 
     Of the plans that meet the requirement, and damp where it bounds nothing, the cheapest, see `cheapest`. Where there
@@ -204,9 +91,9 @@ def cheapest(plans: Sequence[Plan], usual: Plan | None = None) -> tuple[Plan, Gr
     """
     if len(plans) == 1:
         return plans[0], Ground.ONLY
-    known = by_propellant(plans)
-    least = min(_cost(plan, known) for plan in plans)
-    equal = [plan for plan in plans if _cost(plan, known) <= least * (1.0 + SAME_COST)]
+    unit = _unit(plans)
+    least = min(plan.pulses.cost_in(unit) for plan in plans)
+    equal = [plan for plan in plans if plan.pulses.cost_in(unit) <= least * (1.0 + SAME_COST)]
     if len(equal) == 1:
         return equal[0], Ground.COST
     if usual is not None and any(plan is usual for plan in equal):
@@ -249,24 +136,22 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
 
     For little more; one of command blocks for whatever it costs, since the spacecraft may fire nothing else.
     """
-    known, body = by_propellant(plans), best.spacecraft
-    few, soon = FEWER_PULSES * len(best.pulses), SOONER_END * best.pulses.end
+    unit, body = _unit(plans), best.spacecraft
+    turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else 0.2 * _off(best)
+    few, soon = 0.5 * len(best.pulses), min(0.5 * best.pulses.end, best.pulses.end - body.inertial_period)
     gains_of: dict[Gain, Plan] = {}
-    for gain, times, gains in (
-        (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < STEADIER_SHIFT * _off(best)),
-        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
-        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= min(soon, best.pulses.end - body.inertial_period)),
-        (Gain.REAL, REAL_COST, lambda plan: not plan.pulses.idealised),
-        (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks)),
+    # With the largest cost ratio at which each is worth a note.
+    for gain, ratio, gains in (
+        (Gain.STEADIER, 1.1, lambda plan: _off(plan) < turned),
+        (Gain.SIMPLER, 1.05, lambda plan: len(plan.pulses) <= few),
+        (Gain.SOONER, 1.05, lambda plan: plan.pulses.end <= soon),
+        (Gain.REAL, 1.1, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
+        (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks),
     ):
-        if gain is Gain.STEADIER and (body.goal.axis is not None or _off(best) <= DAMPED_ANGLE):
-            continue
-        if (gain is Gain.REAL and not best.pulses.idealised) or (gain is Gain.COMMANDED and best.pulses.blocks):
-            continue
-        most = times * _cost(best, known)
-        those = [plan for plan in plans if len(plan.pulses) and gains(plan) and _cost(plan, known) <= most]
+        most = ratio * best.pulses.cost_in(unit)
+        those = [plan for plan in plans if len(plan.pulses) and gains(plan) and plan.pulses.cost_in(unit) <= most]
         if those:
-            gains_of[gain] = min(those, key=lambda plan: _cost(plan, known))
+            gains_of[gain] = min(those, key=lambda plan: plan.pulses.cost_in(unit))
     return gains_of
 
 
@@ -275,108 +160,20 @@ def by_propellant(plans: Sequence[Plan]) -> bool:
     return all(plan.pulses.propellant is not None for plan in plans)
 
 
-def _cost(plan: Judged, known: bool) -> float:
-    """Propellant in kg where it is ``known`` for all plans compared, else impulse in N m s."""
-    return plan.pulses.cost_in("kg" if known else "N m s")
+def _unit(plans: Sequence[Plan]) -> str:
+    return "kg" if by_propellant(plans) else "N m s"
 
 
-def _speed(plan: Judged) -> float | None:
+def _speed(plan: Plan) -> float | None:
     """|ΔV| in m/s; None where unknown."""
     return None if plan.delta_v is None else math.hypot(*plan.delta_v.tolist())
 
 
-def _off(plan: Judged) -> float:
+def _off(plan: Plan) -> float:
     assert plan.flown is not None
     return plan.flown.axis_error
 
 
-def _missed(plan: Judged) -> float:
+def _missed(plan: Plan) -> float:
     assert plan.flown is not None
     return float(missed(plan.spacecraft, plan.flown.nutation, plan.flown.axis_error))
-
-
-WORST = math.hypot(1.0, 1.5)
-"""Worst over root-mean-square effect of ticks: the centre is off by half the on-time's error and the start's."""
-
-
-class Obstacle(Enum):
-    """Obstacle to less nutation."""
-
-    UNPLANNED_DISTURBANCES = "disturbances that the plan was made without"
-    STEADY_TILT = "disturbances, under which a tilt stays"
-    MAX_PULSES = "limits.max_pulses"
-    RESOLUTION = "limits.tick"
-    LIMITS = "limits of the file that bind"
-    SCHEME = "the scheme"
-
-
-@dataclass(frozen=True, eq=False)
-class Hindrance:
-    """Limiting factors of ``pulses``, which leave ``nutation`` rad; ``aware``: planned with the disturbances."""
-
-    spacecraft: Spacecraft
-    pulses: Schedule
-    aware: bool
-    nutation: float
-
-    @property
-    def obstacle(self) -> Obstacle:
-        """Dominant obstacle."""
-        body, limits = self.spacecraft, self.spacecraft.limits
-        if self.full and self.to_the_end:
-            return Obstacle.LIMITS
-        if body.disturbances:
-            return Obstacle.STEADY_TILT if self.aware else Obstacle.UNPLANNED_DISTURBANCES
-        if self.nutation <= self.rounding:
-            return Obstacle.RESOLUTION
-        if len(self.pulses) == limits.max_pulses:
-            return Obstacle.MAX_PULSES
-        return Obstacle.LIMITS if self.binding or self.suspected else Obstacle.SCHEME
-
-    @property
-    def binding(self) -> tuple[str, ...]:
-        """Keys of the file for the limits that certainly end the schedule."""
-        ends = {"max_on_time": self.full, "limits.horizon": self.to_the_end}
-        if not any(ends.values()):
-            ends["min_on_time"] = self.shortest
-        return tuple(key for key in ends if ends[key])
-
-    @property
-    def suspected(self) -> tuple[str, ...]:
-        """Keys of the file for limits that may end it: certainty takes a plan without them."""
-        limits = self.spacecraft.limits
-        ticks = limits.tick is not None and not self.full and not self.to_the_end
-        suspects = {"limits.tick": ticks, "limits.blackout": bool(limits.blackout)}
-        return tuple(key for key in suspects if suspects[key])
-
-    @property
-    def full(self) -> bool:
-        """True if every pulse is as long as its channel may be on; False without such a limit."""
-        longest = {channel.name: channel.max_on_time for channel in self.spacecraft.channels}
-        most = [longest.get(pulse.channel, math.inf) for pulse in self.pulses]
-        return bool(most) and all(
-            pulse.loaded[1] >= long * (1.0 - 1e-9) for pulse, long in zip(self.pulses, most, strict=True)
-        )
-
-    @property
-    def shortest(self) -> bool:
-        """True if a pulse is no longer than its channel has to be on."""
-        least = {channel.name: channel.min_on_time for channel in self.spacecraft.channels}
-        return any(0.0 < pulse.loaded[1] <= least.get(pulse.channel, 0.0) * (1.0 + 1e-9) for pulse in self.pulses)
-
-    @property
-    def to_the_end(self) -> bool:
-        """True if less than one nutation period is left of the horizon after the last pulse."""
-        body = self.spacecraft
-        return body.horizon - self.pulses.end < body.nutation_period
-
-    @property
-    def rounding(self) -> float:
-        """Largest effect, rad, of half a tick in starts and on-times, to first order; 0 without ticks."""
-        return WORST * math.fsum(rounded_off(self.spacecraft, self.pulses))
-
-    @property
-    def steady_tilt(self) -> float:
-        """Angle in rad at which the disturbances hold the body once the pulses are over."""
-        body = self.spacecraft
-        return math.atan(body.inertia.A * abs(steady_omega(body, self.pulses.end)) / abs(body.axial))

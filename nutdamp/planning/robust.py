@@ -31,15 +31,9 @@ from nutdamp.planning.notes import TIES
 from nutdamp.planning.plan import Plan
 from nutdamp.planning.recommendation import Ground, by_propellant, cheapest
 from nutdamp.planning.screening import AS_GOOD, Fresh, PlanCandidate, entered, equal_from, fly_all, fresh_of
-from nutdamp.schemes.catalogue import Options
+from nutdamp.schemes.catalogue import OPTIMAL, Options
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
-
-LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
-"""Later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)."""
-
-WITHIN = (1.5, 2.0)
-"""Ends by which the scheme optimal is to be done with least cost, over the earliest one."""
 
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
@@ -157,7 +151,7 @@ def variations_of(comparison: Comparison, options: Options | None = None) -> lis
         tried.append(Variation(partial(list, [("as planned", base)]), VariationKind.PLANNED))
         tried.append(Variation(partial(_alignments, body, base.scheme, options)))
         tried += [Variation(partial(_planned, *other, base.scheme, options)) for other in _others(body, base)]
-        if base.scheme == chance_plan.SCHEME:
+        if base.scheme == OPTIMAL.name:
             tried.append(Variation(partial(chance_plan.plans, body, options), VariationKind.MARGINS))
             tried.append(Variation(partial(_early, body, options), VariationKind.EARLY))
     return sorted(tried, key=attrgetter("kind"))
@@ -179,7 +173,7 @@ def compare(
     probability = required_share(body.requirement)
     entries: dict[object, PlanCandidate] = {}
     # No early end costs less than the plan of the whole horizon that leaves as little.
-    least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == chance_plan.SCHEME), default=0.0)
+    least = min((plan.pulses.cost for plan in comparison.plans if plan.scheme == OPTIMAL.name), default=0.0)
     with work.budget("the robust plans", work.FRONTS) as budget:
         for number, variation in enumerate(variations):
             watch(number)
@@ -286,21 +280,10 @@ def ranked(
     if equals:
         best, ground = cheapest([equal.plan for equal in equals], None if usual is None else usual.plan)
         chosen = next(equal for equal in equals if equal.plan is best)
+    by_rank = sorted(candidates, key=lambda each: (each is not chosen, each.rank, each.plan.pulses.cost))
+    known = by_propellant([equal.plan for equal in equals])
     return RobustComparison(
-        comparison,
-        tuple(
-            sorted(
-                candidates, key=lambda candidate: (candidate is not chosen, candidate.rank, candidate.plan.pulses.cost)
-            )
-        ),
-        usual,
-        chosen,
-        ground,
-        len(equals),
-        by_propellant([equal.plan for equal in equals]),
-        probability,
-        samples,
-        SEED,
+        comparison, tuple(by_rank), usual, chosen, ground, len(equals), known, probability, samples, SEED
     )
 
 
@@ -320,7 +303,7 @@ def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tup
 
 def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     """Spacecraft for which the scheme plans differently: later, or without one of its channels."""
-    for periods in LATER:
+    for periods in (0.25, 0.5, 0.75, 1.0, 2.0):  # of the nutation as seen in the body, inertial ones for a sphere
         earliest = body.limits.earliest + periods * body.nutation_period
         if earliest < body.horizon:
             yield f"from {earliest:.4g} s on", replace(body, limits=replace(body.limits, earliest=earliest))
@@ -332,15 +315,15 @@ def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
 
 def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     """Earliest end of `optimal`, and its cheapest plans that end little later."""
-    first = attempt(body, chance_plan.SCHEME, Options(**{**options.chosen, "least": "time"}))
+    first = attempt(body, OPTIMAL.name, Options(**{**options.chosen, "least": "time"}))
     if not first.feasible:
         return
     yield "earliest end", first
-    for times in WITHIN:
+    for times in (1.5, 2.0):
         horizon = times * first.end
         if horizon < body.horizon:
             soon = replace(body, limits=replace(body.limits, horizon=horizon))
-            yield f"by {horizon:.4g} s", attempt(soon, chance_plan.SCHEME, options)
+            yield f"by {horizon:.4g} s", attempt(soon, OPTIMAL.name, options)
 
 
 def _planned(variant: str, body: Spacecraft, scheme: str, options: Options) -> list[tuple[str, Plan]]:

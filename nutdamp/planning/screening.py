@@ -1,11 +1,10 @@
 """Sequential screening of plans in dispersed cases, and on-times trimmed to what enough cases need.
 
-Few cases of all plans are flown, all cases of those that may be chosen after a few. All plans fly the same draws, the
-first cases first. The complying share of all cases is bounded by an exact interval from the first ones (Clopper &
-Pearson 1934), so wide that it errs once in a million times; a plan that could not be chosen even at the favourable end
-of its interval is flown no further. Trimming shortens the on-times of a plan as far as enough cases comply, in cases of
-a fresh seed too. Which comply with shorter on-times is predicted: their flown ends move by the slopes of the closed
-form. What comes out is flown; where too few cases comply then, fewer are predicted to the next time.
+All plans fly the same draws, the first cases first. The complying share of all cases is bounded by an exact interval
+from the first ones (Clopper & Pearson 1934), so wide that it errs once in a million times; a plan that could not be
+chosen even at the favourable end of its interval is flown no further. Which cases comply with shorter on-times is
+predicted: their flown ends move by the slopes of the closed form. What comes out is flown, in fresh cases too; where
+too few cases comply then, fewer are predicted to the next time.
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ from nutdamp.montecarlo.statistics import EXACT_CASES, OUTPUTS, ROWS, binomial_i
 from nutdamp.montecarlo.study import CONFIDENCE, EARLY, Results, Study, run, study_of, threads_here
 from nutdamp.physics import attitude
 from nutdamp.planning import plan as planning
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Share
+from nutdamp.planning.plan import Plan, Share
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
@@ -41,11 +39,9 @@ from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 STAGES = (2_048, 8_192)
 """Numbers of cases after which plans are screened."""
 
-CERTAIN = 1.0 - 1e-6
-"""Confidence of the intervals by which plans are left out."""
-
-LIKELIER = 0.01
-"""Least possible gain in the complying share for a plan to be flown further, where too few cases comply with each."""
+CERTAIN, LIKELIER = 1.0 - 1e-6, 0.01
+"""Confidence of the intervals by which plans are left out; least possible gain in the complying share for a plan to be
+flown further, where too few cases comply with each."""
 
 AS_GOOD = 1.05
 """Without a requirement: candidates within this factor of the least angle count as equal, so far apart may be luck."""
@@ -98,16 +94,14 @@ def equal_from(share: float, samples: int) -> float:
 class PlanCandidate:
     """Plan and its dispersed ``results``.
 
-    ``variant`` says how it differs from what its scheme plans. Of all cases the share that complies lies between
-    ``low`` and ``high``; these are None where nothing is required.
+    ``variant`` says how it differs from what its scheme plans. ``share``: of all cases; None where nothing is required.
     """
 
     plan: Plan
     variant: str
     cases: Cases
     results: Results | None = None
-    low: float | None = field(init=False, default=None)
-    high: float | None = field(init=False, default=None)
+    share: Share | None = field(init=False, default=None)
 
     @property
     def nutation(self) -> float:
@@ -123,13 +117,6 @@ class PlanCandidate:
     def met(self) -> float | None:
         """Complying share; None where nothing is required."""
         return self.cases.complying
-
-    @property
-    def share(self) -> Share | None:
-        """Share of all cases; None where nothing is required."""
-        if self.low is None or self.high is None:
-            return None
-        return Share(self.low, self.high, self.cases.probability)
 
     @property
     def left(self) -> float:
@@ -151,9 +138,9 @@ class PlanCandidate:
 def entered(plan: Plan, variant: str, study: Study, samples: int) -> PlanCandidate:
     """A candidate that has flown the first of ``samples`` cases of a study."""
     results = _run(Results(study, min(STAGES[0], samples)))
-    made = PlanCandidate(plan, variant, cases_of(results, samples), results)
-    _bound(made, samples)
-    return made
+    candidate = PlanCandidate(plan, variant, cases_of(results, samples), results)
+    _bound(candidate, samples)
+    return candidate
 
 
 def _run(results: Results) -> Results:
@@ -233,12 +220,10 @@ def shares_of(plans: Sequence[Plan], flown: Mapping[Plan, PlanCandidate]) -> dic
 
 
 def _bound(candidate: PlanCandidate, samples: int) -> None:
-    if candidate.met is not None:
-        known = candidate.cases.samples >= samples
-        count = round(candidate.met * candidate.cases.samples)
-        candidate.low, candidate.high = (
-            (candidate.met, candidate.met) if known else binomial_interval(count, candidate.cases.samples, CERTAIN)
-        )
+    met, done = candidate.met, candidate.cases.samples
+    if met is not None:
+        bounds = (met, met) if done >= samples else binomial_interval(round(met * done), done, CERTAIN)
+        candidate.share = Share(*bounds, candidate.cases.probability)
 
 
 def _stage(done: int, samples: int) -> int:
@@ -269,14 +254,18 @@ def fly_all(
     those that comply as often as the best but for the sampling error. Those that have a case that cannot be flown
     leave the ``candidates``.
     """
+
+    def promise(candidate: PlanCandidate) -> tuple[bool, bool, float]:
+        may = candidate.share is not None and candidate.share.high >= probability
+        return candidate not in always, not may, candidate.plan.pulses.cost if may else candidate.rank
+
     while candidates:
-        some = [candidate for candidate in always if candidate in candidates] + _hopeful(
-            candidates, samples, probability
-        )
+        some = [candidate for candidate in always if candidate in candidates]
+        some += _hopeful(candidates, samples, probability)
         some = [candidate for candidate in some if candidate.cases.samples < samples]
         if not some:
             return
-        first = min(some, key=lambda candidate: (candidate not in always, *_promise(candidate, probability)))
+        first = min(some, key=promise)
         try:
             _further(first, samples)
         except Infeasible:
@@ -284,24 +273,17 @@ def fly_all(
         watch()
 
 
-def _promise(candidate: PlanCandidate, probability: float) -> tuple[bool, float]:
-    """Sort key of the next candidate to fly."""
-    may = candidate.high is not None and candidate.high >= probability
-    return not may, candidate.plan.pulses.cost if may else candidate.rank
-
-
 def _hopeful(candidates: list[PlanCandidate], samples: int, probability: float) -> list[PlanCandidate]:
     """Candidates that may still be chosen."""
-    if any(candidate.low is None for candidate in candidates):
+    bounds = [(each, each.share.low, each.share.high) for each in candidates if each.share is not None]
+    if len(bounds) < len(candidates):
         return _as_near(candidates, samples, probability)
-    bounds = [(candidate, candidate.low or 0.0, candidate.high or 0.0) for candidate in candidates]
     sure = [candidate.plan.pulses.cost for candidate, low, _ in bounds if low >= probability]
     if sure:
         comparable = len({candidate.plan.pulses.propellant is None for candidate in candidates}) == 1
         most = min(sure) * (1.0 + SAME_COST) if comparable else math.inf
-        return [
-            candidate for candidate, _, high in bounds if high >= probability and candidate.plan.pulses.cost <= most
-        ]
+        may = [candidate for candidate, _, high in bounds if high >= probability]
+        return [candidate for candidate in may if candidate.plan.pulses.cost <= most]
     least = min(probability, equal_from(max((low for _, low, _ in bounds), default=0.0), samples))
     return [candidate for candidate, _, high in bounds if high >= least]
 
@@ -311,41 +293,33 @@ def _as_near(candidates: list[PlanCandidate], samples: int, probability: float) 
     ranks = [candidate.rank for candidate in candidates if candidate.cases.samples >= samples]
     if not ranks:
         return candidates
-    most = AS_GOOD * min(ranks)
-    return [candidate for candidate in candidates if _share_within(candidate, most) >= probability]
 
+    def largest_share(candidate: PlanCandidate) -> float:
+        """Of all cases, that may leave that little."""
+        body, results = candidate.plan.spacecraft, candidate.results
+        if results is None or results.values is None:
+            return 1.0
+        parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, requirements.aim(body)]
+        rows = results.values[[OUTPUTS.index(part.value) for part in parts], : results.done]
+        count = min(int(np.count_nonzero(row <= AS_GOOD * min(ranks))) for row in rows)
+        return binomial_interval(count, results.done, CERTAIN)[1]
 
-def _share_within(candidate: PlanCandidate, most: float) -> float:
-    """Largest share of all cases that may leave at most ``most`` rad."""
-    body = candidate.plan.spacecraft
-    if candidate.results is None or candidate.results.values is None:
-        return 1.0
-    parts = [Part.NUTATION] if body.goal.axis is None else [Part.NUTATION, requirements.aim(body)]
-    rows = candidate.results.values[[OUTPUTS.index(part.value) for part in parts], : candidate.results.done]
-    count = min(int(np.count_nonzero(row <= most)) for row in rows)
-    return binomial_interval(count, candidate.results.done, CERTAIN)[1]
+    return [candidate for candidate in candidates if largest_share(candidate) >= probability]
 
 
 FRESH = 211
 """Seed of cases that nothing was chosen by."""
 
-SHORTEST = 0.8
-"""Least share of on-times when they are shortened: together, and then each alone once more."""
-
-HALVINGS, FINER = 7, 5
-"""Steps in which all on-times are shortened together, and then each alone."""
-
-FEW = 8
-"""Pulses up to which each is shortened alone."""
+SHORTEST, HALVINGS, FINER, FEW = 0.8, 7, 5, 8
+"""Least share of on-times when they are shortened; steps in which all are shortened together, and then each alone once
+more; pulses up to which that is done."""
 
 PASSES, NEARLY = 3, 2.0
 """Times that on-times are shortened, and standard deviations of complying cases to spare up to which once will do."""
 
-WORST, THIN = 20.0, 8
-"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands."""
-
-SMALL = 0.02
-"""Share of on-times of difference quotients."""
+WORST, THIN, SMALL = 20.0, 8, 0.02
+"""How many times the cases that may fail are all predicted, and for how many cases one of the others stands; share of
+on-times of difference quotients."""
 
 TRIMS, RESERVE = 4, 0.2
 """Plans that are flown in each pass, and the standard deviations by which fewer cases than may are predicted to fail.
@@ -386,21 +360,15 @@ def trimmed(plan: Plan, complies: Callable[[Plan], bool]) -> Plan:
     fixed = plan.spacecraft.limits.tick is not None or bool(plan.pulses.blocks) or not len(plan.pulses)
     if fixed or any(pulse.channel not in channels or pulse.on_time == 0.0 for pulse in plan.pulses):
         return plan
-    everywhere = list(range(len(plan.pulses)))
-    best = _shortened(plan, everywhere, HALVINGS, complies)
-    for index in everywhere if len(everywhere) <= FEW else ():
-        best = _shortened(best, [index], FINER, complies)
-    return best
-
-
-def _shortened(plan: Plan, which: list[int], halvings: int, complies: Callable[[Plan], bool]) -> Plan:
-    """Pulses with the indices ``which`` shortened alike, by bisection."""
-    low, high, best = SHORTEST, 1.0, plan
-    for _ in range(halvings):
-        middle = 0.5 * (low + high)
-        ratios = [middle if index in which else 1.0 for index in range(len(plan.pulses))]
-        shorter = _scaled(plan, ratios, complies)
-        best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
+    every = range(len(plan.pulses))
+    alone = [((index,), FINER) for index in every] if len(every) <= FEW else []
+    best = plan
+    for which, halvings in ((every, HALVINGS), *alone):
+        low, high, long = SHORTEST, 1.0, best
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            shorter = _scaled(long, [middle if index in which else 1.0 for index in every], complies)
+            best, low, high = (best, middle, high) if shorter is None else (shorter, low, middle)
     return best
 
 
@@ -457,9 +425,8 @@ class FlownPlan:
     @cached_property
     def failing(self) -> list[int]:
         """Number of cases of each draw that fail."""
-        return [
-            round((1.0 - met) * self.candidate.cases.samples) for met in (self.candidate.met or 0.0, self.fresh.met)
-        ]
+        shares, samples = (self.candidate.met or 0.0, self.fresh.met), self.candidate.cases.samples
+        return [round((1.0 - met) * samples) for met in shares]
 
     @cached_property
     def _slopes(self) -> list[tuple[Vector, Vector, NDArray[np.int_]]]:
@@ -469,7 +436,11 @@ class FlownPlan:
         in the closed form, of which the nutation is exact too; it errs by what it takes wide pulses for, nearly alike
         in all cases.
         """
-        heads = np.array([_heading(self.plan.spacecraft, schedule) for schedule in self._schedules])
+        body = self.plan.spacecraft
+        # Directions of H at the end of nominal flights, in body axes at t = 0.
+        flights, back = (propagation.flown(body, each) for each in self._schedules), body.initial.quaternion
+        momenta = [attitude.rotate(attitude.conjugate(back), flight.last_momentum) for flight in flights]
+        heads = np.array([momentum / np.linalg.norm(momentum) for momentum in momenta])
         wide = np.tile((heads[0] - heads[1:]) / SMALL, 2)[:, :, None] - self._nominal[1][:, 2:8]
         slopes = []
         for flown in (self.candidate.results, self.fresh.results):
@@ -533,12 +504,6 @@ def _ends(body: Spacecraft, schedule: Schedule, draws: Draws) -> Vector:
     ends = np.empty((ROWS, number_of(cases)))
     vectors(model, ClosedForm(model)(cases), ends)
     return ends
-
-
-def _heading(body: Spacecraft, schedule: Schedule) -> Vector:
-    """Direction (3,) of H at the end of the nominal flight, in body axes at t = 0."""
-    axis = attitude.rotate(attitude.conjugate(body.initial.quaternion), propagation.flown(body, schedule).last_momentum)
-    return np.asarray(axis / np.linalg.norm(axis))
 
 
 def shortest(chosen: PlanCandidate, fresh: Fresh) -> FlownPlan:

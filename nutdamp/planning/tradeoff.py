@@ -33,19 +33,11 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Bounds
 
-SCHEME = "optimal"
-
 ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
 """Subjects of the equations."""
 
-SAME = 1e-9
-"""Relative difference up to which a bound is that of the plan."""
-
-LOOKS = 32
-"""Moments of the primer curve in a turn of the faster of its two parts."""
-
-MOST_LOOKS = 6_000
-"""Moments of the whole curve."""
+LOOKS, MOST_LOOKS = 32, 6_000
+"""Moments of the primer curve in a turn of the faster of its two parts, and of all of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +52,6 @@ class Certificate:
     program: Program
     burns: tuple[Burn, ...]
     proof: Proof
-
-    @property
-    def bound(self) -> float:
-        """Proved lower bound of the cost."""
-        return self.proof.bound
 
     @property
     def rows(self) -> list[str]:
@@ -108,11 +95,11 @@ class Certificate:
 def certificate(plan: Plan) -> Certificate:
     """Certificate of a plan of optimal; raises BadRequest where there is none, with the reason."""
     known = plan.pulses.bounds
-    if plan.scheme != SCHEME:
-        raise BadRequest(f"a certificate is of a plan of {SCHEME}, not of {plan.scheme}")
+    if plan.scheme != OPTIMAL.name:
+        raise BadRequest(f"a certificate is of a plan of {OPTIMAL.name}, not of {plan.scheme}")
     if not plan.feasible or known is None or known.first_order is None:
-        raise BadRequest(f"{SCHEME} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
-    chosen = planner.options_of(catalogue.SCHEMES[SCHEME], plan.options)
+        raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {plan.refusal or 'there is no such plan'}")
+    chosen = planner.options_of(catalogue.SCHEMES[OPTIMAL.name], plan.options)
     body = planning.known(plan.spacecraft, chosen)
     if body.thrust_laws:
         chosen, body = valve_commands.options(body, chosen), valve_commands.plain(body)
@@ -123,9 +110,9 @@ def certificate(plan: Plan) -> Certificate:
         program = problem.program()
         solution = program.solve()
     except Infeasible as reason:
-        raise BadRequest(f"{SCHEME} has no least cost to prove here: {reason}") from None
+        raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {reason}") from None
     proof = bounds.first_order(program, solution.prices)
-    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(known.first_order):
+    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > 1e-9 * abs(known.first_order):
         raise BadRequest("the plan is put together from several programs, and none of them proves what all of it costs")
     return Certificate(plan, problem, program, solution.burns, proof)
 
@@ -166,11 +153,8 @@ class Front:
         """First-order lower bound for a ``point``; no more than those of points that have less time."""
         first, within = point.bounds.first_order, point.bounds.within
         known = [point.bounds for point in self.points if point.bounds.within <= within]
-        return (
-            None
-            if first is None
-            else min([first, *(bounds.first_order for bounds in known if bounds.first_order is not None)])
-        )
+        known_orders = (bounds.first_order for bounds in known if bounds.first_order is not None)
+        return None if first is None else min(first, *known_orders, math.inf)
 
 
 def fronts(
@@ -191,46 +175,57 @@ def fronts(
     if options.least == "impulse":
         # The search for the fastest saves time, and counts in kg whatever it can: one unit for all points.
         spacecraft = replace(spacecraft, channels=tuple(channel.of(isp=None) for channel in spacecraft.channels))
-    ordered = sorted(set(shifts))
+    ordered, done = sorted(set(shifts)), 0
     entries: list[tuple[float, Plan, float]] = []
     why: dict[float, str] = {}
+
+    def search(body: Spacecraft, chosen: OptimalOptions) -> Plan:
+        # The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may;
+        # of what they leave, all searches to come have equal shares.
+        nonlocal done
+        share = 1 if chosen.least == "time" else count * len(ordered) - done
+        with work.budget("a point", (spent.most - spent.done) / share):
+            planned = plan(body, OPTIMAL.name, chosen)
+        done += 1
+        progress(done)
+        return planned
+
     with work.budget("the fronts", work.FRONTS) as spent:
-        searches = _Searches(count * len(ordered), spent, progress)
         for number, shift in enumerate(ordered, start=1):
-            searched = _searched(spacecraft, _allowing(options, shift), count, searches)
+            anywhere = math.isinf(shift)
+            allowing = replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
+            searched = _searched(spacecraft, allowing, count, search)
             if isinstance(searched, str):
                 why[shift] = searched
             else:
                 entries += [(shift, *entry) for entry in searched]
-            searches.done = count * number
+            done = count * number
     others = _others(spacecraft, options) if why else []
     unit = "N m s" if options.least == "impulse" else _unit([*(plan for _, plan, _ in entries), *others])
-    result: list[Front] = []
     made_for = [(kept, Point(plan, horizon, unit)) for kept, plan, horizon in entries]
-    for shift in ordered:
-        own = [point for kept, point in made_for if kept <= shift]
-        others_too = [
-            point
-            for kept, point in made_for
-            if kept > shift and (_keeps(point.plan, shift) or any(_serves(point, rival) for rival in own))
+    return tuple(_fronts(ordered, made_for, [Point(plan, spacecraft.horizon, unit) for plan in others], why))
+
+
+def _fronts(
+    shifts: Sequence[float], made_for: Sequence[tuple[float, Point]], others: Sequence[Point], why: dict[float, str]
+) -> Iterator[Front]:
+    """Fronts of the ``shifts``, the strictest first, of points ``made_for`` one of them; of the ``others`` without."""
+    kept: tuple[Point, ...] = ()
+    for shift in shifts:
+        own = [point for asked, point in made_for if asked <= shift]
+        looser = [point for asked, point in made_for if asked > shift]
+        points = own + [
+            point for point in looser if _keeps(point.plan, shift) or any(_serves(point, rival) for rival in own)
         ]
-        points = [*own, *others_too]
-        if not points:
-            points = [Point(plan, spacecraft.horizon, unit) for plan in others if _keeps(plan, shift)]
-        kept = undominated(points, result[-1].points if result else ())
-        result.append(Front(shift, kept, why.get(shift) if _by_others(kept) else None))
-    return tuple(result)
+        kept = undominated(points or [point for point in others if _keeps(point.plan, shift)], kept)
+        by_others = all(point.plan.scheme != OPTIMAL.name for point in kept)
+        yield Front(shift, kept, why.get(shift) if by_others else None)
 
 
 def _unit(plans: Sequence[Plan]) -> str:
     """Unit in which all costs and bounds are known."""
     bounds = [plan.pulses.bounds for plan in plans if plan.pulses.bounds is not None]
     return "kg" if by_propellant(plans) and all(bound.unit == "kg" for bound in bounds) else "N m s"
-
-
-def _by_others(points: Sequence[Point]) -> bool:
-    """True if no point is of the scheme optimal."""
-    return all(point.plan.scheme != OPTIMAL.name for point in points)
 
 
 def _keeps(plan: Plan, shift: float) -> bool:
@@ -253,45 +248,18 @@ def _others(spacecraft: Spacecraft, options: OptimalOptions) -> list[Plan]:
     return [plan for plan in plans if len(plan.pulses) and {bound.part for bound in plan.shortfalls} <= ends]
 
 
-@dataclass(eq=False)
-class _Searches:
-    """Searches of all fronts, within their ``budget``.
-
-    The schedules of the whole horizon and the fastest, between which the others lie, may cost what a scheme may; of
-    what they leave, all searches to come have equal shares.
-    """
-
-    count: int
-    budget: work.WorkBudget
-    progress: Callable[[int], None]
-    done: int = 0
-
-    def __call__(self, spacecraft: Spacecraft, options: OptimalOptions) -> Plan:
-        left = self.budget.most - self.budget.done
-        with work.budget("a point", left if options.least == "time" else left / (self.count - self.done)):
-            planned = plan(spacecraft, OPTIMAL.name, options)
-        self.done += 1
-        self.progress(self.done)
-        return planned
-
-
-def _allowing(options: OptimalOptions, shift: float) -> OptimalOptions:
-    anywhere = math.isinf(shift)
-    return replace(options, free_axis=anywhere, shift=None if anywhere or shift == 0.0 else shift)
-
-
 def _searched(
-    spacecraft: Spacecraft, options: OptimalOptions, count: int, searches: _Searches
+    spacecraft: Spacecraft, options: OptimalOptions, count: int, search: Callable[[Spacecraft, OptimalOptions], Plan]
 ) -> list[tuple[Plan, float]] | str:
     """Schedules of the whole horizon, the fastest, and of horizons between, evenly by their ratios.
 
     Each with its horizon, s; or why there is none.
     """
-    whole = searches(spacecraft, options)
+    whole = search(spacecraft, options)
     if whole.schedule is None or whole.schedule.bounds is None:
         return infeasibility(whole) or "there is nothing to do"
     entries = [(whole, spacecraft.horizon)]
-    fastest = searches(spacecraft, replace(options, least="time")) if count > 1 else whole
+    fastest = search(spacecraft, replace(options, least="time")) if count > 1 else whole
     if fastest.schedule is None or not len(fastest.schedule):
         return entries
     entries.append((fastest, spacecraft.horizon))
@@ -299,7 +267,7 @@ def _searched(
     for share in np.linspace(0.0, 1.0, count)[1:-1]:
         horizon = begin + (end - begin) * ((last - begin) / (end - begin)) ** float(share)
         body = replace(spacecraft, limits=replace(spacecraft.limits, horizon=horizon))
-        planned = searches(body, options)
+        planned = search(body, options)
         if planned.schedule is not None and planned.schedule.bounds is not None:
             entries.append((planned, horizon))
     return entries

@@ -21,8 +21,7 @@ from nutdamp.flight.end_state import Aspect
 from nutdamp.flight.propagation import Flight, Residual
 from nutdamp.planning.decision import Comparison, Decision, Line, decide, infeasibility, strays
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Share
+from nutdamp.planning.plan import Plan, Share
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector

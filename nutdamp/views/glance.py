@@ -438,12 +438,12 @@ def ends(decision: Decision) -> Table:
     if formula is not None and (by_impulses := short_angle(formula.nutation, least)) not in angles[0].split():
         angles[0] += f" (17: {by_impulses})"
     rows = [("after pulses, deg", "  ".join(angles))]
-    first, second = angle_texts(body, decision.final.axis)
+    first, second = angle_texts(body, decision.flight.final.axis)
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     turned = f"turned by {short_angle(left.momentum_shift, turn)} deg"
     turned = turned if body.goal.axis is None else f"{short_angle(left.axis_error, turn)} deg off target"
-    spun = abs(decision.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
-    spin = f"; spin {decision.final.spin * RPM:.5g} rpm" * spun
+    spun = abs(decision.flight.final.spin - body.spin) > requirements.SPIN_TOLERANCE * abs(body.spin)
+    spin = f"; spin {decision.flight.final.spin * RPM:.5g} rpm" * spun
     rows.append(("axis", f"{names[0]} {first}, {names[1]} {second}; H {turned}{spin}"))
     if len(plan.pulses) and lasting(decision.flight):
         rows.append(("", lasting(decision.flight)))

@@ -12,8 +12,7 @@ from support.random_bodies import power, random_spacecraft
 
 from nutdamp.planning.decision import Comparison, compare, usual
 from nutdamp.planning.notes import comparison_warnings
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Standing
+from nutdamp.planning.plan import Plan, Standing
 from nutdamp.schemes.catalogue import Options
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part

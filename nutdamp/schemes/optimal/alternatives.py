@@ -1,9 +1,8 @@
 """Schedules beside those of the linear program: simple spin changes, other ends, other schemes as starts.
 
 And firing almost without a pause, one channel after another: the earliest end, and the least cost in a short horizon.
-The program of `linear_program` lets channels fire at once. Here they share each slot of time: what one channel after
-another can supply is the convex hull of what each can, so that within a horizon the program has a solution where, to
-first order, there is a schedule. Its slots become burns without gaps, whose lengths are then found on the true motion.
+Channels share each slot of time: what one after another can supply is the convex hull of what each can. The slots
+become burns without gaps, whose lengths are then found on the true motion.
 """
 
 from __future__ import annotations
@@ -36,14 +35,9 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-STARTS = 8
-"""Starts in a nutation period that are tried of a channel that has a transverse torque, too."""
-
-CORRECTED = 4
-"""Flights by which the length is corrected."""
-
-MOST_PULSES = 200
-"""Pulses at most."""
+STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
+"""Starts in a nutation period that are tried of a channel that has a transverse torque, too; flights by which the
+length is corrected; pulses at most."""
 
 
 def spin_changes(spacecraft: Spacecraft, fly: Callable[[Schedule], Flight]) -> Iterator[Schedule]:
@@ -96,51 +90,16 @@ def _schedule(
     return schedule if all(bound.met for bound in held) and keeps_limits(spacecraft, schedule) else None
 
 
-CLEARLY = 0.8
-"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for."""
+CLEARLY, ABOUT = 0.8, 0.002
+"""Share of the end at which small angles must allow the same cost, for an earlier end to be looked for, and the share
+by which it may be more: it is not that of the true motion."""
 
-ABOUT = 0.002
-"""Share by which their cost may be more: it is not that of the true motion."""
+BISECTIONS, ROUNDS, PARTS = 3, 3, (0.2, 0.4, 0.6)
+"""Steps in which the earliest end is found that they allow; earlier ends looked for one after the other; horizons that
+are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
 
-BISECTIONS = 3
-"""Steps in which the earliest end is found that they allow."""
-
-ROUNDS = 3
-"""Earlier ends that are looked for one after the other."""
-
-PARTS = (0.2, 0.4, 0.6)
-"""Horizons that are tried in turn, as parts of the way from the earliest end that they allow to the end there is."""
-
-EARLIER = 300.0
-"""Units of `work` after which no other one is looked for."""
-
-MOST_ENDS = 900.0
-"""Units that may be spent on all of them."""
-
-ELSEWHERE = (0.85, 0.7, 0.55, 0.4)
-"""Shares of the horizon that are tried in turn where a schedule is dear or was not found."""
-
-MOST_ELSEWHERE = 1500.0
-"""Units that may be spent on them."""
-
-
-def elsewhere(
-    problem: Problem, best: Schedule | None, first: Solution, cheapest: Callable[[float], Schedule | None]
-) -> Schedule | None:
-    """The ``best``; where there is none, or a dear one, the cheapest with shorter horizons.
-
-    ``first`` and ``cheapest`` as in `hastened`.
-    """
-    if first.unmet > UNMET:
-        return best
-    begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    with work.budget("other ends", MOST_ELSEWHERE):
-        for share in ELSEWHERE:
-            sooner = begin + share * (horizon - begin)
-            if work.exhausted() or not problem.dear(best, first.cost) or not problem.feasible(sooner):
-                break
-            best = problem.cheaper(best, cheapest(sooner))
-    return best
+EARLIER, MOST_ENDS = 300.0, 900.0
+"""Units of `work` after which no other one is looked for, and that may be spent on all of them."""
 
 
 def hastened(
@@ -179,10 +138,7 @@ def hastened(
 
 
 def _least_share(problem: Problem, span: float, most: float) -> float | None:
-    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`.
-
-    Nor may it cost them more than `ABOUT` over what they cost in all of the span.
-    """
+    """The least share of the ``span`` s that small angles allow at a cost of ``most``; None for one above `CLEARLY`."""
 
     def cost(share: float) -> float:
         horizon = problem.spacecraft.limits.earliest + share * span
@@ -190,6 +146,7 @@ def _least_share(problem: Problem, span: float, most: float) -> float | None:
         return solution.cost if solution.unmet <= UNMET else math.inf
 
     clearly = cost(CLEARLY)
+    # Nor may it cost them more than `ABOUT` over what they cost in all of the span.
     if clearly > most or clearly > (most := min(most, cost(1.0) * (1.0 + ABOUT))):
         return None
     low, high = 0.0, CLEARLY
@@ -197,10 +154,6 @@ def _least_share(problem: Problem, span: float, most: float) -> float | None:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if cost(middle) <= most else (middle, high)
     return high
-
-
-CONES = (12, 6, 3)
-"""Half cones in a row that are tried beside the number that the scheme takes."""
 
 
 def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedule]:
@@ -221,7 +174,7 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         plans.append(partial(two_pulse.schedule, body, TwoPulseOptions()))
         if body.spin != 0.0:
             plans.append(partial(rhumb_line.schedule, body, RhumbLineOptions()))
-        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, *CONES)]
+        plans += [partial(half_cone.schedule, body, HalfConeOptions(cones=cones)) for cones in (None, 12, 6, 3)]
     for plan in plans:
         if work.exhausted():
             return
@@ -236,26 +189,14 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
 SLOTS, MOST_SLOTS = 40, 320
 """Slots in the faster of the two turns, at ω3 and at aω3, and in all."""
 
-LINES = 4
-"""Programs one after the other, each about the flight of the one before: at large angles small ones mislead."""
-
-NEWTON_STEPS = 25
-"""Newton steps for the lengths of the burns."""
-
-CONVERGED = 1e-12
-"""Largest end error, over |H|."""
+NEWTON_STEPS, CONVERGED = 25, 1e-12
+"""Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
 
 SHORTEST = 0.02
 """Share of a slot below which a burn is left out before the lengths are found."""
 
-HALVINGS = 10
-"""Steps in which the earliest end is found, from what small angles allow."""
-
-LONGER = (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
-"""Shares added to the earliest end by small angles, tried in turn."""
-
-PROGRAM = 4.0
-"""Units of work of a program."""
+HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
+"""Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""
 
 
 class Piece(NamedTuple):
@@ -265,25 +206,18 @@ class Piece(NamedTuple):
     time: float
 
 
-def possible(problem: Problem) -> bool:
-    """True where burns may follow each other without a gap, begin at any time and be of any number."""
-    limits = problem.spacecraft.limits
-    return limits.gap == 0.0 and limits.tick is None and limits.max_pulses is None and bool(problem.channels)
-
-
 def earliest(problem: Problem) -> Schedule | None:
     """The schedule of one channel after another that ends first, as far as it is found; None where there is none."""
-    if not possible(problem):
-        return None
     begin, horizon = problem.spacecraft.limits.earliest, problem.spacecraft.horizon
-    if _pieces(problem, _small_angles(problem), horizon) is None:
+    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    if _pieces(problem, influence, horizon) is None:
         return None
     low, high = begin, horizon
     for _ in range(HALVINGS):
         if work.exhausted():
             return None
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _pieces(problem, _small_angles(problem), middle) else (middle, high)
+        low, high = (low, middle) if _pieces(problem, influence, middle) else (middle, high)
     for share in LONGER:
         end = min(high + share * (high - begin), horizon)
         schedule = within(problem, end)
@@ -294,10 +228,8 @@ def earliest(problem: Problem) -> Schedule | None:
 
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
-    if not possible(problem):
-        return None
-    influence = _small_angles(problem)
-    for _ in range(LINES):
+    influence = refinement.small_angles(problem.spacecraft, problem.equations)
+    for _ in range(4):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None
@@ -306,19 +238,12 @@ def within(problem: Problem, horizon: float) -> Schedule | None:
             flown = problem.flown(schedule)
         except Infeasible:
             return None
-        if (
-            problem.left(flown) <= LEFT
-            and schedule.end <= horizon
-            and keeps_limits(problem.spacecraft, schedule.pulses)
-        ):
+        in_time = problem.left(flown) <= LEFT and schedule.end <= horizon
+        if in_time and keeps_limits(problem.spacecraft, schedule.pulses):
             return schedule
         first = _burns(problem, pieces, np.array([piece.time for piece in pieces]))
         influence = refinement.along(problem.flown(first), problem.equations, _slot(problem))
     return None
-
-
-def _small_angles(problem: Problem) -> Influence:
-    return refinement.small_angles(problem.spacecraft, problem.equations)
 
 
 def _slot(problem: Problem) -> float:
@@ -328,15 +253,17 @@ def _slot(problem: Problem) -> float:
 
 def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piece] | None:
     """The cheapest firing of one channel after another in time order; None where none is worth one, to first order."""
-    body, channels = problem.spacecraft, problem.channels
-    begin = body.limits.earliest
+    body, channels, limits = problem.spacecraft, problem.channels, problem.spacecraft.limits
+    if limits.gap > 0.0 or limits.tick is not None or limits.max_pulses is not None or not channels:
+        return None  # burns may not follow each other without a gap, begin at any time and be of any number
+    begin = limits.earliest
     count = min(max(math.ceil((horizon - begin) / _slot(problem)), 2 * SLOTS // 3), MOST_SLOTS)
     edges = np.linspace(begin, horizon, count + 1)
     free = np.flatnonzero(~Windows(body).blocked(edges[:-1], edges[1:]))
     width = float(edges[1] - edges[0])
     if not len(free):
         return None
-    work.spend(PROGRAM)
+    work.spend(4.0)
     centres = 0.5 * (edges[1:] + edges[:-1])[free]
     lost = influence.widths(np.array([width]))[0]
     torques = np.array([channel.torque for channel in channels])
@@ -362,11 +289,11 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
 def _in_order(channels: tuple[Channel, ...], edges: Vector, free: NDArray[np.intp], times: Vector) -> list[Piece]:
     """Burns from ``times`` (channels, slots) s: in each slot first what fired before, last what fires on after it."""
     width = float(edges[1] - edges[0])
-    pieces, place = list[Piece](), {int(slot): number for number, slot in enumerate(free)}
-    before: Channel | None = None
+    pieces, before = list[Piece](), None
+    every = np.zeros((len(channels), len(edges)))  # and one slot more, in which nothing fires
+    every[:, free] = times
     for slot in range(len(edges) - 1):
-        mine = times[:, place[slot]] if slot in place else np.zeros(len(channels))
-        following = times[:, place[slot + 1]] if slot + 1 in place else np.zeros(len(channels))
+        mine, following = every[:, slot], every[:, slot + 1]
         firing = [number for number in range(len(channels)) if mine[number] > SHORTEST * width]
         firing.sort(key=lambda number: (channels[number] is not before, following[number] > 0.0))
         for number in firing:

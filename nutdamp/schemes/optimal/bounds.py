@@ -1,34 +1,27 @@
 """Lower bounds of the cost of a schedule, by duality and by the length of the way.
 
 The rigorous ones hold at any angle for a symmetric body left alone: no dissipation, no disturbances. They concern
-schedules that leave no more than `Allowed`, and none of them knows of gaps, ticks and on-times, which can only raise
-the cost.
+schedules that leave no more than `Allowed`, and know of no gaps, ticks and on-times, which can only raise the cost.
 
 *Nutation.* w = A ω e^{iφ} with φ = a ∫ω3 dt obeys dw/dt = M e^{iφ}, at any angle. Let y be complex with
-Re(y* m e^{iφ}) ≤ c for the torque m and the cost c per second of every channel, and for every phase φ at which it may
-be on. Then the cost Σ ∫ c dt of a schedule is at least Re(y* (w(end) - w(0))) ≥ -Re(y* A ω0) - |y| A |ω(end)|. The best
-such y is the optimum of the dual of a linear program; each is a bound.
-
-*Axial torque* changes ω3, and so the phases: by no more than what a schedule of a given cost can give to the spin.
-Schedules that cost more need no bound.
-
-*Spin.* A final spin costs impulse too: with M3 in place of one component, and |m| in place of the other.
-
-*First order.* The same for the program of small angles, with all its equations: see `SmallAngles`.
+Re(y* m e^{iφ}) ≤ c for the torque m and the cost c per second of every channel, and every phase φ at which it may be
+on. Then Σ ∫ c dt ≥ Re(y* (w(end) - w(0))) ≥ -Re(y* A ω0) - |y| A |ω(end)|. Axial torque changes ω3, and so the phases,
+by no more than what a schedule of a given cost can give to the spin. A final *spin* costs impulse too: with M3 in place
+of one component, and |m| in place of the other.
 
 *Turn.* Where ω3 stays, H·e3 = Cω3, so H never comes nearer to the origin than r = C|ω3|. From |H0| = r/cos θ0 the
 shortest way round that sphere to the direction of the target is the tangent, r tan θ0, and an arc of the sphere.
 
-*Primer.* q is the worth of a second of a channel by prices y, over its cost. By weak duality prices prove that no
-schedule costs less than their worth at the goal, once q ≤ 1 everywhere. Prices that are too high somewhere are lowered
-for channels that act within a moment; for those that have to be on for long, the gain of each stretch is taken off:
-∫ max(0, q - 1) c dt. Between the times looked at, q is known by its curvature.
+*First order*, the primer: q is the worth of a second of a channel by prices y, over its cost, in the program of small
+angles. By weak duality no schedule costs less than their worth at the goal, once q ≤ 1 everywhere. Prices that are too
+high somewhere are lowered for channels that act within a moment; for those that have to be on for long, the gain of
+each stretch is taken off: ∫ max(0, q - 1) c dt. Between the times looked at, q is known by its curvature.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -40,29 +33,17 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING
 
-QUARTERINGS = 9
-"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot."""
-
-PARTS = 4
-"""Parts of a slot in which the gain of a channel that is on for long is summed."""
+QUARTERINGS, PARTS = 9, 4
+"""Subdivisions into quarters of the span between two times: to a 1e-5 of a slot; parts of a slot in which the gain of a
+channel that is on for long is summed."""
 
 LOWERINGS = (1.0, 1.0003, 1.0005, 1.001, 1.0016)
 """Factors by which prices are lowered for channels that are on for long. Solved with slots, they are up to w²/8 + w²/24
 too high in the middle of a slot of w rad, which adds up over very many alignments; each factor gives a bound."""
 
-ENOUGH = 1e-10
-"""Relative height of a price that is not worth a closer look."""
-
-ROUNDING = 1e-12
-"""Share by which gains are lowered and prices raised, so that no bound is too high by the rounding of sums."""
-
-
-class Lowered(NamedTuple):
-    """The best ``bound`` by prices over a ``factor``; ``gained``: gain of channels on for long by them."""
-
-    bound: float
-    factor: float
-    gained: float
+ENOUGH, ROUNDING = 1e-10, 1e-12
+"""Relative height of a price that is not worth a closer look, and share by which gains are lowered and prices raised,
+so that no bound is too high by the rounding of sums."""
 
 
 class SmallAngles:
@@ -75,7 +56,11 @@ class SmallAngles:
     def __init__(self, program: Program, prices: Vector) -> None:
         self.program, self.prices, self.costs = program, prices, program.costs
         self.torques = np.array([channel.torque for channel in program.channels])
-        self.begins, self.lengths = stretches(program, slackened(free_windows(program.spacecraft, program.end)))
+        windows = free_windows(program.spacecraft, program.end)
+        spans = [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
+        edges = [np.linspace(*span, max(math.ceil((span[1] - span[0]) / program.width), 1) + 1) for span in spans]
+        self.begins = np.concatenate([part[:-1] for part in edges])
+        self.lengths = np.concatenate([np.diff(part) for part in edges])
         # Second derivative, at most: each pair of equations turns at its rate, and grows or decays slowly.
         rates = program.influence.turning
         bend = sum(
@@ -96,38 +81,12 @@ class SmallAngles:
         return np.asarray(worth / self.costs)
 
 
-def stretches(program: Program, spans: Sequence[tuple[float, float]]) -> tuple[Vector, Vector]:
-    """Begins and lengths, s, of stretches no longer than a slot into which ``spans`` (begin, end) s are cut."""
-    edges = [
-        np.linspace(begins, ends, max(math.ceil((ends - begins) / program.width), 1) + 1) for begins, ends in spans
-    ]
-    return np.concatenate([part[:-1] for part in edges]), np.concatenate([np.diff(part) for part in edges])
-
-
-def slackened(windows: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The windows, widened by the tolerance for rounding."""
-    return [(begin - TOUCHING, end + TOUCHING) for begin, end in windows]
-
-
-def lowered(curve: SmallAngles, strong: NDArray[np.bool_], goal: float) -> Lowered | None:
-    """Bound proved by prices worth ``goal``; None where they prove nothing. ``strong``: act within a moment."""
-    highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
-    if highest <= 0.0:
-        return None
-    candidates = []
-    for factor in map(float, highest * np.array([1.0] if strong.all() else LOWERINGS)):
-        gained = _lasting(curve, ~strong, factor)
-        candidates.append(Lowered((goal / factor - gained) * (1.0 - ROUNDING), factor, gained))
-    best = max(candidates, key=lambda candidate: candidate.bound)
-    return best if best.bound > 0.0 else None
-
-
 def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
     """The highest q of ``which`` channels at any time; a little more where that is not exact."""
     which_ones = np.flatnonzero(which)
     if not len(which_ones):
         return 0.0
-    before, after = (part[:, which] for part in _ends(curve, curve.begins, curve.lengths))
+    before, after = (curve.at(times)[:, which] for times in (curve.begins, curve.begins + curve.lengths))
     tops = _top(before, after, curve.bends[which_ones], curve.lengths[:, None])
     best = float(max(before.max(), after.max()))
     slot, index = np.nonzero(tops > best + ENOUGH * abs(best))
@@ -139,17 +98,12 @@ def _highest(curve: SmallAngles, which: NDArray[np.bool_]) -> float:
         lengths, channel = np.repeat(0.25 * lengths, 4), np.repeat(channel, 4)
         begins = np.repeat(begins, 4) + lengths * np.tile(np.arange(4), len(begins))
         every = np.arange(len(begins))
-        before, after = (part[every, channel] for part in _ends(curve, begins, lengths))
+        before, after = (curve.at(times)[every, channel] for times in (begins, begins + lengths))
         highest = _top(before, after, curve.bends[channel], lengths)
         best = max(best, float(before.max()), float(after.max()))
         there = highest > best + ENOUGH * abs(best)
         begins, lengths, channel, highest = begins[there], lengths[there], channel[there], highest[there]
     return max(best + ENOUGH * abs(best), float(highest.max(initial=-math.inf)))
-
-
-def _ends(curve: SmallAngles, begins: Vector, lengths: Vector) -> list[Vector]:
-    """q at both ends of stretches, (n, channels) each."""
-    return [curve.at(begins), curve.at(begins + lengths)]
 
 
 def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> float:
@@ -158,12 +112,16 @@ def _lasting(curve: SmallAngles, which: NDArray[np.bool_], factor: float) -> flo
     if not len(which_ones):
         return 0.0
     costs, bends = curve.costs[which_ones], curve.bends[which_ones] / factor
-    ends = [values[:, which_ones] / factor - 1.0 for values in _ends(curve, curve.begins, curve.lengths)]
-    pays = np.flatnonzero((_top(ends[0], ends[1], bends, curve.lengths[:, None]) > 0.0).any(axis=1))
+
+    def gain(times: Vector) -> Vector:
+        return np.asarray(curve.at(times)[:, which_ones] / factor - 1.0)
+
+    before, after = gain(curve.begins), gain(curve.begins + curve.lengths)
+    pays = np.flatnonzero((_top(before, after, bends, curve.lengths[:, None]) > 0.0).any(axis=1))
     begins, lengths = curve.begins[pays], curve.lengths[pays] / PARTS
-    total, before = 0.0, ends[0][pays]
+    total, before = 0.0, before[pays]
     for part in range(PARTS):
-        after = curve.at(begins + (part + 1) * lengths)[:, which_ones] / factor - 1.0
+        after = gain(begins + (part + 1) * lengths)
         mean = curve.mean(begins + (part + 0.5) * lengths, lengths)[:, which_ones] / factor - 1.0
         arch = bends * lengths[:, None] ** 2
         gained = np.where(-_top(-before, -after, bends, lengths[:, None]) >= 0.0, mean, 0.0)
@@ -190,13 +148,8 @@ def _positive_mean(before: Vector, after: Vector) -> Vector:
     return np.asarray(np.where(most <= 0.0, 0.0, np.where(least >= 0.0, 0.5 * (most + least), crossing)))
 
 
-TURN = 2.0 * math.pi
-
-LOOKS = 33
-"""Directions looked at at once where the best is looked for."""
-
-NARROWINGS = 9
-"""Narrowings of the search to a sixteenth: to 1e-11 rad."""
+LOOKS, NARROWINGS = 33, 9
+"""Directions looked at at once, and narrowings of the search to a sixteenth: to 1e-11 rad."""
 
 
 class Allowed(NamedTuple):
@@ -227,7 +180,11 @@ def rigorous(
     if spacecraft.goal.spin is not None:
         lower_bounds.append(_nutation_and_spin(spacecraft, torques, costs, allowed))
     if shift and not axial:
-        lower_bounds.append(_turn(spacecraft, torques, costs, allowed))
+        # The way of H to the direction of the target, round the sphere of radius |H3|.
+        nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
+        way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
+        dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
+        lower_bounds.append(abs(spacecraft.axial) * way / dearest * (1.0 - ROUNDING))
     best = max(lower_bounds)
     return best if math.isfinite(best) else None
 
@@ -235,29 +192,24 @@ def rigorous(
 def _nutation(spacecraft: Spacecraft, channels: list[Channel], costs: Vector, cost: float, allowed: Allowed) -> float:
     """Least cost of taking the nutation out, at the phases at which the channels may be on."""
     inertia, limits = spacecraft.inertia, spacecraft.limits
-    faster = (
-        cost
-        * float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
-        / inertia.C
-    )
+    dearest = float(max(abs(channel.axial) / price for channel, price in zip(channels, costs, strict=True)))
+    faster = cost * dearest / inertia.C
     goal = -inertia.A * complex(spacecraft.omega0[0], spacecraft.omega0[1])
     stays = (abs(spacecraft.axial) + inertia.C * faster) * math.tan(allowed.nutation)
     if abs(goal) <= stays:
         return 0.0
-    low, wide = _arcs(
-        [
-            (min(phases) - wider, max(phases) + wider)
-            for begins, ends in slackened(free_windows(spacecraft))
-            for phases in [(spacecraft.nutation_rate * begins, spacecraft.nutation_rate * ends)]
-            for wider in [abs(inertia.a) * faster * max(ends - limits.earliest, 0.0)]
-        ]
-    )
+    spans = []
+    for begin, end in free_windows(spacecraft):
+        phases = [spacecraft.nutation_rate * edge for edge in (begin - TOUCHING, end + TOUCHING)]
+        wider = abs(inertia.a) * faster * max(end + TOUCHING - limits.earliest, 0.0)
+        spans.append((min(phases) - wider, max(phases) + wider))
+    low, wide = _arcs(spans)
     points = np.array([channel.transverse for channel in channels]) / costs
     strength, angle = np.abs(points), np.angle(points)
 
     def value(directions: Vector) -> Vector:
         # From the begin of each arc to the direction, for each channel: inside, the whole strength is to be had.
-        apart = np.mod(directions[:, None, None] - angle[:, None] - low, TURN)
+        apart = np.mod(directions[:, None, None] - angle[:, None] - low, math.tau)
         beside = np.maximum(np.cos(apart), np.cos(apart - wide))
         reach = (strength * np.where(apart <= wide, 1.0, beside).max(axis=2)).max(axis=1)
         return _ratio(abs(goal) * np.cos(directions - np.angle(goal)) - stays, abs(goal), reach, float(strength.max()))
@@ -287,24 +239,16 @@ def _nutation_and_spin(spacecraft: Spacecraft, torques: Vector, costs: Vector, a
     return _largest(value, float(np.angle(goal)), 0.5 * math.pi)
 
 
-def _turn(spacecraft: Spacecraft, torques: Vector, costs: Vector, allowed: Allowed) -> float:
-    """Least cost of the way of H to the direction of the target, round the sphere of radius |H3|."""
-    nutation, beta = spacecraft.nutation, max(spacecraft.to_turn - allowed.off, 0.0)
-    way = math.tan(nutation) + beta - nutation if beta > nutation else math.sin(beta) / math.cos(nutation)
-    dearest = float((np.hypot(torques[:, 0], torques[:, 1]) / costs).max())
-    return abs(spacecraft.axial) * way / dearest * (1.0 - ROUNDING)
-
-
 def _arcs(spans: list[tuple[float, float]]) -> tuple[Vector, Vector]:
     """Begins in [0, 2π) and lengths, rad, of the arcs that ``spans`` of phases (begin, end) cover, joined."""
     merged: list[list[float]] = []
-    for low, high in sorted((begin % TURN, begin % TURN + end - begin) for begin, end in spans):
+    for low, high in sorted((begin % math.tau, begin % math.tau + end - begin) for begin, end in spans):
         if merged and low <= merged[-1][1]:
             merged[-1][1] = max(merged[-1][1], high)
         else:
             merged.append([low, high])
     begins, ends = np.array(merged).T
-    return begins, np.minimum(ends - begins, TURN)
+    return begins, np.minimum(ends - begins, math.tau)
 
 
 def _ratio(gain: Vector, most: float, reach: Vector, strongest: float) -> Vector:
@@ -342,8 +286,17 @@ def first_order(program: Program, prices: Vector) -> Proof:
 
     Any prices give a bound; the best are those of a solution. The proof's are no higher than what it costs.
     """
+    nothing, strong = Proof(0.0, np.zeros_like(prices)), program.strong
+    if not prices.any():
+        return nothing
     goal = float(prices @ program.influence.goal) - program.off * float(np.linalg.norm(prices[2:4]))
-    best = lowered(SmallAngles(program, prices), program.strong, goal) if prices.any() else None
-    if best is None:
-        return Proof(0.0, np.zeros_like(prices))
-    return Proof(best.bound, prices / best.factor, best.gained)
+    curve = SmallAngles(program, prices)
+    highest = max(_highest(curve, strong), 0.0 if strong.all() else 1.0)
+    if highest <= 0.0:
+        return nothing
+    proofs = []
+    for factor in map(float, highest * np.array([1.0] if strong.all() else LOWERINGS)):
+        gained = _lasting(curve, ~strong, factor)
+        proofs.append(Proof((goal / factor - gained) * (1.0 - ROUNDING), prices / factor, gained))
+    best = max(proofs, key=lambda proof: proof.bound)
+    return best if best.bound > 0.0 else nothing

@@ -8,7 +8,6 @@ program has tangents of the cones, added where its solution breaks them (Kelley 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,35 +21,27 @@ from nutdamp.spacecraft.model import Vector
 
 Complex = NDArray[np.complex128]
 
-KINDS = ("nutation", "shift", "spin")
-"""Limited end errors, see `ChanceLimit`."""
-
 TURNS = 100_000
 """More than there are turns in a horizon: pulses are numbered by channel and turn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertain:
-    """Effects of d dispersed inputs of one sigma, for each of K channels; (2,): of nutation and shift.
+    """Effects of d dispersed inputs of one sigma, for each of K channels; (3,): of nutation, shift and spin.
 
-    ``effect`` (K,) and ``axial`` (K,): torque about the transverse axes (complex) and axis 3, N m, with biases.
-    ``begin`` (2, d) complex N m s: by what each changes what is to be undone; ``rates`` (2, d) rad/s: the two rates.
-    ``torque`` (K, d) complex and ``axial_torque`` (K, d) N m; ``late`` (K, d) s: by how much a pulse comes later.
-    ``own`` (d,): whether each pulse draws it anew. ``spin`` (d,) N m s. ``delay`` (K,) s: bias of the moment. ``less``
-    (d,): by what share each makes angles smaller that are left, as H is longer then.
+    ``effects`` (3, K) N m of the channels, with biases, and ``changes`` (3, K, d) of these, but for those of the
+    ``rates`` (3, d) rad/s at which they turn; ``start`` (3, d) N m s: changes of the end error without firing. Angles
+    that are left are smaller where H is longer. ``own`` (d,): whether each pulse draws it anew. ``delay`` (K,) s: bias
+    of the moment. ``goal`` (3,) N m s: required sum of the firing.
     """
 
-    effect: Complex
-    axial: Vector
-    begin: Complex
+    effects: Complex
+    changes: Complex
     rates: Vector
-    torque: Complex
-    axial_torque: Vector
-    late: Vector
+    start: Complex
     own: NDArray[np.bool_]
-    spin: Vector
     delay: Vector
-    less: Vector
+    goal: Complex
 
 
 class ChanceLimit(NamedTuple):
@@ -63,7 +54,7 @@ class ChanceLimit(NamedTuple):
 class Tangent(NamedTuple):
     """A tangent of a cone: direction ``u``; unit vector ``shared`` (d,) along the inputs and ``own`` (pulses, 1 + d).
 
-    ``own`` begins with the number of the pulse, see `ChanceModel.pulse`.
+    ``own`` begins with the number of the pulse, see `ChanceProgram.pulse`.
     """
 
     limit: ChanceLimit
@@ -86,27 +77,39 @@ class Spread(NamedTuple):
         return np.sqrt(np.maximum(0.5 * (size + (np.conj(directions) ** 2 * double).real), 0.0))
 
 
-class Weights(NamedTuple):
-    """Sum of priced tangents for a channel and a kind: Re(E(t) (``fixed`` + ``rate`` t + ``own`` of the turn)).
+DIRECTIONS, BEGUN = 72, 16
+"""Directions in which the cones of two equations are looked at, and of the first tangents of one, without margin."""
 
-    E is what `ChanceModel.turns` gives; ``own`` (turns,).
-    """
+WORST, ROUNDS = 3, 40
+"""Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
 
-    fixed: complex
-    rate: complex
-    own: Complex
+BEST, PRICE = 200, 1e-6
+"""Columns taken in at a time, and the relative reduced cost below which none enters."""
 
 
-class ChanceModel:
-    """The cones of a ``program`` of small angles; ``goal`` (5,) N m s: required sum of the firing."""
+class Sure(NamedTuple):
+    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
 
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
-        self.program, self.uncertain, self.limits = program, uncertain, limits
-        body = program.spacecraft
+    burns: tuple[Burn, ...]
+    excess: float
+    left: Vector
+
+
+class ChanceProgram:
+    """The program of margins for the channels and slots of a ``program`` of small angles; ``size`` of the goal."""
+
+    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], size: float) -> None:
+        self.program, self.limits, self.uncertain, body = program, limits, uncertain, program.spacecraft
         self.pace = np.array([body.nutation_rate, body.spin])
-        self.goal = np.array([complex(goal[0], goal[1]), complex(goal[2], goal[3]), goal[4]])
         self.turn = 2.0 * np.pi / max(abs(self.pace[0]), abs(self.pace[1]))
         self.count = int(self.turn_of(np.array([program.end]))[0]) + 1
+        self.effects, self.changes, self.rates = uncertain.effects, uncertain.changes, uncertain.rates
+        self.scale = max(size, max(limit.most for limit in limits))
+        self.unit: Vector = self.scale / np.hypot(np.abs(uncertain.effects[0]), uncertain.effects[2].real)
+        self.cost = program.costs * self.unit
+        self.dearest = float(self.cost.max())
+        self.strong = self.unit < program.width
+        self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
 
     def turn_of(self, times: Vector) -> NDArray[np.int_]:
         """Number from 0 of the turn, of the faster of both rates, in which ``times`` (n,) s lie."""
@@ -129,36 +132,12 @@ class ChanceModel:
             turned *= np.hypot(rows[:, 0], rows[:, 1])
         return np.asarray(turned)
 
-    def effects(self, kind: int) -> tuple[Complex, Complex]:
-        """Effects of the channels, N m, (K,), and changes by the inputs but for the rate, (K, d)."""
-        inputs = self.uncertain
-        if kind == 2:
-            return inputs.axial.astype(complex), inputs.axial_torque.astype(complex)
-        return inputs.effect, inputs.torque + (1j * self.pace[kind] * inputs.late - inputs.less) * inputs.effect[
-            :, None
-        ]
-
-    def rates(self, kind: int) -> Vector:
-        """Changes by the inputs of the rate at which effects turn, (d,) rad/s."""
-        return self.uncertain.rates[kind] if kind < 2 else np.zeros(len(self.uncertain.own))
-
-    def start(self, kind: int) -> Complex:
-        """Changes by the inputs of the end error without firing, (d,) N m s."""
-        inputs = self.uncertain
-        return inputs.spin.astype(complex) if kind == 2 else inputs.begin[kind] + inputs.less * self.goal[kind]
-
-    def plain(self, limit: ChanceLimit, u: complex) -> Tangent:
-        """The tangent in a direction that knows of no dispersion."""
-        count = len(self.uncertain.own)
-        return Tangent(limit, complex(u), np.zeros(count), np.zeros((0, 1 + count)))
-
     def row(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Coefficients of a tangent per second of each column, N m, (n,)."""
         kind = tangent.limit.kind
-        effects, changes = self.effects(kind)
-        effect = effects[columns.channel]
+        effect, changes = self.effects[kind, columns.channel], self.changes[kind]
         total = effect + margin * (changes @ tangent.shared)[columns.channel]
-        rate = float(self.rates(kind) @ tangent.shared)
+        rate = float(self.rates[kind] @ tangent.shared)
         if rate:
             total = total + margin * 1j * rate * columns.t * effect
         if len(tangent.own):
@@ -171,101 +150,38 @@ class ChanceModel:
 
     def right(self, tangent: Tangent, margin: float) -> float:
         """Upper limit of the sum of a tangent over its columns, N m s."""
-        kind = tangent.limit.kind
-        taken = (np.conj(tangent.u) * (margin * self.start(kind) @ tangent.shared - self.goal[kind])).real
-        return float(tangent.limit.most - taken)
+        kind, inputs = tangent.limit.kind, self.uncertain
+        taken = np.conj(tangent.u) * (margin * inputs.start[kind] @ tangent.shared - inputs.goal[kind])
+        return float(tangent.limit.most - taken.real)
 
     def left(self, columns: ProgramColumns, on_times: Vector) -> Complex:
         """End errors of nutation, shift and spin, (3,) N m s."""
-        each = [self.turns(kind, columns) * self.effects(kind)[0][columns.channel] @ on_times for kind in range(3)]
-        return np.asarray(np.array(each, dtype=np.complex128) - self.goal)
+        each = [self.turns(kind, columns) * self.effects[kind, columns.channel] @ on_times for kind in range(3)]
+        return np.asarray(np.array(each, dtype=np.complex128) - self.uncertain.goal)
 
     def spread(self, kind: int, columns: ProgramColumns, on_times: Vector) -> Spread:
         """End error by one sigma of each input, N m s, with columns on for ``on_times`` (n,) s."""
         shared = ~self.uncertain.own
-        effect, changed = (part[columns.channel] for part in self.effects(kind))
+        effect, changed = (part[kind, columns.channel] for part in (self.effects, self.changes))
         each = (self.turns(kind, columns) * on_times)[:, None]
-        changed = changed + 1j * columns.t[:, None] * effect[:, None] * self.rates(kind)
-        total: Complex = np.where(shared, (each * changed).sum(axis=0) + self.start(kind), 0j)
+        changed = changed + 1j * columns.t[:, None] * effect[:, None] * self.rates[kind]
+        total: Complex = np.where(shared, (each * changed).sum(axis=0) + self.uncertain.start[kind], 0j)
         pulses, at = np.unique(self.pulse(columns), return_inverse=True)
         own = np.zeros((len(pulses), len(shared)), dtype=complex)
         np.add.at(own, at, np.where(shared, 0.0, each * changed))
         return Spread(total, pulses, own)
 
-    def weights(self, kind: int, channel: int, priced: Sequence[tuple[Tangent, float]], margin: float) -> Weights:
-        """Worth of a second of a channel by tangents of one kind and their prices."""
-        effects, changes = (part[channel] for part in self.effects(kind))
-        fixed = rate = 0j
-        own = np.zeros(self.count, dtype=complex)
-        for tangent, price in priced:
-            if tangent.limit.kind != kind:
-                continue
-            weight = price * np.conj(tangent.u)
-            fixed += weight * (effects + margin * changes @ tangent.shared)
-            rate += weight * margin * 1j * (self.rates(kind) @ tangent.shared) * effects
-            pulses = tangent.own[:, 0].astype(int)
-            mine = pulses // TURNS == channel
-            own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
-        return Weights(complex(fixed), complex(rate), own)
-
-
-DIRECTIONS = 72
-"""Directions in which the cones of two equations are looked at."""
-
-BEGUN = 16
-"""Directions of the first tangents of such a cone, without margin."""
-
-WORST = 3
-"""Tangents added to a cone at a time."""
-
-BEST = 200
-"""Columns taken in at a time."""
-
-TIGHT = 1e-3
-"""Share of a limit by which a solution may pass it."""
-
-PRICE = 1e-6
-"""Relative reduced cost below which a column does not enter."""
-
-ROUNDS = 40
-"""Rounds of the linear program, each with more tangents or columns."""
-
-EXCESS = 10.0
-"""Cost of passing all limits by themselves, over that of all there is to do: done where hardly anything else helps."""
-
-SOME = 1e-9
-"""Share of what is needed below which an on-time is rounding."""
-
-
-class Sure(NamedTuple):
-    """Burns of least cost; ``excess``: share by which limits are passed, ``left`` (5,) N m s: end errors."""
-
-    burns: tuple[Burn, ...]
-    excess: float
-    left: Vector
-
-
-class ChanceProgram:
-    """The program of margins for the channels and slots of a ``program`` of small angles."""
-
-    def __init__(self, program: Program, uncertain: Uncertain, limits: tuple[ChanceLimit, ...], goal: Vector) -> None:
-        self.program, self.limits = program, limits
-        self.model = ChanceModel(program, uncertain, limits, goal)
-        self.scale = max(float(np.linalg.norm(goal)), max(limit.most for limit in limits))
-        self.unit = self.scale / np.hypot(np.abs(uncertain.effect), uncertain.axial)
-        self.cost = program.costs * self.unit
-        self.dearest = float(self.cost.max())
-        self.strong = self.unit < program.width
-        self._kept: dict[tuple[int, int], tuple[Complex, NDArray[np.int_]]] = {}
-
     def solve(self, margin: float) -> Sure:
         """The cheapest burns with so many sigmas of margin; where there are none, those that pass limits by least."""
-        tangents = [self.model.plain(limit, u) for limit in self.limits for u in directions_of(limit, BEGUN)]
+        inputs = len(self.uncertain.own)
+        plain = np.zeros(inputs), np.zeros((0, 1 + inputs))  # tangents that know of no dispersion
+        tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
-        rights = np.array([self.model.right(tangent, margin) for tangent in tangents]) / self.scale
+        rights = np.array([self.right(tangent, margin) for tangent in tangents]) / self.scale
         master = highs.GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
-        master.add(np.array([EXCESS]), excess, np.array([np.inf]))
+        # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
+        master.add(np.array([10.0]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
         best, taken = None, columns
         for _ in range(ROUNDS):
@@ -278,7 +194,7 @@ class ChanceProgram:
             new = self._broken(columns, on_times, margin, float(best.x[0]))
             for tangent in new:
                 row = np.concatenate([[-tangent.limit.most / self.scale], self._coefficients(tangent, columns, margin)])
-                master.limit(row, self.model.right(tangent, margin) / self.scale)
+                master.limit(row, self.right(tangent, margin) / self.scale)
             priced = self._priced(tangents, best.shadows, columns, margin)
             tangents += new
             if not len(priced.t) and not new:
@@ -289,7 +205,7 @@ class ChanceProgram:
         if best is None:
             return Sure((), np.inf, np.zeros(5))
         on_times = self._on_times(taken, best.x[1:])
-        used, left = on_times > 0.0, self.model.left(taken, on_times)
+        used, left = on_times > 0.0, self.left(taken, on_times)
         return Sure(
             burns(self.program.channels, taken.of(used), on_times[used], 1.01 * self.program.width),
             float(best.x[0]),
@@ -298,26 +214,22 @@ class ChanceProgram:
 
     def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
         """On-times (n,) s of amounts in units, without rounding."""
-        return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
+        return np.where(amounts > 1e-9, amounts, 0.0) * self.unit[columns.channel]
 
     def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Coefficients of a tangent for one unit of each column, over the scale."""
-        return self.model.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
+        return self.row(tangent, columns, margin) * self.unit[columns.channel] / self.scale
 
     def _broken(self, columns: ProgramColumns, on_times: Vector, margin: float, excess: float) -> list[Tangent]:
         """Tangents where the cones are passed, the worst of each."""
         used = on_times > 0.0
         columns, on_times = columns.of(used), on_times[used]
-        left, tangents = self.model.left(columns, on_times), []
+        left, tangents = self.left(columns, on_times), []
         for limit in self.limits:
-            spread = self.model.spread(limit.kind, columns, on_times)
-
-            def passed(directions: Complex, limit: ChanceLimit = limit, spread: Spread = spread) -> Vector:
-                along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
-                return np.asarray(along - (1.0 + excess + TIGHT) * limit.most)
-
+            spread = self.spread(limit.kind, columns, on_times)
             directions = directions_of(limit, DIRECTIONS)
-            by = passed(directions)
+            along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
+            by = along - (1.0 + excess + 1e-3) * limit.most  # a little more passes
             peaked = np.flatnonzero((by > 0.0) & (by >= np.roll(by, 1)) & (by >= np.roll(by, -1)))
             for index in peaked[np.argsort(-by[peaked])][:WORST].tolist():
                 u = complex(directions[index])
@@ -328,18 +240,16 @@ class ChanceProgram:
 
     def _begin(self) -> ProgramColumns:
         """Columns to begin with: those that pull along the goal, or back."""
-        model = self.model
-        toward = np.conj(model.goal[0] or model.goal[1] or 1.0)
-        worth = np.abs((toward * model.turns(0, self._all())[None, :] * model.uncertain.effect[:, None]).real)
+        toward = np.conj(self.uncertain.goal[0] or self.uncertain.goal[1] or 1.0)
+        worth = np.abs((toward * self.turns(0, self._all())[None, :] * self.effects[0][:, None]).real)
         worth = np.where(self.program.forbidden, 0.0, worth * (self.unit / self.scale)[:, None])
         channel, slot = np.nonzero(worth > 0.8 * worth.max(initial=0.0))
         some = np.unique(np.linspace(0, len(slot) - 1, min(2 * BEST, len(slot))).astype(int))
         return self._slots(channel[some], slot[some])
 
     def _all(self, channel: int = 0) -> ProgramColumns:
-        centres = self.program.centres
-        width = 0.0 if self.strong[channel] else self.program.width
-        return alone(np.full(len(centres), channel), centres, np.full(len(centres), width))
+        every = np.arange(len(self.program.centres))
+        return self._slots(np.full(len(every), channel), every)
 
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], np.where(self.strong[channel], 0.0, self.program.width))
@@ -366,17 +276,22 @@ class ChanceProgram:
         """Worth of one unit of a channel in each slot by tangents and their prices."""
         worth = np.zeros(len(self.program.centres))
         for kind in {limit.kind for limit in self.limits}:
-            turned, turn = self._slots_of(kind, channel)
-            fixed, rate, own = self.model.weights(kind, channel, active, margin)
+            if (kind, channel) not in self._kept:
+                every = self._all(channel)
+                self._kept[kind, channel] = self.turns(kind, every), self.turn_of(every.t)
+            turned, turn = self._kept[kind, channel]
+            effect, changes = self.effects[kind, channel], self.changes[kind, channel]
+            fixed, rate, own = 0j, 0j, np.zeros(self.count, dtype=complex)
+            for tangent, price in active:
+                if tangent.limit.kind == kind:
+                    weight = price * np.conj(tangent.u)
+                    fixed += weight * (effect + margin * changes @ tangent.shared)
+                    rate += weight * margin * 1j * (self.rates[kind] @ tangent.shared) * effect
+                    pulses = tangent.own[:, 0].astype(int)
+                    mine = pulses // TURNS == channel
+                    own[pulses[mine] % TURNS] += weight * margin * (tangent.own[mine, 1:] @ changes)
             worth += (turned * (fixed + rate * self.program.centres + own[turn])).real
         return np.asarray(worth * (self.unit[channel] / self.scale))
-
-    def _slots_of(self, kind: int, channel: int) -> tuple[Complex, NDArray[np.int_]]:
-        """Turns of all slots of a channel, see `ChanceModel.turns` and `ChanceModel.turn_of`; remembered."""
-        if (kind, channel) not in self._kept:
-            every = self._all(channel)
-            self._kept[kind, channel] = self.model.turns(kind, every), self.model.turn_of(every.t)
-        return self._kept[kind, channel]
 
 
 def directions_of(limit: ChanceLimit, count: int) -> Complex:

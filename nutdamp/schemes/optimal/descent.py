@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
-from nutdamp.physics.taylor import Forcing
 from nutdamp.schemes.optimal import refinement
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.equipment import Channel
@@ -38,8 +36,7 @@ FLIGHT, CASE = 0.05, 0.0003
 """Units of `work` of a stretch of a flight of many sequences, and of each of them."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sequences:
+class Sequences(NamedTuple):
     """Channels ``which`` (b, n), by number, of b sequences of n pulses.
 
     ``begins`` and ``ends`` (b, n) s: the window of each pulse; ``shortest`` and ``longest`` (b, n) s: its on-time.
@@ -51,16 +48,9 @@ class Sequences:
     shortest: Vector
     longest: Vector
 
-    def of(self, rows: Any) -> Self:
+    def of(self, rows: Any) -> Sequences:
         """Some of the sequences."""
-        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-
-class _Forces(NamedTuple):
-    """External torques, see `batch.Bodies`."""
-
-    constant: Vector
-    forcing: Forcing
+        return Sequences._make(part[rows] for part in self)
 
 
 class Task:
@@ -84,13 +74,16 @@ class Task:
         self.unit = size / np.linalg.norm(self.torques, axis=1)
         """s of each channel that are worth all there is to do"""
         self.least = float(np.min(costs * self.unit))
+        self.shortest = np.array([channel.min_on_time for channel in channels])
         self.pace = min(1.0 / body.fastest, body.inertial_period)
         dynamics, start = make_dynamics(body), body.initial
-        self._forced = _Forces(dynamics.constant, dynamics.forcing)
-        self._coasting = _Forces(np.zeros(3), dynamics.forcing._replace(turning=()))
+        # External torques with and without disturbances, see `batch.Bodies`.
+        self._forced = dynamics.constant, dynamics.forcing
+        self._coasting = np.zeros(3), dynamics.forcing._replace(turning=())
         self._start = np.asarray(dynamics.moments, dtype=float), start.rates, start.quaternion
         forcing = dynamics.forcing
-        self._free = not dynamics.constant.any() and not forcing.turning and forcing.growth == 0.0
+        self._decays, self._wheel = forcing.growth != 0.0, forcing.wheel
+        self._free = not dynamics.constant.any() and not forcing.turning and not self._decays
         self._target, self._across = body.target_axis, refinement.square_to_target(body)
 
     def misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
@@ -104,7 +97,7 @@ class Task:
     def _misses(self, which: Indices, x: Vector, kicks: int) -> Vector:
         count, n = which.shape
         work.spend(n * (max(kicks, 1) + 1) * (FLIGHT + CASE * count))
-        flown = self._together if self._free or (kicks and self._coasting.forcing.growth == 0.0) else self._in_turn
+        flown = self._together if self._free or (kicks and not self._decays) else self._in_turn
         momentum, turn = flown(which, x, kicks)
         inertial = attitude.rotate(turn.T, momentum.T)
         shift = inertial @ self._across.T
@@ -118,8 +111,7 @@ class Task:
         """H in body axes (3, b) and quaternions (4, b) at the end, stretch by stretch."""
         count, n = which.shape
         moments, rates, turn = (np.repeat(part[:, None], count, axis=1) for part in self._start)
-        forces = self._coasting if kicks else self._forced
-        bodies = batch.Bodies(moments, forces.constant, forces.forcing)
+        bodies = batch.Bodies(moments, *(self._coasting if kicks else self._forced))
         now = np.zeros(count)
         for pulse in range(n):
             begin, on_time, torque = x[:, pulse], x[:, n + pulse], self.torques[which[:, pulse]].T
@@ -143,13 +135,12 @@ class Task:
         """
         count, n = which.shape
         (A, _, C), rates, turn = self._start
-        wheel = self._coasting.forcing.wheel
+        wheel = self._wheel
         parts, starts, widths = max(kicks, 1), x[:, :n], x[:, n : 2 * n]
         impulses = np.repeat(self.torques[which] * (widths / parts)[:, :, None], parts, axis=1)
         if kicks:
-            starts = (starts[:, :, None] + widths[:, :, None] * ((np.arange(kicks) + 0.5) / kicks)).reshape(
-                count, n * kicks
-            )
+            shares = (np.arange(kicks) + 0.5) / kicks
+            starts = (starts[:, :, None] + widths[:, :, None] * shares).reshape(count, n * kicks)
             widths = np.zeros_like(starts)
         coasts = np.diff(starts, axis=1, prepend=0.0)
         coasts[:, 1:] -= widths[:, :-1]
@@ -173,10 +164,8 @@ class Task:
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
         if not kicks:
-            pulsed = self._pulsed(which, across, before, widths)[1]
-            first, second = (
-                np.stack(pair, axis=2).reshape(count, 2 * n) for pair in zip((first, second), pulsed, strict=True)
-            )
+            turns = zip((first, second), self._pulsed(which, across, before, widths)[1], strict=True)
+            first, second = (np.stack(pair, axis=2).reshape(count, 2 * n) for pair in turns)
         first, second = _product(first, second)
         momentum = after[:, -1] * np.exp(-1j * phase[:, -1])
         spun = attitude.product(turn, (first.real, second.real, second.imag, first.imag))
@@ -191,7 +180,7 @@ class Task:
         """
         count = which.size
         moments = np.repeat(self._start[0][:, None], count, axis=1)
-        spinning = before.ravel() - self._coasting.forcing.wheel
+        spinning = before.ravel() - self._wheel
         rates = np.array([across.real.ravel(), across.imag.ravel(), spinning]) / moments
         turns = np.repeat(np.array([[1.0], [0.0], [0.0], [0.0]]), count, axis=1)
         bodies = batch.Bodies(moments, *self._coasting)
@@ -215,26 +204,16 @@ class Task:
         """Cost of sequences with on-times ``on`` (…, n) s."""
         return np.asarray(np.sum(self.costs[which] * on, axis=-1))
 
-    def scale(self, which: Indices) -> Vector:
-        """Natural sizes of the unknowns, (b, …)."""
-        count, n = which.shape
-        return np.hstack([np.full((count, n), self.pace), self.unit[which], np.ones((count, self.loose))])
-
     def bounds(self, sequences: Sequences) -> tuple[Vector, Vector]:
         """Rows (r, …) and levels (b, r): rows @ x >= levels keeps gap, windows, on-times and ``off``."""
         count, n = sequences.which.shape
         identity, zero = np.eye(n), np.zeros((n, n))
         after = identity - np.eye(n, k=-1)
-        rows = [
-            np.hstack([after, -np.eye(n, k=-1)])[1:],
-            np.hstack([identity, zero]),
-            np.hstack([-identity, -identity]),
-            np.hstack([zero, identity]),
-            np.hstack([zero, -identity]),
-        ]
+        matrix = np.block(
+            [[after, -np.eye(n, k=-1)], [identity, zero], [-identity, -identity], [zero, identity], [zero, -identity]]
+        )[1:]
         levels = [np.full((count, n - 1), self.body.limits.gap), sequences.begins, -sequences.ends]
         levels += [sequences.shortest, -sequences.longest]
-        matrix = np.vstack(rows)
         if self.loose:
             angles = 2 * math.pi / SIDES * np.arange(SIDES)
             sides = np.hstack([np.zeros((SIDES, 2 * n)), -np.column_stack([np.cos(angles), np.sin(angles)])])
@@ -258,24 +237,16 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
 SHARES = np.array([0.5, 0.2, 0.05, 0.01])
 """Shares of a step that are tried where the whole does not help."""
 
-BARRIER = 1e-9
-"""Share of the cost at which the barrier of the bounds ends."""
+BARRIER, SETTLED = 1e-9, 1e-7
+"""Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an
+optimum at which a sequence is done."""
 
-SETTLED = 1e-7
-"""Largest error of the conditions for an optimum, relative, at which a sequence is done."""
-
-FLAT = 1e-5
-"""Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it."""
-
-LEAST_ROOM = 1e-10
-"""Share of the room to a bound that a step must leave."""
-
-PROXIMAL = 1e-9
-"""Weight that keeps the multipliers finite where equations depend on one another."""
+FLAT, PROXIMAL = 1e-5, 1e-9
+"""Share of the cost below which the next step's promise, the barrier and the misses are not worth taking it; weight
+that keeps the multipliers finite where equations depend on one another."""
 
 
-@dataclass(eq=False)
-class DescentState:
+class DescentState(NamedTuple):
     """State of the descents of b sequences: unknowns ``x`` (b, v), slacks of the r bounds and their multipliers.
 
     ``misses`` (b, m), ``slopes`` (b, m, v), ``prices`` (b, m) multipliers of the equations, ``curvature`` (b, v, v) of
@@ -295,12 +266,7 @@ class DescentState:
 
     def of(self, rows: Any) -> DescentState:
         """The states of some sequences."""
-        return DescentState(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-    def put(self, rows: Any, other: DescentState) -> None:
-        """Replace the states of some sequences."""
-        for field in fields(self):
-            getattr(self, field.name)[rows] = getattr(other, field.name)
+        return DescentState._make(part[rows] for part in self)
 
 
 class Descent:
@@ -308,23 +274,24 @@ class Descent:
 
     def __init__(self, task: Task, sequences: Sequences, x: Vector, *, kicks: int, barrier: float = 0.1) -> None:
         self.task, self.sequences, self.kicks = task, sequences, kicks
-        self.scale = task.scale(sequences.which)
+        which, (count, number) = sequences.which, x.shape
+        n = which.shape[1]
+        # Natural sizes of the unknowns.
+        self.scale = np.hstack([np.full((count, n), task.pace), task.unit[which], np.ones((count, task.loose))])
         rows, levels = task.bounds(sequences)
         scaled = rows * self.scale[:, None, :]
         size = np.abs(scaled).max(axis=2)
         self.rows = scaled / size[:, :, None]
-        n = sequences.which.shape[1]
         self.price = np.zeros_like(self.scale)
-        self.price[:, n : 2 * n] = (task.costs * task.unit)[sequences.which] / task.least
-        count, number = x.shape
+        self.price[:, n : 2 * n] = (task.costs * task.unit)[which] / task.least
         slack = (x @ rows.T - levels) / size
-        misses = task.misses(sequences.which, x, kicks)
+        misses = task.misses(which, x, kicks)
         self.state = DescentState(
             x=np.array(x),
             slack=slack,
             dual=barrier / slack,
             misses=misses,
-            slopes=task.slopes(sequences.which, x, self.scale, misses, kicks),
+            slopes=task.slopes(which, x, self.scale, misses, kicks),
             prices=np.zeros((count, len(task.chosen))),
             curvature=np.repeat(np.eye(number)[None], count, axis=0),
             barrier=np.full(count, barrier),
@@ -355,7 +322,8 @@ class Descent:
             if not len(going) or work.exhausted():
                 break
             with np.errstate(all="ignore"):  # a sequence that gets lost is left as it is
-                self.state.put(going, self._stepped(going))
+                for state, stepped in zip(self.state, self._stepped(going), strict=True):
+                    state[going] = stepped
 
     def close(self, steps: int = 5) -> None:
         """Take the last misses away by the least moves, measured by the room that is left."""
@@ -426,7 +394,8 @@ class _LineSearch:
         """Take the scaled ``step`` (k, v) of those still to do where it falls enough; the misses where it does not."""
         k = self.active
         x, slack, misses, enough = self._trial(k, step, 1.0)
-        self._take(k[enough], x[enough], slack[enough], misses[enough])
+        there = k[enough]
+        self.x[there], self.slack[there], self.misses[there] = x[enough], slack[enough], misses[enough]
         self.active = k[~enough]
         return misses[~enough]
 
@@ -439,7 +408,7 @@ class _LineSearch:
         enough = enough.reshape(count, len(k))
         self.stuck[k] = ~enough.any(axis=0)
         first, every = np.where(self.stuck[k], count - 1, np.argmax(enough, axis=0)), np.arange(len(k))
-        self._take(k, x[first, every], slack[first, every], misses[first, every])
+        self.x[k], self.slack[k], self.misses[k] = x[first, every], slack[first, every], misses[first, every]
 
     def _trial(
         self, k: Indices, step: Vector, share: Vector | float
@@ -447,16 +416,13 @@ class _LineSearch:
         """Unknowns, slacks and misses after a step, and whether it falls enough for its ``share`` of the whole."""
         old = self.old
         slack = old.slack[k] + np.einsum("bri,bi->br", self.rows[k], step)
-        inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)
+        inside = np.all(slack > 1e-10 * old.slack[k], axis=1)  # as much of the room must be left
         x = np.where(inside[:, None], old.x[k] + step * self.scale[k], old.x[k])
         slack = np.where(inside[:, None], slack, old.slack[k])
         misses = self.task.misses(self.which[k], x, self.kicks)
         merit = self._merit(x, slack, misses, k)
         least = self.before[k] + 1e-4 * share * self.slope[k] + 1e-11 * np.abs(self.before[k])
         return x, slack, misses, inside & (merit <= least)
-
-    def _take(self, k: Indices, x: Vector, slack: Vector, misses: Vector) -> None:
-        self.x[k], self.slack[k], self.misses[k] = x, slack, misses
 
     def _merit(self, x: Vector, slack: Vector, misses: Vector, k: Indices) -> Vector:
         dear = np.einsum("bi,bi->b", self.price[k], x / self.scale[k]) - self.old.barrier[k] * np.log(slack).sum(axis=1)

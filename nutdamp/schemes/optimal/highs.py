@@ -26,10 +26,8 @@ WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
 """Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
-
 MOST_STEPS = 100_000
 """Steps of the simplex or of the interior points, in one way of solving."""
-
 
 SMALL, NONZERO = 10_000, 1e-2
 """Coefficients other than zero up to which a solution counts for nothing here, and units of `work` of each above it."""
@@ -75,11 +73,6 @@ class GrowingProgram:
         """One more limit, of the unknowns (n,) that there are: row @ x ≤ most."""
         used = np.flatnonzero(row)
         self._highs.addRow(-highspy.kHighsInf, most, len(used), used.astype(np.int32), row[used])
-
-    @property
-    def steps(self) -> int:
-        """Steps of the simplex on the way to the last optimum."""
-        return int(self._highs.getInfo().simplex_iteration_count)
 
     def optimum(self) -> Optimum | None:
         """The cheapest solution, from the last one's basis if there is one; None where no way of solving succeeds."""
@@ -132,17 +125,12 @@ class _SilentSolver(highspy.Highs):
         highspy.Highs.enableCallbacks(self)
 
 
-CORNERS = 3000
-"""Corners that are looked at, at most."""
+CORNERS, FLAT = 3000, 1e-12
+"""Corners that are looked at, at most, and share of the weight of one below which it is none."""
 
-MET = 3e-8
-"""Distance from the goal that counts as none, over all there is to do."""
-
-BEYOND = 1e-6
-"""Share of the distance by which the goal must lie beyond the set, for that to be proved in spite of rounding."""
-
-FLAT = 1e-12
-"""Share of a corner's weight below which it is none."""
+MET, BEYOND = 3e-8, 1e-6
+"""Distance from the goal that counts as none, over all there is to do, and the share of it by which the goal must lie
+beyond the set, for that to be proved in spite of rounding."""
 
 
 def supplies(most: Vector, goal: Vector, off: float = 0.0) -> bool | None:

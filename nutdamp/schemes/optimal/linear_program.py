@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,16 +37,11 @@ class ProgramColumns(NamedTuple):
 
     def of(self, which: NDArray[np.bool_] | NDArray[np.int_]) -> ProgramColumns:
         """Some of the columns."""
-        return ProgramColumns(self.channel[which], self.t[which], self.width[which], self.burn[which])
+        return ProgramColumns._make(part[which] for part in self)
 
     def joined(self, other: ProgramColumns) -> ProgramColumns:
         """These columns and others."""
-        return ProgramColumns(
-            np.concatenate([self.channel, other.channel]),
-            np.concatenate([self.t, other.t]),
-            np.concatenate([self.width, other.width]),
-            np.concatenate([self.burn, other.burn]),
-        )
+        return ProgramColumns._make(np.concatenate(parts) for parts in zip(self, other, strict=True))
 
 
 def alone(channel: NDArray[np.int_], t: Vector, width: Vector) -> ProgramColumns:
@@ -81,64 +76,30 @@ def burns(channels: Sequence[Channel], columns: ProgramColumns, on_times: Vector
     return tuple(sorted(result, key=lambda burn: burn.t))
 
 
-def peaks(times: Vector, worth: Vector) -> tuple[Vector, Vector]:
-    """Moments (n,) s of the largest worth, and that worth, from ``worth`` (n, 5) at even ``times`` (n, 5) s.
-
-    By the parabola through the best of the five and those beside it; at an end of them, that end.
-    """
-    best = np.argmax(worth, axis=1)
-    every, inner = np.arange(len(best)), np.clip(best, 1, 3)
-    low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
-    bend = low - 2.0 * top + high
-    aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
-    aside = np.where(best == inner, aside, best - inner)
-    most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
-    return times[every, inner] + aside * (times[:, 1] - times[:, 0]), most
-
-
-SLOTS = 64
-"""Slots in the faster of the two turns, at ω3 and at aω3."""
-
-MOST_SLOTS = 600_000
-"""Slots of all channels together: a horizon of more is looked at as far as they reach."""
+SLOTS, MOST_SLOTS = 64, 600_000
+"""Slots in the faster of the two turns, at ω3 and at aω3; and of all channels together: a horizon of more is looked at
+as far as they reach."""
 
 SOLVED, SLOT, COLUMN, LIMITED = 3.0, 3e-4, 1.5e-3, 0.06
 """Units of `work` of a program's solution, of each slot or column given, and of each burn of limited on-time."""
 
-SLACK_COST = 1e3
-"""Cost of what no column supplies, over the dearest channel's: used only where there is no solution."""
+PRICE, PEAK = 1e-7, 1e-6
+"""Relative reduced cost below which a column cannot lower the cost any more, and that for the best moment of a strong
+channel, which may lie close beside one taken."""
 
-PRICE = 1e-7
-"""Relative reduced cost below which a column cannot lower the cost any more."""
+BEST, MANY = 250, 4
+"""Columns taken in per round, the best priced first, and over one the share of all worth taking in that is taken in
+while they do not supply what is needed."""
 
-PEAK = 1e-6
-"""Relative reduced cost for the best moment of a strong channel, which may lie close beside one taken."""
-
-BEST = 250
-"""Columns taken in per round, the best priced first."""
-
-MANY = 4
-"""Share of all columns worth taking in that is taken in, over one, while they do not supply what is needed."""
-
-PROVED = 1e-6
-"""Shortfall by which a program is proved to have no solution, over all there is to do."""
-
-FIRST = 400
-"""Columns to begin with."""
-
-ROUNDS = 60
-
-LOOK = 0.05
-"""Peaks of the price this far below zero are looked at more closely within their slots."""
+FIRST, ROUNDS = 400, 60
+"""Columns to begin with, and rounds in which more are taken in."""
 
 SIDES = 32
 """Directions in which H may end off the target, where it may."""
 
-TINIEST = 1e-6
-"""Coefficient below which an equation is not scaled up any more."""
-
-SOME = 1e-12
-"""Share of what is needed below which an on-time is rounding."""
+TINIEST, SOME = 1e-6, 1e-12
+"""Coefficient below which an equation is not scaled up any more; share of what is needed below which an on-time is
+rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +117,6 @@ class Solution:
     prices: Vector
 
 
-@dataclass(eq=False)
 class Program:
     """The linear program of one spacecraft.
 
@@ -166,29 +126,19 @@ class Program:
     slots) may not be used.
     """
 
-    spacecraft: Spacecraft
-    channels: tuple[Channel, ...]
-    costs: Vector
-    influence: Influence
-    off: float = 0.0
-    haste: float = 0.0
-    end: float = field(init=False)
-    width: float = field(init=False)
-    centres: Vector = field(init=False)
-    forbidden: NDArray[np.bool_] = field(init=False)
-
-    def __post_init__(self) -> None:
-        body, limits = self.spacecraft, self.spacecraft.limits
-        slot = 2 * math.pi / body.fastest / SLOTS
-        self.end = min(body.horizon, limits.earliest + MOST_SLOTS // len(self.channels) * slot)
-        count = max(math.ceil((self.end - limits.earliest) / slot), 1)
-        edges = np.linspace(limits.earliest, self.end, count + 1)
+    def __init__(
+        self, body: Spacecraft, channels: tuple[Channel, ...], costs: Vector, influence: Influence, off: float = 0.0
+    ) -> None:
+        self.spacecraft, self.channels, self.costs, self.off, self.haste = body, channels, costs, off, 0.0
+        begin, slot = body.limits.earliest, 2 * math.pi / body.fastest / SLOTS
+        self.end = min(body.horizon, begin + MOST_SLOTS // len(channels) * slot)
+        edges = np.linspace(begin, self.end, max(math.ceil((self.end - begin) / slot), 1) + 1)
         self.width = float(edges[1] - edges[0])
-        self.centres = 0.5 * (edges[1:] + edges[:-1])
-        self.forbidden = np.tile(Windows(body).blocked(edges[:-1], edges[1:]), (len(self.channels), 1))
+        self.centres: Vector = 0.5 * (edges[1:] + edges[:-1])
+        self.forbidden: NDArray[np.bool_] = np.tile(Windows(body).blocked(edges[:-1], edges[1:]), (len(channels), 1))
         self._pool: ProgramColumns | None = None
-        self._torques = np.array([channel.torque for channel in self.channels])
-        self.aim(self.influence)
+        self._torques = np.array([channel.torque for channel in channels])
+        self.aim(influence)
 
     def aim(self, influence: Influence) -> None:
         """Take other equations."""
@@ -215,12 +165,15 @@ class Program:
             return Solution((), 0.0, 0.0, np.zeros(2), nothing)
         generate = columns is None
         chosen = self._first() if columns is None else columns
-        master = self._master(chosen, self._reach() if columns is None else None)
+        reach = None
+        if columns is None:  # the most that one unit of any channel does in each of the equations, or a little more
+            reach = (np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1)
+        master = self._master(chosen, reach)
         optimum = master.optimum()
         if optimum is None:
             return Solution((), math.inf, math.inf, np.zeros(2), nothing)
         for _ in range(ROUNDS if generate else 0):
-            unmet = self._unmet(optimum)
+            unmet = float(optimum.x[: 2 * len(nothing)].sum())
             if work.exhausted() or (enough and (unmet <= SOME or self._out_of_reach(optimum.prices))):
                 break
             new = self._priced(optimum.prices, chosen, unmet)
@@ -234,19 +187,16 @@ class Program:
         if generate:
             self._pool = chosen
         free, amounts = np.split(optimum.x, [len(optimum.x) - len(chosen.t)])
+        off = -(self._ring() @ free[2 * len(nothing) :])[2:4] * self._scale if self.off > 0.0 else np.zeros(2)
         used = amounts > SOME
         on_times = amounts[used] * self._unit[chosen.channel[used]]
         return Solution(
             burns(self.channels, chosen.of(used), on_times, 1.01 * self.width),
             float(self.costs[chosen.channel[used]] @ on_times),
-            self._unmet(optimum),
-            self._off_by(free[2 * len(nothing) :]),
+            float(free[: 2 * len(nothing)].sum()),
+            np.asarray(off),
             optimum.prices * self._dearest / self._scale,
         )
-
-    def _unmet(self, optimum: highs.Optimum) -> float:
-        """Sum of the slacks, over all there is to do."""
-        return float(optimum.x[: 2 * len(self.influence.goal)].sum())
 
     def _master(self, columns: ProgramColumns, reach: Vector | None) -> highs.GrowingProgram:
         """The program of these columns, in units of all there is to do, after slacks and the ring.
@@ -265,7 +215,8 @@ class Program:
         rows = np.zeros((count + len(limits), 2 * count + ring.shape[1]))
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count : count + shares, 2 * count :] = 1.0
-        cost = np.repeat([SLACK_COST, 0.0], [2 * count, ring.shape[1]])
+        # What no column supplies costs far more than the dearest channel: used only where there is no solution.
+        cost = np.repeat([1e3, 0.0], [2 * count, ring.shape[1]])
         master.add(cost, rows, np.full(len(cost), np.inf))
         self._add(master, columns)
         return master
@@ -298,30 +249,24 @@ class Program:
         ring[2:4] = np.cos(angles), np.sin(angles)
         return ring
 
-    def _off_by(self, amounts: Vector) -> Vector:
-        return np.asarray(-(self._ring() @ amounts)[2:4] * self._scale) if self.off > 0.0 else np.zeros(2)
-
     def _dearness(self, times: Vector) -> Vector:
         return 1.0 + self.haste * times / float(self.centres[-1])
 
     def _coefficients(self, columns: ProgramColumns) -> Vector:
-        """Coefficients of one unit of each column, (equations, n)."""
-        return np.asarray(np.einsum("nek,nk->en", self._rows(columns), self._direction[columns.channel]))
-
-    def _rows(self, columns: ProgramColumns) -> Vector:
-        """Coefficients of one N m s of each column about each body axis, (n, equations, 3).
+        """Coefficients of one unit of each column, (equations, n).
 
         Once slots were looked at as often as there are any, all of them are, and kept.
         """
         slots = columns.width > 0.0
         self._looked += int(np.count_nonzero(slots))
         if self._grid is None and self._looked <= len(self.centres):
-            return np.asarray(self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None])
-        rows = np.empty((len(slots), len(self.influence.goal), 3))
-        rows[slots] = self._slot_rows()[:, :, self._slot(columns.t[slots])].transpose(2, 0, 1)
-        if not slots.all():
-            rows[~slots] = self.influence.rows(columns.t[~slots])
-        return rows
+            rows = self.influence.rows(columns.t) * self.influence.widths(columns.width)[:, :, None]
+        else:
+            rows = np.empty((len(slots), len(self.influence.goal), 3))
+            rows[slots] = self._slot_rows()[:, :, self._slot(columns.t[slots])].transpose(2, 0, 1)
+            if not slots.all():
+                rows[~slots] = self.influence.rows(columns.t[~slots])
+        return np.asarray(np.einsum("nek,nk->en", rows, self._direction[columns.channel]))
 
     def _slot_rows(self) -> Vector:
         """Coefficients of one N m s in each slot, (equations, 3, slots)."""
@@ -329,10 +274,6 @@ class Program:
             lost = self.influence.widths(np.array([self.width]))[0]
             self._grid = np.ascontiguousarray((self.influence.rows(self.centres) * lost[:, None]).transpose(1, 2, 0))
         return self._grid
-
-    def _reach(self) -> Vector:
-        """The most that one unit of any channel does in each of the equations, (equations,), or a little more."""
-        return np.asarray((np.abs(self._slot_rows()).max(axis=2) @ np.abs(self._direction).T).max(axis=1))
 
     def _worth(self, weights: Vector) -> Vector:
         """Worth of one unit of each channel in each slot by prices ``weights``, (channels, slots)."""
@@ -354,9 +295,7 @@ class Program:
         if self._scale == 0.0 or self.strong.any():  # strong ones act at moments, of which slots are only samples
             return None
         work.spend(SOLVED + SLOT * self.forbidden.size)
-        lost = self.influence.widths(np.array([self.width]))[0]
-        grid = self.influence.rows(self.centres) * lost[:, None]
-        most = np.einsum("nek,ck->ecn", grid, self._direction) * (self.width / self._unit)[None, :, None]
+        most = np.einsum("ekn,ck->ecn", self._slot_rows(), self._direction) * (self.width / self._unit)[None, :, None]
         return supplies(most[:, ~self.forbidden], self.influence.goal / self._scale, self.off / self._scale)
 
     def _out_of_reach(self, weights: Vector) -> bool:
@@ -366,14 +305,12 @@ class Program:
         size = float(np.abs(weights).max())
         most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
         loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
-        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
+        return float(weights @ self.influence.goal) / self._scale - most - loose > 1e-6 * size
 
     def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
         if self._pool is not None:
-            pool = self._pool
-            allowed = ~self.forbidden[pool.channel, self._slot(pool.t)]
-            return pool.of(allowed)
+            return self._pool.of(~self.forbidden[self._pool.channel, self._slot(self._pool.t)])
         worth = self._gains(self.influence.goal / self._scale) * (self._dearest / self._price)[:, None]
         channel, slot = np.nonzero(worth > 0.7 * worth.max(initial=0.0) - 0.3)
         chosen = np.linspace(0, len(slot) - 1, min(FIRST, len(slot))).astype(int)
@@ -400,10 +337,10 @@ class Program:
         return columns.joined(self._peaks(gains, duals)) if self.strong.any() else columns
 
     def _peaks(self, gains: Vector, duals: Vector) -> ProgramColumns:
-        """Moments within slots at which a strong channel is worth most."""
+        """Moments within slots at which a strong channel is worth most, in slots in which it costs little more."""
         padded = np.pad(np.where(self.strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
         middle = padded[:, 1:-1]
-        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
+        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -0.05))
         order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
         channel, centre = channel[order], self.centres[slot[order]]
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it
@@ -411,8 +348,15 @@ class Program:
         fives = alone(np.repeat(channel, 5), times.ravel(), np.zeros(times.size))
         cost = self._price[fives.channel] / self._dearest * self._dearness(fives.t)
         worth = (duals @ self._coefficients(fives) - cost).reshape(-1, 5)
-        t, most = peaks(times, worth)
-        good = most > PEAK
+        # By the parabola through the best of the five and those beside it; at an end of them, that end.
+        best = np.argmax(worth, axis=1)
+        every, inner = np.arange(len(best)), np.clip(best, 1, 3)
+        low, top, high = (worth[every, inner + shift] for shift in (-1, 0, 1))
+        bend = low - 2.0 * top + high
+        aside = np.divide(0.5 * (low - high), bend, out=np.zeros_like(bend), where=bend < 0.0)
+        aside = np.where(best == inner, aside, best - inner)
+        most = np.where(best == inner, top - 0.25 * (low - high) * aside, worth[every, best])
+        t, good = times[every, inner] + aside * (times[:, 1] - times[:, 0]), most > PEAK
         return alone(channel[good], t[good], np.zeros(int(good.sum())))
 
     def forbid(self, channel: Channel | None, start: float, end: float) -> None:
@@ -438,10 +382,8 @@ class Program:
                 times = np.clip(times, self.centres[0] - half, self.centres[-1] + half)
                 times = times[np.diff(times, prepend=-np.inf) > 0.0]
                 times = times[~self.forbidden[index, self._slot(times)]]
-                same = np.full(len(times), index)
-                impulses = impulses.joined(
-                    ProgramColumns(same, times, np.zeros(len(times)), np.full(len(times), number))
-                )
+                same, mine = (np.full(len(times), value) for value in (index, number))
+                impulses = impulses.joined(ProgramColumns(same, times, np.zeros(len(times)), mine))
             else:
                 first, last = self._slot(np.array([burn.t - reach, burn.t + reach]))
                 near = np.arange(first, last + 1)

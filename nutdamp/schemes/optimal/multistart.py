@@ -20,59 +20,33 @@ from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-STARTS = 512
-"""Random sequences to begin with."""
+STARTS, BEST = 512, 8
+"""Random sequences to begin with, and schedules that go on to the next stage."""
 
 ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))
 """Steps of descent, and share of the sequences that goes on after them."""
 
-UNMET_COST = 100.0
-"""Cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost."""
+SPARE, ADDITIONS = 2, 2
+"""Pulses more than equations when some are added: what they make needless goes back to nothing; rounds of that."""
 
-SPARE = 2
-"""Pulses more than equations when some are added: what they make needless goes back to nothing."""
-
-ADDITIONS = 2
-"""Rounds in which pulses are added."""
-
-MOMENTS = 97
-"""Moments at which each channel is priced."""
+MOMENTS, SMALL = 97, 1e-6
+"""Moments at which each channel is priced, by an impulse of that share of all there is to do."""
 
 GAIN = 1e-4
 """Share of the cost that is worth another round, and by which two schedules differ."""
 
-BEST = 8
-"""Schedules that go on to the next stage."""
+FOUND, EXACT = 1e-6, 1e-10
+"""Largest miss, over |H|, of a schedule of ideal impulses, and of one flown through real widths."""
 
-FOUND = 1e-6
-"""Largest miss, over |H|, of a schedule of ideal impulses."""
-
-EXACT = 1e-10
-"""Largest miss, over |H|, of a schedule flown through real widths."""
-
-NEAR = 1.03
-"""Schedules of ideal impulses so much dearer than the best go on to the true motion."""
-
-NEEDLESS = 1e-3
-"""Share of all there is to do below which a pulse may be left out."""
-
-NOTHING = 1e-10
-"""Share of all there is to do below which a pulse is left out even where nothing makes good for it."""
-
-HALF = 0.5
-"""Share of the least on-time from which a pulse is lengthened to it; shorter ones are left out."""
+NEEDLESS, NOTHING = 1e-3, 1e-10
+"""Shares of all there is to do below which a pulse may be left out, and is even where nothing makes good for it."""
 
 WIDE, MOST_KICKS = 0.25, 24
 """Angle of the faster turn, rad, from which pulses are first taken as several kicks, and the most of them."""
 
-CLOSE = 1e-5
-"""Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended."""
-
-MOVES, FEWEST_MOVES = 30, 3
-"""Steps of such a descent, over the number of pulses, and the fewest."""
-
-SMALL = 1e-6
-"""The impulse that is priced, as a share of all there is to do."""
+CLOSE, MOVES, FEWEST_MOVES = 1e-5, 30, 3
+"""Barrier of the bounds from which a schedule that is nearly the cheapest nearby is descended, steps of such a descent,
+over the number of pulses, and the fewest."""
 
 
 class Starts(NamedTuple):
@@ -104,7 +78,9 @@ def schedules(task: Task, known: Iterable[Schedule] = ()) -> list[Schedule]:
         added = _added(task, best, _pulses(task, SPARE), rng)
         if added is None:
             break
-        more = _descended(task, added, 1e-2, 50)
+        descent = Descent(task, *added, kicks=1, barrier=1e-2)
+        descent.run(50)
+        more = _best(descent)
         if not len(more.left) or more.cost[0] > best.cost[0] * (1.0 - GAIN):
             break
         best = more
@@ -116,9 +92,8 @@ def cheapened(task: Task, schedule: Schedule) -> Schedule | None:
 
     Its sequence of channels stays, and what it leaves too.
     """
-    which, t, on = _moments_of(task, schedule)
-    every = Moments(which[None], t[None], on[None])
-    starts = laid_out(task, every, np.array([channel.min_on_time for channel in task.channels])[every.which])
+    every = Moments._make(part[None] for part in _moments_of(task, schedule))
+    starts = laid_out(task, every, task.shortest[every.which])
     if not len(starts.x):
         return None
     descent = Descent(task, *starts, kicks=0, barrier=CLOSE)
@@ -198,29 +173,23 @@ class _Best(NamedTuple):
     prices: Vector
 
 
-def _best(descent: Descent, most: float = FOUND) -> _Best:
+def _best(descent: Descent) -> _Best:
     cost, left = descent.cost, descent.left
     chosen: list[int] = []
     for row in np.argsort(cost, kind="stable").tolist():
-        if left[row] < most and all(abs(cost[row] - cost[other]) > GAIN * cost[other] for other in chosen):
+        if left[row] < FOUND and all(abs(cost[row] - cost[other]) > GAIN * cost[other] for other in chosen):
             chosen.append(row)
     rows = np.array(chosen[:BEST], dtype=int)
     state = descent.state.of(rows)
     return _Best(descent.sequences.of(rows), state.x, cost[rows], left[rows], state.prices)
 
 
-def _descended(task: Task, starts: Starts, barrier: float, steps: int) -> _Best:
-    descent = Descent(task, *starts, kicks=1, barrier=barrier)
-    descent.run(steps)
-    return _best(descent)
-
-
 def _screened(task: Task, starts: Starts) -> _Best:
-    """The best of very many: in each round some steps, after which only the better part goes on."""
+    """The best of very many: in each round some steps, after which only the better part, misses and all, goes on."""
     descent = Descent(task, *starts, kicks=1)
     for steps, share in ROUNDS:
         descent.run(steps)
-        score = np.nan_to_num(descent.cost / task.least + UNMET_COST * descent.left, nan=np.inf)
+        score = np.nan_to_num(descent.cost / task.least + 100.0 * descent.left, nan=np.inf)
         descent.keep(np.argsort(score, kind="stable")[: max(int(share * len(score)), 1)])
     return _best(descent)
 
@@ -255,10 +224,7 @@ def _added(task: Task, best: _Best, pulses: int, rng: np.random.Generator) -> St
 
 
 def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Vector) -> Vector:
-    """Saving of a sequence's cost by a small impulse of each channel at moments ``t`` (k,), (channels, k), over all.
-
-    By the prices of the equations: its change in them, less its cost.
-    """
+    """Saving of a sequence's cost by a small impulse of each channel at moments ``t`` (k,), (channels, k), over all."""
     count, n = len(which), len(task.channels) * len(t)
     channel, moment = np.repeat(np.arange(len(task.channels)), len(t)), np.tile(t, len(task.channels))
     centres = x[:count] + 0.5 * x[count : 2 * count]
@@ -274,6 +240,7 @@ def _worth(task: Task, which: NDArray[np.int_], x: Vector, prices: Vector, t: Ve
     loose = np.tile(x[2 * count :], (n, 1))
     there = task.misses(among(which, channel), np.hstack([start, on, loose]), 1)
     here = task.misses(which[None], x[None], 1)
+    # By the prices of the equations: its change in them, less its cost.
     worth = -(there - here) / SMALL @ prices - (task.costs * task.unit / task.least)[channel]
     return np.asarray(worth.reshape(len(task.channels), len(t)))
 
@@ -282,21 +249,18 @@ def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
     given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
-    near = int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0  # the cheapest come first
+    near = int(np.count_nonzero(best.cost <= 1.03 * best.cost[0])) if ideal else 0  # the cheapest come first
     flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(task, ideal[near:])
     spare = [len(_needed(task, moments).which) < len(moments.which) for moments in flown]
     lean = [moments for moments, more in zip(flown, spare, strict=True) if not more]
     lean += _on_the_true_motion(task, [moments for moments, more in zip(flown, spare, strict=True) if more])
-    most = min((_price(task, moments) for moments in lean), default=math.inf) * (1.0 - GAIN)
-    kept = [
-        *lean,
-        *(moments for moments, more in zip(flown, spare, strict=True) if more and _price(task, moments) < most),
-    ]
-    return [_schedule(task, moments) for moments in sorted(kept, key=lambda moments: _price(task, moments))]
 
+    def price(moments: Moments) -> float:
+        return float(task.price(moments.which, moments.on))
 
-def _price(task: Task, moments: Moments) -> float:
-    return float(task.price(moments.which, moments.on))
+    most = min(map(price, lean), default=math.inf) * (1.0 - GAIN)
+    kept = lean + [moments for moments, more in zip(flown, spare, strict=True) if more and price(moments) < most]
+    return [_schedule(task, moments) for moments in sorted(kept, key=price)]
 
 
 def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
@@ -306,8 +270,7 @@ def _on_the_true_motion(task: Task, every: Sequence[Moments]) -> list[Moments]:
     for count in sorted({len(moments.which) for moments in fewer} - {0}):
         alike = [moments for moments in fewer if len(moments.which) == count]
         together = Moments(*(np.array(part) for part in zip(*alike, strict=True)))
-        least = np.array([channel.min_on_time for channel in task.channels])[together.which]
-        starts = laid_out(task, together, least)
+        starts = laid_out(task, together, task.shortest[together.which])
         if len(starts.x):
             barrier, widest = 1e-4, float(np.max(together.on)) / task.pace
             if widest > WIDE:  # kicks fly faster than the true motion
@@ -344,8 +307,7 @@ def _schedule(task: Task, moments: Moments) -> Schedule:
 
 def _needed(task: Task, moments: Moments) -> Moments:
     """One sequence (n,) without needless pulses, and with pulses of a channel that touch as one."""
-    least = np.array([channel.min_on_time for channel in task.channels])
-    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], HALF * least[moments.which])
+    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], 0.5 * task.shortest[moments.which])
     moments = Moments(*(part[kept] for part in moments))
     which, start, on = moments.which.tolist(), (moments.t - 0.5 * moments.on).tolist(), moments.on.tolist()
     for number in reversed(range(1, len(which))):

@@ -23,7 +23,7 @@ from nutdamp.schemes.optimal.bounds import Allowed
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
-from nutdamp.spacecraft.constraints import Windows, rounded_off, usable
+from nutdamp.spacecraft.constraints import Windows, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_pulse
@@ -34,15 +34,9 @@ UNMET = 1e-7
 REPAIRS = 60
 """Rounds in which burns that break a limit are moved elsewhere."""
 
-THRIFT = 0.004
-"""Share of the least cost that is given away for fewer pulses."""
-
-GAIN = 0.0005
-"""Share of the cost given away where there are few, and share that is not worth another search."""
-
-
-class Unrepairable(Exception):
-    """No burns were found that keep on-times, gap and max_pulses all at once."""
+THRIFT, GAIN = 0.004, 0.0005
+"""Shares of the least cost that are given away for fewer pulses, where there are many and where few: so little is not
+worth another search."""
 
 
 def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) -> Solution:
@@ -67,38 +61,32 @@ def thinned(program: Program, solution: Solution, cost: float, *, fewest: bool) 
     return best
 
 
-def repaired(program: Program, solution: Solution) -> Solution:
+def repaired(program: Program, solution: Solution) -> Solution | None:
     """The solution, once none of its burns breaks a limit: where one does, its slots are forbidden.
 
-    Where that leaves too little, burns longer than their channel may be on become several side by side.
-    Raises Unrepairable.
+    Where that leaves too little, burns longer than their channel may be on become several side by side. None where no
+    burns were found that keep on-times, gap and max_pulses all at once.
     """
     allowed = program.forbidden.copy()
-    try:
-        return _repaired(program, solution)
-    except Unrepairable:
+    kept = _repaired(program, solution)
+    if kept is None:
         program.forbidden = allowed
-        if not _divide(program, solution.burns):
-            raise
-    return _repaired(program, program.solve())
+        kept = _repaired(program, program.solve()) if _divide(program, solution.burns) else None
+    return kept
 
 
-def _repaired(program: Program, solution: Solution) -> Solution:
-    """The solution with what breaks a limit moved to other slots. Raises Unrepairable."""
-    if solution.unmet > UNMET:
-        raise Unrepairable
+def _repaired(program: Program, solution: Solution) -> Solution | None:
+    """The solution with what breaks a limit moved to other slots."""
     for _ in range(REPAIRS):
-        if work.exhausted():
-            raise Unrepairable
+        if solution.unmet > UNMET or work.exhausted():
+            return None
         broken = next(broken_by(program, solution.burns), None)
         if broken is None:
             return solution
         program.forbid(*broken)
         near = program.solve(program.about(solution.burns))
         solution = near if near.unmet <= UNMET else program.solve()
-        if solution.unmet > UNMET:
-            raise Unrepairable
-    raise Unrepairable
+    return None
 
 
 def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
@@ -109,8 +97,10 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     every = np.arange(len(program.centres))
     divided = False
     for row, channel in enumerate(program.channels):
-        long = sorted((burn for burn in burns if burn.channel is channel and _too_long(burn)), key=lambda burn: burn.t)
-        window = math.floor(channel.max_on_time / program.width + TOUCHING) if long else 0
+        most = channel.max_on_time
+        long = [burn for burn in burns if burn.channel is channel and burn.on_time > most + TOUCHING]
+        long.sort(key=lambda burn: burn.t)
+        window = math.floor(most / program.width + TOUCHING) if long else 0
         if window == 0:
             continue
         divided = True
@@ -128,16 +118,12 @@ def _divide(program: Program, burns: tuple[Burn, ...]) -> bool:
     return divided
 
 
-def _too_long(burn: Burn) -> bool:
-    return burn.on_time > burn.channel.max_on_time + TOUCHING
-
-
 def broken_by(program: Program, burns: tuple[Burn, ...]) -> Iterator[tuple[Channel | None, float, float]]:
     """Spans to forbid, s: ends of too long burns, too short ones, the less of two too near, the least if too many."""
     limits, width = program.spacecraft.limits, program.width
     for burn in burns:
         longest, shortest = burn.channel.max_on_time, burn.channel.min_on_time
-        if _too_long(burn):
+        if burn.on_time > longest + TOUCHING:
             reach = burn.on_time + width
             yield burn.channel, burn.t - reach, burn.t - 0.5 * longest + 0.5 * width
             yield burn.channel, burn.t + 0.5 * longest - 0.5 * width, burn.t + reach
@@ -170,18 +156,9 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
 LEFT = math.radians(1e-6)
 """Largest nutation and distance from the target, rad, and spin error, as a share, of a plan."""
 
-LATEST = 64.0
-"""Multiple of the horizon up to which a feasible one is looked for, to name it."""
-
-SHARPEST = 1e-3
-"""Relative accuracy of a least time by the program of small angles."""
-
-NAMED = 5e-3
-"""Relative accuracy of a least time that is only advice."""
-
-
-DEARER = 0.03
-"""Share above the program's least cost from which shorter horizons are looked at too."""
+SHARPEST, DEARER = 1e-3, 0.03
+"""Relative accuracy of a least time by the program of small angles, and the share above its least cost from which
+shorter horizons are looked at too."""
 
 
 class Problem:
@@ -194,13 +171,12 @@ class Problem:
         if requested and not any(channel.axial for channel in self.channels):
             raise Infeasible(NO_AXIAL)
         self.equations = EndEquations(shift=not options.free_axis, spin=requested)
-        flows = [channel.mass_flow for channel in self.channels]
-        known = [flow for flow in flows if flow is not None]
-        if options.least != "impulse" and len(known) == len(flows):
-            self.costs, self.unit = np.array(known), "kg"
-        else:
-            self.costs = np.array([channel.strength for channel in self.channels])
-            self.unit = "N m s"
+        in_kg = options.least != "impulse" and all(channel.mass_flow is not None for channel in self.channels)
+        self.unit = "kg" if in_kg else "N m s"
+        prices = {channel.name: channel.mass_flow if in_kg else channel.strength for channel in spacecraft.channels}
+        # Cost per second of every channel of which it is known.
+        self.prices = {name: price for name, price in prices.items() if price is not None}
+        self.costs = np.array([self.prices[channel.name] for channel in self.channels])
         self._dynamics = make_dynamics(spacecraft).remembering()
 
     def flown(self, schedule: Schedule) -> Flight:
@@ -232,14 +208,13 @@ class Problem:
         known = program.reachable()
         return program.solve(enough=True).unmet <= UNMET if known is None else known
 
-    def least_horizon(self, low: float, high: float, sharp: float = SHARPEST) -> float:
-        """Between ``low`` (infeasible) and ``high`` (feasible) s, the earliest end that small angles allow.
-
-        To a share ``sharp`` of it, and feasible.
-        """
+    def least_horizon(
+        self, low: float, high: float, sharp: float = SHARPEST, feasible: Callable[[float], bool] | None = None
+    ) -> float:
+        """The earliest ``feasible`` end (to small angles) from ``low`` to ``high`` s, to a share ``sharp`` of it."""
         while high - low > sharp * high:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.feasible(middle) else (middle, high)
+            low, high = (low, middle) if (feasible or self.feasible)(middle) else (middle, high)
         return high
 
     def overtaxed(self, solution: Solution) -> dict[str, float]:
@@ -255,34 +230,22 @@ class Problem:
         program = self.program()
         first = first or program.solve()
         least = None if first.unmet > UNMET else bounds.first_order(program, first.prices).bound
-        keeping = self._keeping() if self.options.free_axis and not work.exhausted() else None
-        return Schedule(
-            schedule.pulses, schedule.notes, Bounds(least, self.rigorous(schedule), self.unit, program.end, keeping)
-        )
-
-    def _keeping(self) -> float | None:
-        """The first-order least cost of a schedule that keeps H; None where there is none."""
-        program = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
-        solution = program.solve()
-        return None if solution.unmet > UNMET else bounds.first_order(program, solution.prices).bound
+        keeping = None
+        if self.options.free_axis and not work.exhausted():
+            still = self.program(equations=EndEquations(shift=True, spin=self.equations.spin))
+            kept = still.solve()
+            keeping = None if kept.unmet > UNMET else bounds.first_order(still, kept.prices).bound
+        lower = Bounds(least, self.rigorous(schedule), self.unit, program.end, keeping)
+        return Schedule(schedule.pulses, schedule.notes, lower)
 
     def rigorous(self, schedule: Schedule) -> float | None:
         """Lower bound of the cost of schedules that leave no more than this one; None where none is known."""
-        body = self.spacecraft
-        left = self.leaves(self.flown(schedule))
-        return bounds.rigorous(body, self.prices(), self.price(schedule), left, shift=self.equations.shift)
-
-    def prices(self) -> dict[str, float]:
-        """Cost per second, in the unit of the bounds, of every channel of which it is known."""
-        flows = {channel.name: channel.mass_flow for channel in self.spacecraft.channels}
-        if self.unit == "kg":
-            return {name: flow for name, flow in flows.items() if flow is not None}
-        return {channel.name: channel.strength for channel in self.spacecraft.channels}
+        left, cost = self.leaves(self.flown(schedule)), self.price(schedule)
+        return bounds.rigorous(self.spacecraft, self.prices, cost, left, shift=self.equations.shift)
 
     def price(self, schedule: Schedule) -> float:
         """Cost of a schedule by the program's own prices."""
-        price = {channel.name: cost for channel, cost in zip(self.channels, self.costs, strict=True)}
-        return math.fsum(price[pulse.channel] * pulse.on_time for pulse in schedule)
+        return math.fsum(self.prices[pulse.channel] * pulse.on_time for pulse in schedule)
 
     def worth(self, schedule: Schedule) -> float:
         """Quantity to be least: the cost, or the number of pulses."""
@@ -308,15 +271,17 @@ class Problem:
         off = residual.axis_error if self.equations.shift else 0.0
         return Allowed(residual.nutation, off, 0.0 if goal.spin is None else abs(flown.settled.spin / goal.spin - 1.0))
 
-    def rounded(self, schedule: Schedule) -> float:
-        """End error by starts and on-times on ticks, rad, root sum square; zero without ticks."""
-        return math.hypot(*rounded_off(self.spacecraft, schedule))
-
     def not_found(self) -> str:
         """Reason for no schedule although the program has solutions: the limits that it does not know of."""
-        if too_few := self._too_few():
-            return too_few
-        limits = self.spacecraft.limits
+        body, limits = self.spacecraft, self.spacecraft.limits
+        if limits.max_pulses is not None and body.inertia.symmetric and body.growth == 0.0 and not body.disturbances:
+            most = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
+            if limits.max_pulses * most < body.least_impulse:
+                return (
+                    f"limits.max_pulses = {limits.max_pulses} is too few: so many pulses give at most "
+                    f"{100.0 * limits.max_pulses * most / body.least_impulse:.4g} % of the impulse that takes out the "
+                    f"nutation, {math.ceil(body.least_impulse / most)} pulses or more all of it"
+                )
         shortest = max(channel.min_on_time for channel in self.channels)
         longest = min(channel.max_on_time for channel in self.channels)
         kept = {
@@ -331,66 +296,3 @@ class Problem:
             "not found: for small angles, without other limits than the horizon, there are schedules; on the true "
             f"motion none was found with {', '.join(named)}; shorter horizons were tried too, a longer one may help"
         )
-
-    def _too_few(self) -> str:
-        """Reason that max_pulses pulses cannot give the impulse needed; empty where that is not known."""
-        body, most = self.spacecraft, self.spacecraft.limits.max_pulses
-        if most is None or not body.inertia.symmetric or body.growth != 0.0 or body.disturbances:
-            return ""
-        largest = max(abs(channel.transverse) * channel.max_on_time for channel in self.channels)
-        if most * largest >= body.least_impulse:
-            return ""
-        return (
-            f"limits.max_pulses = {most} is too few: so many pulses give at most "
-            f"{100.0 * most * largest / body.least_impulse:.4g} % of the impulse that takes out the nutation, "
-            f"{math.ceil(body.least_impulse / largest)} pulses or more all of it"
-        )
-
-    def cure(self, long_enough: Callable[[float], float | None]) -> str:
-        """Reason for a program without solution, and the limit to relax; ``long_enough``: see `relaxed`."""
-        body = self.spacecraft
-        names, horizon = ", ".join(channel.name for channel in self.channels), body.horizon
-        nutation = EndEquations(shift=False)
-        left = self.program(body, nutation).solve().unmet
-        if left <= UNMET:
-            failing = "H cannot be kept where it is" if body.goal.axis is None else "H cannot be brought to the target"
-            if (
-                self.equations.spin
-                and self.program(body, EndEquations(shift=self.equations.shift)).solve().unmet <= UNMET
-            ):
-                failing = "the spin cannot be brought to the rate of the goal"
-            out = "the nutation can be taken out, but " if body.transverse_rate > 0.0 else ""
-            what = f"within {horizon:.4g} s {out}{failing}"
-        else:
-            what = (
-                f"within {horizon:.4g} s the channels ({names}) cannot take out the nutation, "
-                f"{100.0 * min(left, 1.0):.3g} % of it stays"
-            )
-        return f"{what}; {self.relaxed(long_enough)}"
-
-    def relaxed(self, long_enough: Callable[[float], float | None]) -> str:
-        """The limit that has to be relaxed, and how far.
-
-        ``long_enough`` gives a horizon in which a schedule was found, s, no shorter than the one with which the program
-        has a solution; None where it found none.
-        """
-        body = self.spacecraft
-        horizon = later = body.horizon
-        while later < LATEST * horizon:
-            if work.exhausted():
-                return f"horizons of more than {later:.4g} s were not tried"
-            later *= 2.0
-            if self.feasible(later):
-                needed = self.least_horizon(0.5 * later, later, NAMED)
-                enough = long_enough(needed)
-                if enough is not None:
-                    return f"limits.horizon = {enough:.4g} s is long enough"
-                return (
-                    f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
-                    f"without other limits)"
-                )
-        if body.limits.blackout:
-            free = replace(body, limits=replace(body.limits, blackout=()))
-            if self.program(free).solve().unmet <= UNMET:
-                return "shorten the blackout windows (without any it can be done)"
-        return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"

@@ -1,28 +1,23 @@
 """Equations of the end errors, refinement of a schedule on its flight, rounding to ticks.
 
 Five equations at most, all in N m s: nutation (two: the transverse momentum A ω, turned back to t = 0), momentum shift
-(two, square to the target axis) and spin (one). Before anything is planned they are those of small angles; after that
-those along a flight, at its true angles.
+(two, square to the target axis) and spin (one); first those of small angles, then those along a flight.
 
 Refinement moves and lengthens pulses until the flown motion leaves nothing: a quasi-Newton iteration for the nearest
-solution. Its slopes are those of the equations, which cost no flights, corrected at each step (Broyden 1965). Room is
-shared between neighbours beforehand, so that no limit can be broken.
-
-On ticks, starts and on-times are stepped to and fro, two pulses at a time, by the linear model of the end error, which
-is taken anew about the ticks reached: each pulse rounded on its own leaves the effect of half a tick.
+solution, with the slopes of the equations, which cost no flights, corrected at each step (Broyden 1965). On ticks,
+starts and on-times are stepped to and fro, two pulses at a time, by the linear model of the end error.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.schemes.correction import bounded_step
@@ -30,14 +25,9 @@ from nutdamp.spacecraft.constraints import Windows, longest_on_time, rooms
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 
-MOST_GROWN = 14.0
-"""Exponent of growth or decay beyond which nothing is left of the nutation, or all is lost.
-
-A millionth is left then, which takes pulses that a clock still resolves.
-"""
-
-KNOTS = 400
-"""Even moments, besides the edges of pulses, at which ω3 is read from a flight with dissipation."""
+MOST_GROWN, KNOTS = 14.0, 400
+"""Exponent of growth or decay beyond which nothing (a millionth, of pulses that a clock still resolves) is left of the
+nutation, or all is lost; even moments, besides the edges of pulses, at which ω3 is read from a flight with it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +119,7 @@ def along(flight: Flight, equations: EndEquations, step: float) -> Influence:
         return _all_rows(back, np.stack(columns, axis=-1))[:, equations.chosen]
 
     here = Influence(rows, np.zeros(0), _turning(flight.spacecraft)[equations.chosen])
-    return Influence(rows, here.of(flight.schedule, step) - misses(flight, equations), here.turning)
+    return replace(here, goal=here.of(flight.schedule, step) - misses(flight, equations))
 
 
 def misses(flight: Flight, equations: EndEquations) -> Vector:
@@ -162,25 +152,19 @@ def _turned_back(flight: Flight, times: Vector) -> Vector:
     """e^{i∫ν dt}, and what dissipation adds until the end: turns ω at ``times`` (n,) s back to t = 0."""
     spacecraft, schedule = flight.spacecraft, flight.schedule
     inertia, drift = spacecraft.inertia, spacecraft.spin_drift
-    if spacecraft.growth != 0.0:
-        return _turned_back_by_flight(flight, times)
+    if spacecraft.growth != 0.0:  # dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly
+        knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
+        grown = np.minimum(-spacecraft.growth * (times - schedule.end), MOST_GROWN)
+        least, axial = math.exp(-MOST_GROWN) * abs(spacecraft.axial), inertia.axial(spins)
+        now, then = (np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, schedule.end))
+        phase = inertia.a * np.interp(times, knots, turned) - inertia.wheel / inertia.A * times
+        return np.asarray(np.exp(1j * phase + grown) * then / now)
     turned = (spacecraft.spin + 0.5 * drift * times) * times
     for pulse in schedule:
         if pulse.impulse[2] and pulse.on_time > 0.0:
             since, after = np.maximum(times - pulse.start, 0.0), np.maximum(times - pulse.end, 0.0)
             turned = turned + 0.5 * pulse.impulse[2] / (inertia.C * pulse.on_time) * (since**2 - after**2)
     return np.asarray(np.exp(1j * (inertia.a * turned - inertia.wheel / inertia.A * times)))
-
-
-def _turned_back_by_flight(flight: Flight, times: Vector) -> Vector:
-    """Factor `_turned_back` where dissipation changes ω3: on coasts ω/H3, or tan θ, grows by e^{κt} exactly."""
-    body, inertia = flight.spacecraft, flight.spacecraft.inertia
-    knots, spins, turned = _spins(flight, max(float(np.max(times)), flight.legs[-1].start))
-    grown = np.minimum(-body.growth * (times - flight.schedule.end), MOST_GROWN)
-    least, axial = math.exp(-MOST_GROWN) * abs(body.axial), inertia.axial(spins)
-    now, then = (np.maximum(np.abs(np.interp(at, knots, axial)), least) for at in (times, flight.schedule.end))
-    phase = inertia.a * np.interp(times, knots, turned) - inertia.wheel / inertia.A * times
-    return np.asarray(np.exp(1j * phase + grown) * then / now)
 
 
 @lru_cache(maxsize=2)
@@ -205,19 +189,42 @@ def _all_rows(nutation: Vector, shifts: Vector) -> Vector:
     return rows
 
 
-class PulseParameters:
-    """Centre and on-time of each pulse, as one vector: (c1, τ1, c2, τ2 …) s, its scale, and how far each may go."""
+REACH, TICK_STEPS, MODELS = 2.0, 300, 4
+"""Ticks that a start or on-time may lie from what it was before; steps of one tick, two pulses at a time, by one linear
+model; and linear models, each about the best ticks so far."""
 
-    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
+WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+"""A step: of the start, of the on-time."""
+
+
+CONVERGED, NEWTON_STEPS = 1e-13, 25
+"""Share of |H| that is left: a few roundings of the flight; steps in which that is reached, at most."""
+
+
+class Refinement:
+    """The ``schedule`` with centres and on-times of its pulses moved, as little as it takes, to meet ``equations``.
+
+    ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is to be left of them; ``step`` s
+    is for `Influence.of`. Settings x are (c1, τ1, c2, τ2 …) s, with their scale and how far each may go.
+    """
+
+    def __init__(
+        self,
+        spacecraft: Spacecraft,
+        schedule: Schedule,
+        equations: EndEquations,
+        aside: Vector,
+        step: float,
+        fly: Callable[[Schedule], Flight],
+    ) -> None:
+        self.spacecraft, self.original, self.equations = spacecraft, schedule, equations
+        self.aside, self.step, self.fly = aside, step, fly
+        self.size = float(np.linalg.norm(spacecraft.momentum))
         names = {channel.name: channel for channel in spacecraft.channels}
         self.channels = [names[pulse.channel] for pulse in schedule]
-        self.original = schedule
         pace = 1.0 / spacecraft.fastest
         self.room = rooms(spacecraft, schedule.pulses)
-        start: list[float] = []
-        scale: list[float] = []
-        lower: list[float] = []
-        upper: list[float] = []
+        start, scale, lower, upper = list[float](), list[float](), list[float](), list[float]()
         for pulse, channel, (begun, latest) in zip(schedule, self.channels, self.room, strict=True):
             before, after = max(pulse.start - begun, 0.0), max(latest - pulse.end, 0.0)
             start += [pulse.t, pulse.on_time]
@@ -229,66 +236,67 @@ class PulseParameters:
 
     def schedule(self, x: Vector) -> Schedule:
         """The schedule with these settings."""
-        pairs = x.reshape(-1, 2)
-        pulses = (
-            channel_pulse(channel, float(t), float(on)) for channel, (t, on) in zip(self.channels, pairs, strict=True)
-        )
-        return Schedule(tuple(pulses), self.original.notes, self.original.bounds)
+        pairs = zip(self.channels, x.reshape(-1, 2).tolist(), strict=True)
+        return replace(self.original, pulses=tuple(channel_pulse(channel, t, on) for channel, (t, on) in pairs))
 
-    def slopes(self, schedule: Schedule, flown: propagation.Flight, equations: EndEquations, step: float) -> Vector:
-        """Slopes of the equations by the scaled parameters, (equations, 2k) N m s."""
-        rows = along(flown, equations, step).rows
+    def left(self, schedule: Schedule) -> tuple[Vector, Flight]:
+        """Misses of a schedule beyond what is to be left, (equations,), over |H|, and its flight."""
+        flown = self.fly(schedule)
+        return (misses(flown, self.equations) - self.aside) / self.size, flown
+
+    def slopes(self, schedule: Schedule, flown: Flight) -> Vector:
+        """Slopes of what is left by the scaled parameters, (equations, 2k)."""
+        rows = along(flown, self.equations, self.step).rows
         columns = []
         begins, ends = (rows(np.array(times)) for times in zip(*((p.start, p.end) for p in schedule), strict=True))
         for index, channel in enumerate(self.channels):
             on, off = begins[index] @ channel.torque, ends[index] @ channel.torque
             columns += [off - on, 0.5 * (on + off)]
-        return np.asarray(np.column_stack(columns) * self.scale)
+        return np.asarray(np.column_stack(columns) * self.scale / self.size)
 
+    def refined(self) -> Schedule:
+        """The schedule that leaves least; how little is for the caller to judge."""
+        x = self.start
+        value, flown = self.left(self.original)
+        slopes = self.slopes(self.original, flown)
+        for _ in range(NEWTON_STEPS):
+            norm = float(np.linalg.norm(value))
+            if norm <= CONVERGED:
+                break
+            move = bounded_step(slopes, value, x, self.scale, self.lower, self.upper)
+            for shrink in range(5):
+                trial = np.clip(x + move * 0.5**shrink, self.lower, self.upper)
+                following, _ = self.left(self.schedule(trial))
+                if np.linalg.norm(following) < norm:
+                    break
+            moved = (trial - x) / self.scale
+            if not moved.any():
+                break
+            slopes = slopes + np.outer(following - value - slopes @ moved, moved) / (moved @ moved)
+            if np.linalg.norm(following) >= norm:
+                break
+            x, value = trial, following
+        return self.schedule(x) if self.spacecraft.limits.tick is None else self._on_ticks(x)
 
-REACH = 2.0
-"""Ticks that a start or on-time may lie from what it was before."""
-
-TICK_STEPS = 300
-"""Steps of one tick, two pulses at a time, by one linear model."""
-
-MODELS = 4
-"""Linear models, each about the best ticks so far."""
-
-WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-"""A step: of the start, of the on-time."""
-
-
-def on_ticks(
-    spacecraft: Spacecraft,
-    parameters: PulseParameters,
-    x: Vector,
-    left: Callable[[Schedule], tuple[Vector, Flight]],
-    slopes: Callable[[Schedule, Flight], Vector],
-) -> Schedule:
-    """The schedule of settings ``x`` (2k,) s of the ``parameters`` on ticks.
-
-    ``left`` gives what a schedule leaves (equations,) and its flight, ``slopes`` what the scaled parameters change
-    in it.
-    """
-    lattice = _Lattice(spacecraft, parameters, x)
-    ticks = lattice.rounded
-    best, least = parameters.schedule(lattice.settings(ticks)), np.inf
-    for _ in range(MODELS):
-        schedule = parameters.schedule(lattice.settings(ticks))
-        missing, flown = left(schedule)
-        size = float(np.linalg.norm(missing))
-        if size >= least:
-            break
-        best, least = schedule, size
-        ticks = lattice.stepped(ticks, missing, slopes(schedule, flown) / parameters.scale)
-    return best
+    def _on_ticks(self, x: Vector) -> Schedule:
+        lattice = _Lattice(self.spacecraft, self, x)
+        ticks = lattice.rounded
+        best, least = self.schedule(lattice.settings(ticks)), np.inf
+        for _ in range(MODELS):
+            schedule = self.schedule(lattice.settings(ticks))
+            missing, flown = self.left(schedule)
+            size = float(np.linalg.norm(missing))
+            if size >= least:
+                break
+            best, least = schedule, size
+            ticks = lattice.stepped(ticks, missing, self.slopes(schedule, flown) / self.scale)
+        return best
 
 
 class _Lattice:
     """Starts and on-times in ticks, (k, 2) each, and which of them may be commanded."""
 
-    def __init__(self, spacecraft: Spacecraft, parameters: PulseParameters, x: Vector) -> None:
+    def __init__(self, spacecraft: Spacecraft, parameters: Refinement, x: Vector) -> None:
         windows, channels = Windows(spacecraft), parameters.channels
         self.tick = spacecraft.limits.tick or 0.0
         centres, needed = x.reshape(-1, 2).T
@@ -333,57 +341,3 @@ class _Lattice:
                 ticks[pulse[index]] += start[index], on_time[index]
                 missing = missing + changes[:, index]
         return ticks
-
-
-CONVERGED = 1e-13
-"""Share of |H| that is left: a few roundings of the flight."""
-
-NEWTON_STEPS = 25
-
-
-def refine(
-    spacecraft: Spacecraft,
-    schedule: Schedule,
-    equations: EndEquations,
-    aside: Vector,
-    step: float,
-    fly: Callable[[Schedule], Flight],
-) -> Schedule:
-    """The ``schedule`` with centres and on-times of its pulses moved, as little as it takes, to meet ``equations``.
-
-    ``fly`` flies schedules of the ``spacecraft``; ``aside`` (equations,) N m s is what is to be left of them. What it
-    leaves is for the caller to judge.
-    """
-    parameters = PulseParameters(spacecraft, schedule)
-    size = float(np.linalg.norm(spacecraft.momentum))
-
-    def left(schedule: Schedule) -> tuple[Vector, Flight]:
-        flown = fly(schedule)
-        return (misses(flown, equations) - aside) / size, flown
-
-    def slopes_of(schedule: Schedule, flown: Flight) -> Vector:
-        return parameters.slopes(schedule, flown, equations, step) / size
-
-    x = parameters.start
-    value, flown = left(schedule)
-    slopes = slopes_of(schedule, flown)
-    for _ in range(NEWTON_STEPS):
-        norm = float(np.linalg.norm(value))
-        if norm <= CONVERGED:
-            break
-        move = bounded_step(slopes, value, x, parameters.scale, parameters.lower, parameters.upper)
-        for shrink in range(5):
-            trial = np.clip(x + move * 0.5**shrink, parameters.lower, parameters.upper)
-            following, _ = left(parameters.schedule(trial))
-            if np.linalg.norm(following) < norm:
-                break
-        moved = (trial - x) / parameters.scale
-        if not moved.any():
-            break
-        slopes = slopes + np.outer(following - value - slopes @ moved, moved) / (moved @ moved)
-        if np.linalg.norm(following) >= norm:
-            break
-        x, value = trial, following
-    if spacecraft.limits.tick is None:
-        return parameters.schedule(x)
-    return on_ticks(spacecraft, parameters, x, left, slopes_of)

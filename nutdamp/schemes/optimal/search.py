@@ -1,10 +1,8 @@
 """The search for the least-cost schedule: no nutation left, H on its target, the spin as requested.
 
-The program of `linear_program` chooses burns, at first with small angles. The schedule is flown, the equations of the
-program are taken anew along that flight at its true angles, and so on until the flight leaves little; then centres and
-on-times are refined on it. Where that fails, where the horizon is no longer than a few nutation periods and where the
-schedule is dear, `multistart` looks for a cheaper one from very many starts. Two bounds go with the plan: the first
-least cost of the program, of first order, and a rigorous one.
+The program of `linear_program` chooses burns, at first with small angles. The schedule is flown, the program is aimed
+anew along that flight at its true angles, and so on until little is left; then centres and on-times are refined on it.
+Where that fails, where the horizon is short and where the schedule is dear, `multistart` looks for a cheaper one.
 """
 
 from __future__ import annotations
@@ -22,28 +20,24 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import OptimalOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.optimal import alternatives, multistart, refinement
-from nutdamp.schemes.optimal.alternatives import by_other_schemes, elsewhere, hastened, spin_changes
+from nutdamp.schemes.optimal.alternatives import by_other_schemes, hastened, spin_changes
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Burn, Program, Solution
-from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, Unrepairable, as_pulses, repaired, thinned
-from nutdamp.schemes.optimal.refinement import refine
+from nutdamp.schemes.optimal.problem import GAIN, LEFT, UNMET, Problem, as_pulses, repaired, thinned
+from nutdamp.schemes.optimal.refinement import EndEquations, Refinement
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import keeps_limits, shortest_on_time
+from nutdamp.spacecraft.constraints import keeps_limits, rounded_off, shortest_on_time
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
-CHOICES = 3
-"""Choices of burns among all channels and moments: at small angles, then along the flight before."""
+CHOICES, AIMS = 3, 8
+"""Choices of burns among all channels and moments: at small angles, then along the flight before; and flights along
+which those chosen are corrected, at most."""
 
-AIMS = 8
-"""Flights along which the burns chosen are corrected, at most."""
-
-LOST = 0.5
-"""Share of what there is to do that corrected burns may fail to supply before others are chosen."""
-
-DEAR = 0.01
-"""Share above the program's least cost from which all channels and moments are looked at again."""
+LOST, DEAR = 0.5, 0.01
+"""Share of what there is to do that corrected burns may fail to supply, and share above the program's least cost, from
+which others are chosen."""
 
 FEW, SAVED = 2, 0.001
 """Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
@@ -51,32 +45,21 @@ FEW, SAVED = 2, 0.001
 WAYS = 3
 """Schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks."""
 
-SHORT = 4.0
-"""Inertial nutation periods up to which very many starts are tried."""
+SHORT, STRONG = 4.0, 0.3
+"""Inertial nutation periods up to which very many starts are tried, and within which a strong channel does all."""
 
-STRONG = 0.3
-"""Inertial periods within which a strong channel does all there is to do."""
-
-PROVED = 0.002
-"""Share above the rigorous bound below which very many starts are not tried."""
-
-EQUAL = 1e-6
-"""Share above the rigorous bound below which schedules that keep H are not tried."""
+PROVED, EQUAL = 0.002, 1e-6
+"""Shares above the rigorous bound below which very many starts, and schedules that keep H, are not tried."""
 
 HALVINGS = 3
 """Shorter horizons that are looked at where there is a schedule already."""
 
-MOST_LOOSE = 5000.0
-"""Units that may be spent where H may move, so that some are left for schedules that keep it."""
-
 HASTE = 0.0008
 """Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
 
-NEAR = 0.05
-"""End error, rad, below which a flight is refined."""
-
-NEARLY = 0.05
-"""Share of the tightest bound that a schedule may leave where none leaves nothing."""
+NEAR, NEARLY = 0.05, 0.05
+"""End error, rad, below which a flight is refined; share of the tightest bound that a schedule may leave where none
+leaves nothing."""
 
 SHARP = 0.02
 """Relative accuracy of a least time by schedules found."""
@@ -84,12 +67,14 @@ SHARP = 0.02
 MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """Shares added to the program's least time, tried in turn."""
 
+TRIED, LATER = 6, 4.0
+"""Margins tried to name a horizon that is long enough, and the longest one, over the default: looking takes long."""
 
-TRIED = 6
-"""Margins tried to name a horizon that is long enough."""
+LATEST, NAMED = 64.0, 5e-3
+"""Multiple of the horizon up to which a feasible one is looked for, to name it, and its relative accuracy."""
 
-LATER = 4.0
-"""Longest horizon so tried, over the default one: longer ones take long to look through."""
+ELSEWHERE, MOST_ELSEWHERE = (0.85, 0.7, 0.55, 0.4), 1500.0
+"""Shares of the horizon that are tried in turn where a schedule is dear or was not found, and units for them."""
 
 
 def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
@@ -97,7 +82,11 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
 
     Raises Infeasible where the program has no solution, naming the limit to relax, or where no schedule was found.
     """
-    search = _LeastCostSearch(_before_it_fades(spacecraft), options)
+    if spacecraft.growth < 0.0:  # once a millionth of the nutation is left, waiting costs ever less
+        faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
+        limits = replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded))
+        spacecraft = replace(spacecraft, limits=limits)
+    search = _LeastCostSearch(spacecraft, options)
     simple = list(spin_changes(search.spacecraft, search.flown))
     if simple and options.least == "pulses":
         return search.with_bounds(search.preferred(simple))
@@ -112,14 +101,6 @@ def schedule(spacecraft: Spacecraft, options: OptimalOptions) -> Schedule:
         return search.with_bounds(search.preferred(simple))
     best = search.preferred([schedule, *simple])
     return schedule if best is schedule else search.with_bounds(best)
-
-
-def _before_it_fades(spacecraft: Spacecraft) -> Spacecraft:
-    """The spacecraft, its horizon cut where dissipation leaves a millionth of the nutation: waiting costs ever less."""
-    if spacecraft.growth >= 0.0:
-        return spacecraft
-    faded = spacecraft.limits.earliest - refinement.MOST_GROWN / spacecraft.growth
-    return replace(spacecraft, limits=replace(spacecraft.limits, horizon=min(spacecraft.horizon, faded)))
 
 
 def _fewest(search: _LeastCostSearch) -> Schedule:
@@ -183,18 +164,13 @@ class _LeastCostSearch(Problem):
             end = begin + span * (1.0 + margin)
             if end >= horizon:
                 break
-            if _LeastCostSearch(self.within(end), self.options).has_schedule():
+            if self.has_schedule(end):
                 high = end
                 break
             low = end
-        if high == horizon and not _LeastCostSearch(self.within(horizon), self.options).has_schedule():
+        if high == horizon and not self.has_schedule(horizon):
             return self  # shorter ones are looked at on the way to a schedule
-        while high - low > SHARP * high:
-            middle = 0.5 * (low + high)
-            low, high = (
-                (low, middle) if _LeastCostSearch(self.within(middle), self.options).has_schedule() else (middle, high)
-            )
-        return _LeastCostSearch(self.within(high), self.options)
+        return _LeastCostSearch(self.within(self.least_horizon(low, high, SHARP, self.has_schedule)), self.options)
 
     def preferred(self, schedules: Sequence[Schedule]) -> Schedule:
         """The schedule with least of the quantity to be saved, of ``schedules`` that all meet the requirement.
@@ -207,17 +183,53 @@ class _LeastCostSearch(Problem):
         equal = [schedule for schedule in schedules if spent(schedule) <= least * (1.0 + SAME_COST)]
         return min(equal, key=lambda schedule: (len(schedule), schedule.end))
 
-    def has_schedule(self) -> bool:
-        """True where a schedule is found with this very horizon."""
-        least = self.program().solve()
-        return least.unmet <= UNMET and self.settled(least.cost) is not None
+    def has_schedule(self, horizon: float) -> bool:
+        """True where a schedule is found with this very ``horizon``, s."""
+        search = _LeastCostSearch(self.within(horizon), self.options)
+        least = search.program().solve()
+        return least.unmet <= UNMET and search.settled(least.cost) is not None
 
     def cured(self) -> str:
         """Reason for a program without solution, and its cure: each that is named was tried, or says that not."""
-        goal, free = self.spacecraft.goal, replace(self.options, free_axis=True, shift=None)
+        body, goal, horizon = self.spacecraft, self.spacecraft.goal, self.spacecraft.horizon
+        free = replace(self.options, free_axis=True, shift=None)
         bound = self.equations.shift and goal.axis is None and goal.spin is None
-        freed = bound and not work.exhausted() and _LeastCostSearch(self.spacecraft, free).has_schedule()
-        return f"{self.cure(self.long_enough)}{', or use --free-axis' * freed}"
+        freed = bound and not work.exhausted() and _LeastCostSearch(body, free).has_schedule(horizon)
+        left = self.program(body, EndEquations(shift=False)).solve().unmet
+        if left > UNMET:
+            names = ", ".join(channel.name for channel in self.channels)
+            failing = f"the channels ({names}) cannot take out the nutation, {100.0 * min(left, 1.0):.3g} % of it stays"
+        else:
+            failing = "H cannot be kept where it is" if goal.axis is None else "H cannot be brought to the target"
+            without_spin = EndEquations(shift=self.equations.shift)
+            if self.equations.spin and self.program(body, without_spin).solve().unmet <= UNMET:
+                failing = "the spin cannot be brought to the rate of the goal"
+            if body.transverse_rate > 0.0:
+                failing = f"the nutation can be taken out, but {failing}"
+        return f"within {horizon:.4g} s {failing}; {self.relaxed()}{', or use --free-axis' * freed}"
+
+    def relaxed(self) -> str:
+        """The limit that has to be relaxed, and how far."""
+        body = self.spacecraft
+        horizon = later = body.horizon
+        while later < LATEST * horizon:
+            if work.exhausted():
+                return f"horizons of more than {later:.4g} s were not tried"
+            later *= 2.0
+            if self.feasible(later):
+                needed = self.least_horizon(0.5 * later, later, NAMED)
+                enough = self.long_enough(needed)
+                if enough is not None:
+                    return f"limits.horizon = {enough:.4g} s is long enough"
+                return (
+                    f"set limits.horizon to at least {needed:.4g} s ({needed - horizon:.3g} s more; by small angles, "
+                    f"without other limits)"
+                )
+        if body.limits.blackout:
+            free = replace(body, limits=replace(body.limits, blackout=()))
+            if self.program(free).solve().unmet <= UNMET:
+                return "shorten the blackout windows (without any it can be done)"
+        return f"not even {LATEST:g} times the horizon helps: channels of other directions or more torque are needed"
 
     def long_enough(self, needed: float) -> float | None:
         """A horizon in which a schedule is found, s, four digits: ``needed`` s by small angles, or a little more."""
@@ -228,7 +240,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted():
                 return None
             end = float(f"{needed * (1.0 + margin):.4g}")
-            if _LeastCostSearch(self.within(end), self.options).has_schedule():
+            if self.has_schedule(end):
                 return end
         return None
 
@@ -238,27 +250,22 @@ class _LeastCostSearch(Problem):
         if overtaxed := self.overtaxed(first):
             schedule = self.without(overtaxed).schedule()
             return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
-        with work.budget("a schedule as asked", MOST_LOOSE if self.looser else math.inf):
+        # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
+        looser = self.options.free_axis or self.options.shift is not None
+        with work.budget("a schedule as asked", 5000.0 if looser else math.inf):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
-        if self.looser and not work.exhausted() and not self.proved(best, EQUAL):
+        if looser and not work.exhausted() and not self.proved(best, EQUAL):
             still = self.keeping(best)
             best = still if self.astray(best) and not self.astray(still) else self.cheaper(best, still)
-        if best is None and first.unmet <= UNMET:
-            best = self.nearly()
+        if best is None and first.unmet <= UNMET:  # channels that stand still in space may leave a little
+            most = min(bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
+            there = [each for each in self.nearest if each.left <= NEARLY * most]
+            best = min(there, key=lambda each: each.price).schedule if there else None
         if best is None:
             raise Infeasible(self.cured() if UNMET < first.unmet < math.inf else self.not_found())
         return self.with_bounds(hastened(self, best, first, self.within_shorter), first)
-
-    def nearly(self) -> Schedule | None:
-        """The cheapest schedule so far that leaves a share `NEARLY` of the tightest bound.
-
-        For where none leaves nothing, as channels that stand still in space may not.
-        """
-        most = min(bound.most for bound in requirements.bounds(self.spacecraft) if bound.part is not Part.SPIN)
-        there = [each for each in self.nearest if each.left <= NEARLY * most]
-        return min(there, key=lambda each: each.price).schedule if there else None
 
     def keeping(self, best: Schedule | None) -> Schedule | None:
         """The cheapest schedule found that keeps H, or reaches the target; None where it would not replace the best."""
@@ -293,17 +300,19 @@ class _LeastCostSearch(Problem):
 
     def whole_or_shorter(self, first: Solution) -> Schedule | None:
         """The cheapest found over the whole horizon; where there is none, or a dear one, over less of it too."""
-        return elsewhere(self, self.cheapest(first), first, self.within_shorter)
+        best, begin, horizon = self.cheapest(first), self.spacecraft.limits.earliest, self.spacecraft.horizon
+        with work.budget("other ends", MOST_ELSEWHERE):
+            for share in ELSEWHERE if first.unmet <= UNMET else ():
+                sooner = begin + share * (horizon - begin)
+                if work.exhausted() or not self.dear(best, first.cost) or not self.feasible(sooner):
+                    break
+                best = self.cheaper(best, self.within_shorter(sooner))
+        return best
 
     def within_shorter(self, horizon: float) -> Schedule | None:
         """The cheapest schedule found within ``horizon`` s."""
         shorter = _LeastCostSearch(self.within(horizon), self.options)
         return shorter.cheapest(shorter.program().solve())
-
-    @property
-    def looser(self) -> bool:
-        """True where H may end elsewhere, so that a schedule that keeps it, or reaches the target, will do too."""
-        return self.options.free_axis or self.options.shift is not None
 
     def cheapest(self, first: Solution) -> Schedule | None:
         """The cheapest schedule found, where the program's ``first`` solution is this."""
@@ -333,9 +342,8 @@ class _LeastCostSearch(Problem):
 
     def cheapened(self, schedule: Schedule | None) -> Schedule | None:
         """The schedule after some steps down on the true motion, where that is known in closed form between pulses."""
-        if schedule is None or not len(schedule) or not self.closed or self.spacecraft.limits.tick is not None:
-            return schedule
-        if work.exhausted():
+        ticks = self.spacecraft.limits.tick is not None
+        if schedule is None or not len(schedule) or not self.closed or ticks or work.exhausted():
             return schedule
         other = multistart.cheapened(self.task(), schedule)
         if other is None or not keeps_limits(self.spacecraft, other.pulses) or self.left(self.flown(other)) > LEFT:
@@ -388,8 +396,10 @@ class _LeastCostSearch(Problem):
 
     def proved(self, schedule: Schedule | None, share: float) -> bool:
         """True where a schedule costs at most that ``share`` more than the rigorous bound."""
-        proof = None if schedule is None else self.rigorous(schedule)
-        return schedule is not None and proof is not None and self.price(schedule) <= proof * (1.0 + share)
+        if schedule is None:
+            return False
+        proof = self.rigorous(schedule)
+        return proof is not None and self.price(schedule) <= proof * (1.0 + share)
 
     def task(self) -> Task:
         """Task of the descents."""
@@ -397,22 +407,23 @@ class _LeastCostSearch(Problem):
 
     def descended(self, known: Schedule | None) -> Schedule | None:
         """The best schedule to which very many starts, and the one ``known``, descend on the true motion."""
-        candidates: list[_FlownSchedule] = []
         every = multistart.schedules(self.task(), () if known is None else (known,))
         if self.spacecraft.limits.tick is not None:
             every = [self.on_ticks(schedule) for schedule in every[:WAYS]]
-        for schedule in every:
-            left = self.left(self.flown(schedule))
-            if keeps_limits(self.spacecraft, schedule.pulses):
-                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.worth(schedule), schedule))
-        return self.best(candidates)
+        flown = [self.candidate(self.flown(schedule), self.worth(schedule)) for schedule in every]
+        return self.best([each for each in flown if keeps_limits(self.spacecraft, each.schedule.pulses)])
+
+    def candidate(self, flight: Flight, price: float) -> _FlownSchedule:
+        """The schedule of a flight, with its price."""
+        left = self.left(flight)
+        return _FlownSchedule(0.0 if left <= LEFT else left, price, flight.schedule)
 
     def on_ticks(self, schedule: Schedule) -> Schedule:
         """An exact schedule on the ticks of the commands."""
         missed = refinement.misses(self.flown(schedule), self.equations)
         off = missed[2:4] if self.options.shift is not None else np.zeros(2)
         aside = self.equations.beside(off)
-        return refine(self.spacecraft, schedule, self.equations, aside, self.program().width, self.flown)
+        return Refinement(self.spacecraft, schedule, self.equations, aside, self.program().width, self.flown).refined()
 
     def settled(self, least: float) -> Schedule | None:
         """The cheapest of the schedules on which the search settles from one choice of burns or another."""
@@ -443,8 +454,7 @@ class _LeastCostSearch(Problem):
             if work.exhausted() or (self.left(flights[-1]) <= LEFT and self.price(schedule) <= least * (1.0 + DEAR)):
                 break
         for way in sorted(flights, key=lambda flight: (self.left(flight) > LEFT, self.price(flight.schedule)))[:WAYS]:
-            left = self.left(way)
-            candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, self.price(way.schedule), way.schedule))
+            candidates.append(self.candidate(way, self.price(way.schedule)))
             if work.exhausted():
                 continue
             program = self.program()
@@ -460,21 +470,21 @@ class _LeastCostSearch(Problem):
         for turn in range(AIMS):
             if solution.unmet > LOST or not solution.burns or work.exhausted():
                 break
-            try:
-                solution = repaired(program, solution)
-            except Unrepairable:
+            kept = repaired(program, solution)
+            if kept is None:
                 break
-            schedule = as_pulses(self.spacecraft, solution.burns)
+            solution, schedule = kept, as_pulses(self.spacecraft, kept.burns)
             flown = self.flown(schedule)
             program.aim(refinement.along(flown, self.equations, program.width))
             if self.left(flown) < NEAR:
                 aside = self.equations.beside(solution.off)
-                schedule = refine(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
-                left, price = self.left(self.flown(schedule)), self.price(schedule)
-                candidates.append(_FlownSchedule(0.0 if left <= LEFT else left, price, schedule))
-                if left <= LEFT and (price <= least * (1.0 + DEAR) or price > (1.0 - GAIN) * last):
+                moving = Refinement(self.spacecraft, schedule, self.equations, aside, program.width, self.flown)
+                schedule = moving.refined()
+                there = self.candidate(self.flown(schedule), self.price(schedule))
+                candidates.append(there)
+                if there.left == 0.0 and (there.price <= least * (1.0 + DEAR) or there.price > (1.0 - GAIN) * last):
                     break
-                last = price if left <= LEFT else math.inf
+                last = there.price if there.left == 0.0 else math.inf
             solution = program.solve(program.about(solution.burns, zoom=2.0**turn))
         return candidates
 
@@ -484,6 +494,8 @@ class _LeastCostSearch(Problem):
         All that leave up to `DAMPED_ANGLE` leave as little.
         """
         self.nearest += candidates
-        there = [candidate for candidate in candidates if candidate.left <= self.rounded(candidate.schedule)]
+        # By starts and on-times on ticks, root sum square; zero without ticks.
+        rounded = (math.hypot(*rounded_off(self.spacecraft, candidate.schedule)) for candidate in candidates)
+        there = [candidate for candidate, most in zip(candidates, rounded, strict=True) if candidate.left <= most]
         best = min(there, key=lambda candidate: (max(candidate.left, DAMPED_ANGLE), candidate.price), default=None)
         return None if best is None else best.schedule

@@ -27,7 +27,7 @@ from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import decide
 from nutdamp.planning.notes import plan_notes, reasons
-from nutdamp.planning.recommendation import Share
+from nutdamp.planning.plan import Share
 from nutdamp.spacecraft.model import Keep, Limits, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule

@@ -27,7 +27,7 @@ from nutdamp.montecarlo.study import Results, study_of
 from nutdamp.montecarlo.study import run as fly
 from nutdamp.planning.decision import Comparison, Decision, compare, decide
 from nutdamp.planning.notes import comparison_warnings, decision_notes, reasons
-from nutdamp.planning.plan import Plan, plan
+from nutdamp.planning.plan import Plan, Share, plan
 from nutdamp.planning.screening import Cases, PlanCandidate, cases_of
 from nutdamp.schemes.catalogue import CLASSIC
 from nutdamp.spacecraft.model import Goal, Inertia, Keep, Requirement, Spacecraft
@@ -113,7 +113,8 @@ def with_cases(scheme: str, cases: Cases | None) -> Comparison:
     if cases is not None:
         known = cases.decided and cases.complying is not None
         flown[one] = PlanCandidate(one, "", cases)
-        flown[one].low, flown[one].high = (cases.complying,) * 2 if known else (0.9, 1.0)
+        low, high = (cases.complying or 0.0,) * 2 if known else (0.9, 1.0)
+        flown[one].share = Share(low, high, cases.probability)
     return Comparison(example().spacecraft, (one,), flown)
 
 
@@ -159,7 +160,7 @@ def test_what_a_plan_does_to_axis_and_spin_that_nothing_asks_for_is_noted() -> N
         for asked in (False, True):
             aimed = replace(up, goal=Goal(spin=up.spin * (1.0 + share)) if asked else Goal())
             made = Decision(Plan(aimed, "trial", Schedule((fired,))))
-            assert made.final.spin == pytest.approx(up.spin * (1.0 + share))
+            assert made.flight.final.spin == pytest.approx(up.spin * (1.0 + share))
             assert ("spin-change" in codes(decision_notes(made))) == (change and not asked)
             if change and not asked:
                 values = one_of(decision_notes(made), "spin-change")

@@ -27,8 +27,7 @@ import nutdamp
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare
 from nutdamp.planning.notes import comparison_warnings, plan_notes, reasons
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Hindrance, Obstacle
+from nutdamp.planning.plan import Hindrance, Obstacle, Plan
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse

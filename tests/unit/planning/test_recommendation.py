@@ -29,8 +29,8 @@ from nutdamp.files.reader import read_spacecraft
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import Comparison, compare, decide, usual
 from nutdamp.planning.notes import alternatives, reasons
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Gain, Ground, Standing, cheapest, recommend
+from nutdamp.planning.plan import Plan, Share, Standing
+from nutdamp.planning.recommendation import Gain, Ground, cheapest, recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import catalogue
 from nutdamp.spacecraft.equipment import Block
@@ -196,7 +196,7 @@ def with_shares(plans: list[Plan], text: str) -> Comparison:
     for plan, bounds in zip(plans, text.split(";"), strict=True):
         low, high = (float(bound) for bound in (bounds.split("-") * 2)[:2])
         one = PlanCandidate(plan, "", Cases(20_000 if low == high else 2_048, 20_000, 1, low, 0.997, {}))
-        one.low, one.high = low, high
+        one.share = Share(low, high, 0.997)
         flown[plan] = one
     return Comparison(plans[0].spacecraft, tuple(plans), flown)
 

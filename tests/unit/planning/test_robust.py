@@ -29,7 +29,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning import robust, screening
 from nutdamp.planning.chance_plan import Tightening
 from nutdamp.planning.decision import Comparison, compare
-from nutdamp.planning.plan import Plan
+from nutdamp.planning.plan import Plan, Share
 from nutdamp.planning.recommendation import Ground
 from nutdamp.planning.robust import robust_reasons
 from nutdamp.planning.screening import Cases, PlanCandidate
@@ -431,7 +431,7 @@ def test_only_what_cannot_be_chosen_flies_no_more_cases() -> None:
     ):
         given = [candidate(impulse, met=0.5 * (low + high)) for impulse, low, high in bounds]
         for one, (_, low, high) in zip(given, bounds, strict=True):
-            one.low, one.high = low, high
+            one.share = Share(low, high, 0.95)
         assert {given.index(one) for one in screening._hopeful(given, 20_000, 0.95)} == hopeful
 
 

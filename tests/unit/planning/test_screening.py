@@ -19,8 +19,8 @@ from nutdamp.montecarlo.propagated import RealWidths
 from nutdamp.montecarlo.study import SEED
 from nutdamp.planning import screening
 from nutdamp.planning.decision import Comparison, compare, decide
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Share, recommend
+from nutdamp.planning.plan import Plan, Share
+from nutdamp.planning.recommendation import recommend
 from nutdamp.planning.screening import Cases, PlanCandidate
 
 SHORT, LONG, ALL = 2_048, 8_192, 20_000
@@ -67,8 +67,8 @@ def staged(monkeypatch: pytest.MonkeyPatch) -> dict[Plan, list[tuple[float, floa
         work.spend(1.0)
         if stage >= len(known[one.plan]):
             raise Infeasible(NEVER)
-        one.low, one.high = known[one.plan][stage]
-        one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.low)
+        one.share = Share(*known[one.plan][stage], 0.997)
+        one.cases = replace(one.cases, samples=(*screening.STAGES, ALL)[stage], complying=one.share.low)
 
     def entered(plan: Plan, variant: str, study: object, samples: int) -> PlanCandidate:
         made = PlanCandidate(plan, variant, Cases(0, samples, SEED, 0.0, 0.997, {}))

@@ -95,7 +95,7 @@ def test_first_order_effects_are_those_of_the_kernel_and_of_flights(
     expected = kernel.jacobian * kernel.sigmas @ mixing(kernel.inputs, kernel.groups)
     spins = body.inertia.C * abs(body.spin)
     for kind, rows, size in ((0, slice(0, 2), spins), (1, slice(2, 4), float(np.linalg.norm(body.momentum)))):
-        shared, _, own = search.chance.model.spread(kind, columns, columns.width)
+        shared, _, own = search.chance.spread(kind, columns, columns.width)
         for name in (name for name in known if " pulse " not in name):
             truth = np.linalg.norm(expected[rows, names.index(name)])
             assert abs(shared[known.index(name)] / size) == pytest.approx(truth, rel=0.03, abs=3e-7), (name, kind)
@@ -115,8 +115,8 @@ def test_the_margin_holds_in_every_direction_and_is_used_up() -> None:
         found = chance.solve(margin)
         assert found.excess == pytest.approx(0.0, abs=1e-9)
         columns = columns_of([(channels.index(one.channel.name), one.t, one.on_time) for one in found.burns])
-        shared, _, own = chance.model.spread(0, columns, columns.width)
-        left = chance.model.left(columns, columns.width)[0]
+        shared, _, own = chance.spread(0, columns, columns.width)
+        left = chance.left(columns, columns.width)[0]
         along, alone = (np.conj(turns)[:, None] * shared).real, (np.conj(turns)[:, None, None] * own).real
         used = (np.conj(turns) * left).real + margin * np.sqrt((along**2).sum(1) + (alone**2).sum((1, 2)))
         assert used.max() == pytest.approx(search.limits[0].most, rel=0.02)

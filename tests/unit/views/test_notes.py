@@ -13,7 +13,8 @@ from support.process import Run
 import nutdamp
 from nutdamp.common.results import Note, Value, note
 from nutdamp.planning.decision import compare, decide
-from nutdamp.planning.notes import GAINS, TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
+from nutdamp.planning.notes import TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
+from nutdamp.planning.recommendation import Gain
 from nutdamp.views.guide import note_entries
 from nutdamp.views.text import NAME, NOTE, REASON, WARNING, message, note_json, ordered, text
 
@@ -44,7 +45,7 @@ def test_every_code_has_a_sentence_and_every_sentence_its_values() -> None:
 
 
 def test_every_entry_is_used_and_says_what_it_means() -> None:
-    used = {code for _, code, _ in CALLS} | {*GAINS.values(), *TIES.values()}
+    used = {code for _, code, _ in CALLS} | {*(gain.value for gain in Gain), *TIES.values()}
     used |= {"cone-broken-at-start", "ideal-impulses", "ideal-torquer-assumed", "ideal-torque-missing"}
     assert set(note_entries()) == used
     for entry in note_entries().values():
@@ -101,7 +102,7 @@ def test_notes_of_the_example_are_those_of_its_decision() -> None:
     assert [entry.code for entry in reasons(compared)] == ["least-propellant"]
     assert not [*comparison_warnings(compared)]
     assert {entry.code for plan in compared.plans for entry in plan_notes(plan)} >= {"half-turns-apart"}
-    assert {entry.code for entry in alternatives(compared)} <= set(GAINS.values())
+    assert {entry.code for entry in alternatives(compared)} <= {gain.value for gain in Gain}
     decision = decide(compared)
     assert decision is not None
     codes = [entry.code for entry in decision_notes(decision)]

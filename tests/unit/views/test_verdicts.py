@@ -22,8 +22,7 @@ from support.golden import check_text
 
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import compare, infeasibility
-from nutdamp.planning.plan import Plan
-from nutdamp.planning.recommendation import Standing
+from nutdamp.planning.plan import Plan, Standing
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.requirements import Part

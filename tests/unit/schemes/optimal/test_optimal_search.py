@@ -343,7 +343,7 @@ def test_a_descent_keeps_its_bounds_and_ends_where_no_step_saves(
     rng = np.random.default_rng(6)
     for row in met[:looked_at]:
         sequences, x = begun.sequences.of([row]), descent.state.x[[row]]
-        scale = task.scale(sequences.which)
+        scale = descent.scale[[row]]
         for _ in range(tries):  # other sequences near it that leave nothing either cost no less
             beside = x + 0.02 * scale * rng.normal(size=scale.shape)
             while not np.all(beside @ rows.T > levels[[row]]):  # drawn back until it keeps its bounds
