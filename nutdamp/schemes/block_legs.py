@@ -40,9 +40,6 @@ FLOWN = 12
 DEARER = 1.01
 """Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
 
-LOWER = 0.98
-"""Share of the nutation above which it does not count as lowered."""
-
 
 class BlockSequence(NamedTuple):
     """Blocks and their rank in closed form: the less, the better.
@@ -76,16 +73,13 @@ class BlockFlights:
 
     def __init__(self, spacecraft: Spacecraft) -> None:
         self.body, self.known = spacecraft, math.inf
-        self.bounds = [self._lowered(bound) for bound in requirements.bounds(spacecraft)]
+        self.bounds, lower = list(requirements.bounds(spacecraft)), 0.98 * spacecraft.nutation
+        if spacecraft.goal.axis is None and spacecraft.goal.spin is None:  # then blocks are to lower the nutation
+            for index, bound in enumerate(self.bounds):
+                if bound.part is Part.NUTATION:
+                    self.bounds[index] = bound._replace(most=min(bound.most, lower))
         self.of: dict[Blocks, FlownSequence] = {}
         self._fired: dict[Blocks, Schedule | Infeasible] = {}
-
-    def _lowered(self, bound: requirements.Bound) -> requirements.Bound:
-        """A bound of the nutation that there is no more than already: without a target blocks are to lower it."""
-        goal = self.body.goal
-        if bound.part is not Part.NUTATION or goal.axis is not None or goal.spin is not None:
-            return bound
-        return bound._replace(most=min(bound.most, LOWER * self.body.nutation))
 
     def share(self, left: requirements.Left) -> NDArray[np.float64]:
         """Largest share of a bound that is ``left``: 1 or less keeps all."""
@@ -167,12 +161,6 @@ LEGS = 6
 MARGIN = 0.97
 """Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
 
-SLOWEST = 0.01
-"""Least share of |H3| that a spin leg is reckoned to leave."""
-
-AMPLE = 1.5
-"""Multiple of the time of the fewest pulses that a change of the spin is given."""
-
 Searched = Callable[[Spacecraft, int | None], Schedule]
 """Blocks of one leg, of up to so many; raises Infeasible."""
 
@@ -242,7 +230,7 @@ def _flown(
     for number in range(LEGS):
         here, turns = legs.here, turns_first == (number % 2 == 0)
         here = replace(here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None))
-        slower = min(max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0)  # nutation opens by its inverse
+        slower = min(max(abs(body.inertia.axial(goal) / here.axial), 0.01), 1.0)  # nutation opens by its inverse
         there = (
             here.nutation <= nutation and (shift is None or here.to_turn <= shift)
             if turns
@@ -282,5 +270,4 @@ def _least_time(body: Spacecraft, spin: float) -> float:
     for channel in body.channels:
         on_times = acts(channel, commandable_widths(commands, channel)).on_time
         most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
-    turns = 2.0 + AMPLE * abs(change) * body.inertia.C / most if most > 0.0 else 0.0
-    return turns * spin_turn(body)
+    return (2.0 + 1.5 * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0

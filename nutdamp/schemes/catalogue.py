@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.units import as_given, is_count, is_number
@@ -58,6 +58,9 @@ def _option(default: Any, kind: OptionKind, text: str) -> Any:
 class SchemeOptions:
     """Options of every scheme. Raises SenselessOption for an invalid value."""
 
+    equal: ClassVar[bool] = False
+    """True if the pulses are of one size, which corrections keep."""
+
     with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
 
     def __post_init__(self) -> None:
@@ -78,11 +81,6 @@ class SchemeOptions:
     @property
     def frees_axis(self) -> bool:
         """True if H may end anywhere."""
-        return False
-
-    @property
-    def equal(self) -> bool:
-        """True if the pulses are of one size, which corrections keep."""
         return False
 
     @property
@@ -143,13 +141,9 @@ class CommandBlockOptions(SchemeOptions):
 class RhumbLineOptions(SchemeOptions):
     """Options of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
 
+    equal: ClassVar[bool] = True  # the width is one command
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
-
-    @property
-    def equal(self) -> bool:
-        """Always True: the width is one command."""
-        return True
 
     @property
     def resizable(self) -> bool:
@@ -164,11 +158,7 @@ class OptimalOptions(SchemeOptions):
     ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
     """
 
-    least: str = _option(
-        LEAST[0],
-        OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
-        "What to save.",
-    )
+    least: str = _option(LEAST[0], OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False), "What to save.")
     free_axis: bool | None = _option(None, dataclasses.replace(FLAG, none=True), "Let H end anywhere.")
     shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
@@ -313,7 +303,7 @@ COMMAND_BLOCK = Scheme(
     slow=True,
     by_turns=True,
 )
-NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
+NONE = Scheme("none", "", fires=False)
 """Free motion, for comparison."""
 
 SCHEMES = {

@@ -11,6 +11,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,48 +28,54 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 
-CONVERGED = 1e-14
-"""rad; a few roundings of the integration."""
-
 DIFFERENCE = 1e-6
 """Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
-
-ALIKE = 1e-9
-"""Difference in size, relative, up to which pulses are equal."""
-
-STEPS = 30
-
-INTEGRATED = 50_000
-"""Steps of integration after which a correction stops: some seconds."""
-
-PROGRESS = 0.01
-"""Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
 
 
 TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
-MOVED = 8
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
-
-BEFORE, AFTER = 12, 24
-"""Pulses of given length corrected before the equal ones, which damp the nutation, and at the end."""
-
-CLEARLY = 0.5
-"""Largest residual, over that of an earlier candidate, with which a later or dearer one is taken."""
+MOVED, BEFORE, AFTER = 8, 12, 24
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of given length so many
+before the equal ones, which damp the nutation, and at the end."""
 
 EXACT = 1e-11
 """rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
 
 
-def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[tuple[float, float]]) -> Schedule:
-    """One pulse of each channel, commandable: ``timing`` has the centre and the on-time of each, s."""
-    return Schedule(
-        tuple(
-            commandable(spacecraft, channel_pulse(channel, t, on_time))
-            for channel, (t, on_time) in zip(channels, timing, strict=True)
-        )
-    )
+CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
+"""Factors of cost and miss within which candidates count as equal: of those the one that ends first is preferred."""
+
+
+class PairCandidate(NamedTuple):
+    """Two channels with centre and on-time (s) of a pulse of each, which close to first order."""
+
+    cost: float
+    end: float
+    channels: tuple[Channel, Channel]
+    timing: tuple[tuple[float, float], tuple[float, float]]
+    short: float = 0.0
+    """Part of the impulse out of reach."""
+    miss: float = 0.0
+    """ψ, rad."""
+    factor: float = 1.0
+    """Impulse over A|ω0|."""
+
+    def fired(self, spacecraft: Spacecraft) -> Schedule:
+        """The two pulses, commandable."""
+        pairs = zip(self.channels, self.timing, strict=True)
+        return Schedule(tuple(commandable(spacecraft, channel_pulse(channel, *timing)) for channel, timing in pairs))
+
+
+def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list[PairCandidate]:
+    """At most ``most`` candidates to fly: up to ``near`` that are about the best, by their ends, then the others."""
+    ranked = sorted(candidates, key=lambda candidate: (candidate.short, candidate.cost))
+    if not ranked:
+        return []
+    short, cost = ranked[0].short * CLOSE_IN_SHORT, ranked[0].cost * CLOSE_IN_COST
+    alike = [candidate for candidate in ranked if candidate.short <= short and candidate.cost <= cost]
+    others = [candidate for candidate in ranked if candidate.short > short or candidate.cost > cost]
+    return [*sorted(alike, key=lambda candidate: candidate.end)[:near], *others][:most]
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
@@ -81,7 +88,7 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
             broken = broken or schedule
-        elif best is None or left < CLEARLY * best[0]:
+        elif best is None or left < 0.5 * best[0]:
             best = left, schedule
             if left <= EXACT:
                 break
@@ -95,6 +102,11 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
     return _missed(propagation.flown(spacecraft, schedule))
+
+
+def left(spacecraft: Spacecraft, schedule: Schedule) -> float:
+    """Size of what a flown schedule `misses`, rad."""
+    return float(np.linalg.norm(misses(spacecraft, schedule)))
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
@@ -144,14 +156,14 @@ def correct(
     together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
     common = [_Common(spacecraft, schedule)] if together else []
 
+    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
+
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)
         factor = float(parts[-1][0]) if common else 1.0
         others = common[0].resized(kept, factor) if common else kept
         moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
         return Schedule(supplied(spacecraft, (*others, *moved)), schedule.notes, schedule.bounds)
-
-    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
     def left(schedule: Schedule) -> Vector:
         nonlocal steps
@@ -160,16 +172,16 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    freedom = _stacked(*pulses, *common)
-    x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
+    start, scale, lower, upper = (
+        np.concatenate([getattr(part, name) for part in (*pulses, *common)])
+        for name in ("start", "scale", "lower", "upper")
+    )
+    some_seconds = 50_000  # steps of integration
+    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > some_seconds or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, schedule.notes, schedule.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else schedule
-
-
-MOST_CORRECTED = 1_000
-"""Pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,14 +196,12 @@ class Correction:
         """True if H too has an end condition."""
         return self.scheme.points and not self.options.frees_axis
 
-    @property
-    def equal(self) -> bool:
-        """True if the pulses are planned to be equal."""
-        return self.options.equal
-
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
-        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        if self.options.uncorrected or not schedule.pulses or len(schedule) > MOST_CORRECTED or work.exhausted():
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts.
+
+        One of more than 1000 pulses stays as it is: a correction flies all of them some twenty times.
+        """
+        if self.options.uncorrected or not 0 < len(schedule) <= 1_000 or work.exhausted():
             return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable
@@ -202,27 +212,17 @@ class Correction:
             chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and whole:  # and the pulse that gives most to the spin
-            chosen = (
-                *chosen,
-                max(range(len(schedule)), key=lambda number: abs(float(schedule.pulses[number].impulse[2]))),
-            )
+            axial = [abs(float(pulse.impulse[2])) for pulse in schedule]
+            chosen = (*chosen, axial.index(max(axial)))
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
         return correct(spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
-
-
-def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
-    """Start, scale, lower and upper bound of all free parameters."""
-    start, scale, lower, upper = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "scale", "lower", "upper")
-    )
-    return start, scale, lower, upper
 
 
 def alike(schedule: Schedule, pulse: Pulse) -> bool:
     """True if a pulse is as large as the last one of a schedule."""
     last = schedule.pulses[-1]
     size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
-    return abs(size - other) <= ALIKE * other
+    return abs(size - other) <= 1e-9 * other
 
 
 class _Movable:
@@ -271,11 +271,12 @@ class _Common:
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
-        return [self._resized(pulse, factor) if alike(self.made, pulse) else pulse for pulse in pulses]
-
-    def _resized(self, pulse: Pulse, factor: float) -> Pulse:
-        moved = _Movable(self.spacecraft, pulse, sized=False)
-        return replace(moved.turn(moved.start, factor), t=pulse.t)
+        resized = list(pulses)
+        for index, pulse in enumerate(resized):
+            if alike(self.made, pulse):
+                moved = _Movable(self.spacecraft, pulse, sized=False)
+                resized[index] = replace(moved.turn(moved.start, factor), t=pulse.t)
+        return resized
 
 
 def _size(pulse: Pulse) -> float:
@@ -307,8 +308,8 @@ def solve(
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
-    for _ in range(STEPS):
-        if norm <= CONVERGED or enough():
+    for _ in range(30):
+        if norm <= 1e-14 or enough():  # rad; a few roundings of the integration
             break
         jacobian = _slopes(residual, x, value, scale)
         step = bounded_step(jacobian, value, x, scale, lower, upper)
@@ -320,7 +321,8 @@ def solve(
             if trial_norm < best_norm:
                 best, best_value, best_norm = trial, trial_value, trial_norm
                 break
-        stalled = best_norm > norm * (1.0 - PROGRESS)
+        # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
+        stalled = best_norm > norm * (1.0 - 0.01)
         x, value, norm = best, best_value, best_norm
         if stalled:
             break
@@ -351,13 +353,6 @@ def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lowe
     return step
 
 
-LEFT_OVER = 0.05
-"""Largest residual, over nutation and turn together, of a schedule that reaches the target."""
-
-LEFT_OVER_BY_TICKS = 0.5
-"""Largest residual where the resolution of commands may be to blame."""
-
-
 ROUNDING = 1e-12
 """rad; where the spin axis is that near the target already, no pulses are needed."""
 
@@ -380,12 +375,6 @@ class FlownBuilder:
         self.steps = 0
         self.pulses: list[Pulse] = []
         self._before: list[tuple[float, Spacecraft]] = []
-
-    @property
-    def allowed(self) -> float:
-        """Number of further pulses within the limits."""
-        most = self.here.limits.max_pulses
-        return math.inf if most is None else most
 
     @property
     def left(self) -> float:
@@ -435,7 +424,7 @@ class FlownBuilder:
 
 def tolerable(spacecraft: Spacecraft) -> float:
     """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
-    share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
+    share = 0.05 if spacecraft.limits.tick is None else 0.5
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
@@ -467,16 +456,8 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
 MOMENTS = 16
 """Earliest starts that are tried."""
 
-PREDAMPING_INTEGRATED = 20_000
-"""Steps of integration after which no more of them are tried."""
 
-Planned = Callable[[Spacecraft, SchemeOptions], Schedule]
-
-IN_REACH = 0.5
-"""Share of the horizon within which the damping begins: the rest is for the turn."""
-
-
-def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
+def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Schedule]) -> FlownBuilder:
     """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
 
     H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
@@ -492,7 +473,7 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
     steps = 0
     for number in range(MOMENTS):
         earliest = here.limits.earliest + number * span / MOMENTS
-        if number > 0 and earliest > IN_REACH * here.horizon:
+        if number > 0 and earliest > 0.5 * here.horizon:  # the rest is for the turn
             break
         try:
             damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
@@ -509,7 +490,7 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps
-        if steps > PREDAMPING_INTEGRATED or work.exhausted():
+        if steps > 20_000 or work.exhausted():
             break
     if best is None:
         text = "the nutation is to be taken out first, and"

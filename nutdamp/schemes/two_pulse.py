@@ -11,9 +11,9 @@ the one that Magnus' scheme needs. The chosen pair is corrected on the real puls
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.physics import energy_sink, response
 from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import TwoPulseOptions
-from nutdamp.schemes.correction import tolerable
+from nutdamp.schemes.correction import CLOSE_IN_COST, PairCandidate, tolerable
 from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, bounded_by, model_of
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -32,12 +32,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerabl
 
 DEAREST = 2.0
 """Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
-
-CLOSE_IN_COST = 1.02
-"""Among candidates within this factor of the cheapest the one that ends first is preferred."""
-
-CLOSE_IN_SHORT = 1.1
-"""Factor of the miss within which candidates count as equal, with on-times that cannot give the whole impulse."""
 
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
@@ -80,7 +74,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
         schedule = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
-    return schedule if float(np.linalg.norm(correction.misses(spacecraft, schedule))) <= tolerable(spacecraft) else None
+    return schedule if correction.left(spacecraft, schedule) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
@@ -172,21 +166,6 @@ def _pair(
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
 
 
-class HalfPulseCandidate(NamedTuple):
-    """Two channels and moments that close to first order; ``short`` is the part of the impulse out of reach."""
-
-    short: float
-    cost: float
-    end: float
-    channels: tuple[Channel, Channel]
-    timing: tuple[tuple[float, float], tuple[float, float]]
-    """Centre and on-time of both pulses, s."""
-    miss: float
-    """ψ, rad."""
-    factor: float
-    """Impulse over A|ω0|."""
-
-
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
     """Schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
 
@@ -213,32 +192,17 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
-    """Most promising candidates, corrected, with the flown residual (rad) of each."""
-    candidates = sorted(
-        (candidate for a in channels for b in channels for candidate in _candidates(spacecraft, a, b, options.literal)),
-        key=lambda candidate: (candidate.short, candidate.cost),
-    )
-    if not candidates:
-        return
-    cheapest = candidates[0]
-    short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
-    near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
-    near.sort(key=lambda candidate: candidate.end)
-    others = [candidate for candidate in candidates if candidate not in near]
-    for candidate in [*near, *others][:SHORTLIST]:
-        yield _corrected(spacecraft, candidate, options.literal)
+    """Most promising candidates, commandable and corrected on the real widths, each with its flown residual (rad)."""
+    pairs = (_candidates(spacecraft, one, two, options.literal) for one in channels for two in channels)
+    for candidate in correction.shortlist(itertools.chain.from_iterable(pairs), SHORTLIST, SHORTLIST):
+        schedule = candidate.fired(spacecraft)
+        if not options.literal:
+            schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+        left = correction.left(spacecraft, schedule)
+        yield Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: bool) -> tuple[Schedule, float]:
-    """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
-    if not literal:
-        schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(correction.misses(spacecraft, schedule)))
-    return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
-
-
-def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[Note, ...]:
+def _remark(spacecraft: Spacecraft, candidate: PairCandidate, schedule: Schedule) -> tuple[Note, ...]:
     inertia = spacecraft.inertia
     spin = inertia.equivalent(spacecraft.spin)
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
@@ -256,7 +220,7 @@ def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Sch
     return (apart, *missed)
 
 
-def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:
+def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[PairCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
     inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
     A, C, turning, spin = inertia.A, inertia.C, spacecraft.nutation_rate, inertia.equivalent(spacecraft.spin)
@@ -320,7 +284,7 @@ def _place(
     wait: float,
     miss: float,
     literal: bool,
-) -> HalfPulseCandidate | None:
+) -> PairCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
     windows, turning = Windows(spacecraft), spacecraft.nutation_rate
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
@@ -354,12 +318,10 @@ def _place(
             (free - start for free, start in zip(blocked, starts, strict=True) if free is not None), default=0.0
         )
         if delay == 0.0:
-            pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-            schedule = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return HalfPulseCandidate(
-                short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
-            )
+            schedule = Schedule((channel_pulse(one, *timing[0]), channel_pulse(two, *timing[1])))
+            short = short if short > 1e-9 else 0.0
+            return PairCandidate(schedule.cost, schedule.end, (one, two), timing, short, miss, factor)
         first += delay if turning == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 

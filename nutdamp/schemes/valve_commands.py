@@ -36,14 +36,8 @@ EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the
 ROUNDING = 1e-12
 """Share by which an on-time may pass its bounds."""
 
-ROOM = 0.02
-"""Share of the longest pulse that the next plan leaves at either end of all, where there was too little room."""
-
 NEARLY, EXACT = 1.1, 1e-10
 """Times what the plan leaves on the plain body, and rad, that commands may leave without another plan."""
-
-PLANS = 6
-"""Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
 
 
 def plain(
@@ -114,7 +108,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
-    for _ in range(PLANS):
+    for _ in range(6):
         body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             schedule = plan(body)
@@ -147,13 +141,11 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
-        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
+        room = max(2.0 * room, longer, 0.02 * max(pulse.on_time for pulse in schedule))
     assert schedule is not None
-    return (
-        min(tried, key=lambda trial: trial[:2])[2]
-        if tried
-        else as_commands(spacecraft, schedule, correct, body.inertia)
-    )
+    if not tried:
+        return as_commands(spacecraft, schedule, correct, body.inertia)
+    return min(tried, key=lambda trial: trial[:2])[2]
 
 
 def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
@@ -194,22 +186,17 @@ def _weakened(
     spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
 ) -> Iterator[Note]:
     """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
-    if correct.equal and pairs:
-        yield from _unequal(pairs)
+    if correct.options.equal and pairs:
+        last = pairs[-1][0].on_time
+        alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
+        shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
+        if f"{shortest:.4g}" != f"{longest:.4g}":
+            yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
     tank = spacecraft.tank
     if tank is not None and firing.pulses:
         full, left = 1e-5 * tank.pressure, 1e-5 * tank.pressure_after(firing.propellant or 0.0)
         if f"{full:.4g}" != f"{left:.4g}":
             yield note("pressure-falls", full_bar=full, left_bar=left)
-
-
-def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[Note]:
-    """Note on the last equal pulses of a plan whose commands differ."""
-    last = pairs[-1][0].on_time
-    alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
-    shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
-    if f"{shortest:.4g}" != f"{longest:.4g}":
-        yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
 
 
 def _firing(schedule: Schedule) -> Schedule:
