@@ -1,15 +1,9 @@
 """Flight by Basilisk, an independent simulator (extra ``verify``): a check from outside the project.
 
-Basilisk's clock counts whole nanoseconds, its tasks run on a grid of equal steps, and a stop off the grid is made
-early. Every stretch of constant torque is therefore flown in a unit of time of its own, κ seconds, in which it lasts a
-whole number of steps: the rates go in as κω, the torque as κ²M, which leaves Euler's equations as they are. Pulses
-begin and end exactly; neither their times nor their impulses are rounded to nanoseconds.
-
-The hub is integrated by Runge-Kutta-Fehlberg 7(8) at a fixed step, attitude in modified Rodrigues parameters (MRPs).
-At the default step the flight agrees with `propagation.flown` to some 1e-12 rad over hundreds of radians.
-
-A wheel is a balanced reaction wheel without motor torque, whose rotor adds its own axial moment to the hub: the rotor
-keeps its momentum I_w (ω3 + Ω) = h, and the hub turns about axis 3 as if it were not there.
+Its clock counts whole nanoseconds, and a stop off the grid of its steps is made early. So every stretch of constant
+torque is flown in a unit of time of its own, κ seconds, in which it lasts a whole number of steps: the rates go in as
+κω, the torque as κ²M, which leaves Euler's equations as they are. A wheel is a balanced reaction wheel without motor
+torque, whose rotor adds its own axial moment to the hub: the rotor keeps its momentum I_w (ω3 + Ω) = h.
 """
 
 from __future__ import annotations
@@ -18,6 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -155,7 +150,7 @@ class _Hub:
     """Rigid hub in Basilisk with a torque on it, in the state of ``spacecraft`` at t = 0, in principal axes."""
 
     def __init__(self, spacecraft: Spacecraft, longest: float) -> None:
-        basilisk = _Modules()
+        basilisk = _modules()
         self._longest = longest
         self._moments = np.asarray(spacecraft.inertia.moments)
         self._period = max(round(longest * 1e9), 1)
@@ -224,21 +219,21 @@ class _Hub:
             self._spun.setState([[(self._speed - float(rates[2])) * unit]])
 
 
-class _Modules:
-    """Modules of Basilisk for a flight, loaded on demand."""
+MODULES = {
+    "utilities": ("SimulationBaseClass",),
+    "architecture": ("bskLogging", "messaging"),
+    "simulation": ("spacecraft", "reactionWheelStateEffector", "extForceTorque", "svIntegrators"),
+}
+"""Modules of Basilisk for a flight."""
 
-    def __init__(self) -> None:
-        try:
-            import_module("Basilisk")
-            self.SimulationBaseClass: Any = import_module("Basilisk.utilities.SimulationBaseClass")
-            self.bskLogging: Any = import_module("Basilisk.architecture.bskLogging")
-            self.spacecraft: Any = import_module("Basilisk.simulation.spacecraft")
-            self.messaging: Any = import_module("Basilisk.architecture.messaging")
-            self.reactionWheelStateEffector: Any = import_module("Basilisk.simulation.reactionWheelStateEffector")
-            self.extForceTorque: Any = import_module("Basilisk.simulation.extForceTorque")
-            self.svIntegrators: Any = import_module("Basilisk.simulation.svIntegrators")
-        except ImportError as reason:
-            raise MissingExtra("verify", "flying with Basilisk") from reason
+
+def _modules() -> Any:
+    """The `MODULES` by name, loaded on demand."""
+    paths = {name: f"Basilisk.{package}.{name}" for package, names in MODULES.items() for name in names}
+    try:
+        return SimpleNamespace(**{name: import_module(path) for name, path in paths.items()})
+    except ImportError as reason:
+        raise MissingExtra("verify", "flying with Basilisk") from reason
 
 
 def _column(vector: Vector) -> list[list[float]]:

@@ -56,9 +56,6 @@ def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
     return np.asarray(total)
 
 
-SHARE = 0.1
-"""Tolerance of the impulse sum, as a fraction of a bound of the requirement."""
-
 ANGLE = math.radians(0.01)
 """Tolerance where nothing is required, rad."""
 
@@ -85,11 +82,10 @@ def seen_at(flight: Flight, time: float) -> Flight:
     first, second, third = rates[0].tolist()
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
     kept = [index for index, flag in enumerate(begun) if flag]
+    some = Schedule(tuple(flight.schedule.pulses[index] for index in kept))
     return replace(
         flight,
-        schedule=flight.schedule
-        if len(kept) == len(flight.schedule)
-        else Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
+        schedule=flight.schedule if all(begun) else some,
         settled=SpinState(complex(first, second), third, quaternion[0]),
         spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
         until=time,
@@ -127,7 +123,7 @@ def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
 
     A tenth of what is required; `ANGLE` for a part that nothing bounds.
     """
-    required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
+    required = {bound.part: 0.1 * bound.most for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
 
@@ -217,9 +213,9 @@ def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
 
 def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """First cone violated by an axis on the target; None where there is none, or no target."""
-    if spacecraft.goal.axis is None:
-        return None
     target = spacecraft.goal.axis
+    if target is None:
+        return None
     angles = (_seen(target, target, keep, math.inf) for keep in spacecraft.keep)
     return next((aspect for aspect in angles if not aspect.kept), None)
 

@@ -152,10 +152,9 @@ def correct(
     kept = tuple(pulse for index, pulse in enumerate(schedule) if index not in chosen)
     moving = [schedule.pulses[index] for index in chosen]
     pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(schedule, pulse))) for pulse in moving]
-    ends = np.cumsum([len(part.start) for part in pulses])
+    ends = np.cumsum([len(part.free) for part in pulses])
     together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
     common = [_Common(spacecraft, schedule)] if together else []
-
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
     def build(x: Vector) -> Schedule:
@@ -172,10 +171,7 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    start, scale, lower, upper = (
-        np.concatenate([getattr(part, name) for part in (*pulses, *common)])
-        for name in ("start", "scale", "lower", "upper")
-    )
+    start, scale, lower, upper = np.concatenate([part.free for part in (*pulses, *common)]).T
     some_seconds = 50_000  # steps of integration
     x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > some_seconds or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
@@ -228,25 +224,20 @@ def alike(schedule: Schedule, pulse: Pulse) -> bool:
 class _Movable:
     """Free parameters of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
-    Without the last of them where it is not ``sized`` for itself.
+    Without the last of them where it is not ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper bound.
     """
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
         pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
-        self.channel = channel_of(spacecraft, pulse)
-        self.torquer = spacecraft.torquer
-        self.size = _size(pulse)
-        start, scale, lower, upper = [pulse.start], [pace], [earliest], [latest]
+        self.channel, self.torquer = channel_of(spacecraft, pulse), spacecraft.torquer
+        self.sized, self.size = sized, _size(pulse)
+        free = [(pulse.start, pace, earliest, latest)]
         if self.channel is None:
-            start.append(math.atan2(pulse.impulse[1], pulse.impulse[0]))
-            scale, lower, upper = [*scale, 1.0], [*lower, -math.inf], [*upper, math.inf]
+            free.append((math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf))
         if sized:
-            start, scale = [*start, self.size], [*scale, self.size]
-            least, most = _bounds(spacecraft, pulse)
-            lower, upper = [*lower, least], [*upper, most]
-        self.sized = sized
-        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+            free.append((self.size, self.size, *_bounds(spacecraft, pulse)))
+        self.free = np.array(free)
 
     def turn(self, x: Vector, factor: float) -> Pulse:
         """Pulse with these settings; ``factor`` times as large where it is not sized for itself."""
@@ -260,14 +251,12 @@ class _Movable:
 
 
 class _Common:
-    """Common factor of equal pulses, on the size of all that are as large as the last one."""
-
-    start = scale = np.ones(1)
+    """Common factor of equal pulses, on the size of all that are as large as the last one: ``free`` as of a pulse."""
 
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
         self.spacecraft, self.made, last = spacecraft, schedule, schedule.pulses[-1]
         bounds = np.array([_bounds(spacecraft, pulse) for pulse in schedule if alike(schedule, pulse)]) / _size(last)
-        self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
+        self.free = np.array([(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())])
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
@@ -275,7 +264,7 @@ class _Common:
         for index, pulse in enumerate(resized):
             if alike(self.made, pulse):
                 moved = _Movable(self.spacecraft, pulse, sized=False)
-                resized[index] = replace(moved.turn(moved.start, factor), t=pulse.t)
+                resized[index] = replace(moved.turn(moved.free[:, 0], factor), t=pulse.t)
         return resized
 
 

@@ -176,7 +176,8 @@ def as_commands(
                 supply.take(channels[pulse.channel], pulse.on_time)
             else:
                 supply.count((pulse,))
-        supply.expect_to_last()
+        if supply.shortage is not None:
+            raise Infeasible(supply.shortage)
     fired = [pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0]
     notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), firing, correct)
     return replace(firing, notes=(*firing.notes, *notes))
