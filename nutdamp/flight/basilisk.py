@@ -30,12 +30,6 @@ TURN_TURNING = 0.05
 MOST_STEPS = 200_000
 """Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
 
-ROTOR = 0.01
-"""Axial moment of the rotor of a wheel, over that of the body: any will do."""
-
-ACCEPT_ALL = 1e30
-"""Tolerance that no step fails, so that the integrator keeps its step."""
-
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of the two Gauss nodes from the middle of an interval, over its length."""
 
@@ -158,7 +152,7 @@ class _Hub:
         initial = spacecraft.initial
         self._body = basilisk.spacecraft.Spacecraft()
         self._body.ModelTag = "body"
-        rotor = ROTOR * self._moments[2] if spacecraft.inertia.wheel else 0.0
+        rotor = 0.01 * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
         self._body.hub.IHubPntBc_B = np.diag(self._moments + np.array([0.0, 0.0, rotor])).tolist()
         self._body.hub.omega_BN_BInit = _column(initial.rates)
         self._body.hub.sigma_BNInit = _column(_to_mrp(initial.quaternion))
@@ -178,7 +172,7 @@ class _Hub:
             self._body.addStateEffector(self._wheel)
         # Kept here, as all its objects are: Basilisk's own hold on them is a plain pointer.
         self._integrator = basilisk.svIntegrators.svIntegratorRKF78(self._body)
-        self._integrator.relTol = self._integrator.absTol = ACCEPT_ALL
+        self._integrator.relTol = self._integrator.absTol = 1e30  # no step fails, so that it keeps its step
         self._body.setIntegrator(self._integrator)
         self._simulation = basilisk.SimulationBaseClass.SimBaseClass()
         self._simulation.bskLogger.setLogLevel(basilisk.bskLogging.BSK_ERROR)  # handed on to the models

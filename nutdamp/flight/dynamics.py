@@ -282,10 +282,6 @@ class Lightening:
         return body, Falling(-rate * self.per_kg, -growth * self.per_kg)
 
 
-EVEN = 0.01
-"""Share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse."""
-
-
 class Supply:
     """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
 
@@ -426,7 +422,7 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
     gone, mean = tank.burn(used, flow, pulse.on_time)
     first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
-    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
+    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / 0.01)), list[Ramp](), 0.0, 0.0
     nodes, weights = gauss_legendre(6)
     for ramp in command.ramps:
         length = (ramp.end - ramp.begin) / pieces

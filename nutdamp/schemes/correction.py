@@ -302,18 +302,16 @@ def solve(
             break
         jacobian = _slopes(residual, x, value, scale)
         step = bounded_step(jacobian, value, x, scale, lower, upper)
-        best, best_value, best_norm = x, value, norm
+        before = norm
         for shrink in range(8):
             trial = np.clip(x + step * 0.5**shrink, lower, upper)
             trial_value = residual(trial)
             trial_norm = float(np.linalg.norm(trial_value))
-            if trial_norm < best_norm:
-                best, best_value, best_norm = trial, trial_value, trial_norm
+            if trial_norm < before:
+                x, value, norm = trial, trial_value, trial_norm
                 break
         # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
-        stalled = best_norm > norm * (1.0 - 0.01)
-        x, value, norm = best, best_value, best_norm
-        if stalled:
+        if norm > before * (1.0 - 0.01):
             break
     return x, norm
 

@@ -1,10 +1,8 @@
 """Half cones in a row: the spin axis swings along the great circle to the target, half a nutation turn at a time.
 
 From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of the spin axis, each
-further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is not removed
-first: the first pulse comes at the moment from which the whole row is cheapest, and jumps straight onto its first cone.
-The last cone is the acquisition of `pair_search`, which takes out what the others left. Only a nutation that one pulse
-cannot take out is damped first (`predamping`).
+further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is damped first
+only where one pulse cannot take it out: else the first one jumps straight onto its first cone.
 """
 
 from __future__ import annotations
@@ -27,9 +25,6 @@ from nutdamp.spacecraft.constraints import Windows, commandable, usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
-
-WORTH_A_CONE = 0.01
-"""Share of the cost that one more cone must save; else the fewer cones are taken, which end earlier."""
 
 MOST_CONES = 60
 """Cones tried at most where their number is not given."""
@@ -61,7 +56,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
             if best is not None or len(reasons) > 5:
                 break
         else:
-            if best is not None and row.cost > (1.0 - WORTH_A_CONE) * best.cost:
+            if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
                 break
             best = row
         if work.exhausted():

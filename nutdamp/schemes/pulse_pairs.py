@@ -48,10 +48,8 @@ class SteerablePair:
         self.spacecraft, self.torquer = spacecraft, torquer
         self.A, self.h = spacecraft.inertia.A, abs(spacecraft.axial)
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
-        self.start = spacecraft.initial
-        self.windows = Windows(spacecraft)
-
-    # --- the motion --------------------------------------------------------------------------------------------------
+        self.start, self.windows = spacecraft.initial, Windows(spacecraft)
+        self.step = spacecraft.inertial_period / SPIN_SAMPLES
 
     def axes(self, times: Vector) -> Vector:
         """Spin axis S at ``times`` (n,) s, (n, 3), inertial."""
@@ -86,13 +84,10 @@ class SteerablePair:
             now, momentum = moment, after
         return tuple(pulses)
 
-    # --- what can be chosen ------------------------------------------------------------------------------------------
-
     def moments(self) -> Vector:
         """Moments (n,) s of the first pulse worth looking at: four turns, and one after each blackout window."""
-        period = self.spacecraft.inertial_period
-        first = self.spacecraft.limits.earliest
-        turn = np.arange(SPIN_SAMPLES) * (period / SPIN_SAMPLES)
+        period, first = self.spacecraft.inertial_period, self.spacecraft.limits.earliest
+        turn = np.arange(SPIN_SAMPLES) * self.step
         ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:40]
         parts = [first + number * period + turn for number in range(4)] + [end + turn for end in ends]
         times = np.unique(np.concatenate(parts))
@@ -113,7 +108,7 @@ class SteerablePair:
         if len(times) == 0 or not np.isfinite(costs.min()):
             raise Infeasible(self.no_room(cones))
         best = float(times[np.flatnonzero(costs <= costs.min() * (1.0 + EQUAL))[0]])
-        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), self._steps(0.0)[:1])
+        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), np.array([self.step]))
         moment = float(point[0])
         return self.pulses([(moment, cost(np.array([moment]))[1][0])])
 
@@ -138,13 +133,10 @@ class SteerablePair:
         point = _descend(
             lambda points: self._costs(points[:, 0], points[:, 1], choice.further, straight)[0],
             np.array([choice.moment, choice.aside]),
-            self._steps(0.0 if straight else 0.02 * choice.jumps),
+            np.array([self.step, 0.0 if straight else 0.02 * choice.jumps]),
         )
         _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
         return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
-
-    def _steps(self, aside: float) -> Vector:
-        return np.array([self.spacecraft.inertial_period / SPIN_SAMPLES, aside])
 
     def _costs(
         self, times: Vector, aside: Vector, further: int, straight: bool

@@ -1,13 +1,10 @@
 """Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin turn.
 
-Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
-2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
-chosen so that they close, a nutation at t = 0 included. All pulses are equal, as the width is one command: it is chosen
-so that they just reach the target. An excess is bent away: the train heads a little to one side of its course (a
-spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π, which is C = A for one
-pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
-
-The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
+Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, which from one to the next turns by φ = 2πC/(AK) for K
+pulses a turn. So N leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation: N is chosen so that they close, a nutation at t = 0
+included, their equal width so that they just reach the target. An excess is bent away by heading a little aside (a
+spiral), and on the flown motion the last pulses are moved until nothing is left. The phase is that of the great circle
+to the target, or fixed against the Sun: then H follows a rhumb line.
 """
 
 from __future__ import annotations
@@ -49,9 +46,6 @@ LAST = 20
 
 TRIES = 4
 """Counts that are flown, at most."""
-
-SPARE = 3e-3
-"""Pulses that a train has to spare: by so much it may bend, without which its phases could not bring H nearer."""
 
 
 class Attempt(NamedTuple):
@@ -145,7 +139,8 @@ class Train:
         of its square.
         """
         ratio = abs(self.here.nutation_rate / self.here.spin)  # below 0.1 the phases of pulses hardly matter
-        return SPARE + (float(left[count - 1]) / max(ratio, 0.1)) ** 2 / min(count, LAST)
+        # Without 3e-3 to spare, by which a train may bend, its phases could not bring H nearer.
+        return 3e-3 + (float(left[count - 1]) / max(ratio, 0.1)) ** 2 / min(count, LAST)
 
     def _free(self, left: Vector) -> list[Attempt]:
         """Trains of pulses of any length: `left` by 1, 2, … pulses is ``left`` (n,)."""

@@ -25,9 +25,6 @@ from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
 
-MISSED = 50
-"""Alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready."""
-
 MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
 
@@ -180,7 +177,8 @@ class ImpulseBuilder:
             return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
 
         turns = alignment(self.ready)
-        for _ in range(len(self.windows.limits.blackout) + MISSED):
+        # Rounding to ticks or a disturbance may move 50 in a row to before the actuators are ready.
+        for _ in range(len(self.windows.limits.blackout) + 50):
             centre = self._when(first + turns * self.period)
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
@@ -291,15 +289,14 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
-    pulses = [builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period)) for channel in channels]
-    there = [pulse for pulse in pulses if pulse is not None]
+    pulses = [(each, builder.align(each, max(each.min_on_time, 1e-6 * builder.period))) for each in channels]
+    there = [(channel, pulse) for channel, pulse in pulses if pulse is not None]
     if not there:
         flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
         return Infeasible(f"no channel ever opposes the nutation{flat * (spacecraft.growth > 0.0)}")
-    by_name = {channel.name: channel for channel in channels}
-    ends = [_end(builder, by_name[pulse.channel], pulse) for pulse in there if builder.helps(pulse)]
+    ends = [_end(builder, channel, pulse) for channel, pulse in there if builder.helps(pulse)]
     if not ends:
-        best = min(there, key=builder.left_after)
+        best = min((pulse for _, pulse in there), key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
             return Infeasible(
@@ -435,16 +432,10 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
     if not spacecraft.disturbances:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
-    left = tuple(
-        replace(disturbance, transverse=0.0 + 0.0j) if settles(spacecraft, disturbance) else disturbance
-        for disturbance in spacecraft.disturbances
-    )
+    left = [replace(each, transverse=0j) if settles(spacecraft, each) else each for each in spacecraft.disturbances]
+    lasting = tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse)
     omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
-    return replace(
-        spacecraft,
-        omega0=omega0,
-        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
-    )
+    return replace(spacecraft, omega0=omega0, disturbances=lasting)
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
@@ -455,13 +446,10 @@ def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
-    inertia = spacecraft.inertia
-    return sum(
-        (
-            response.steady_response(inertia.A, spacecraft.nutation_rate, disturbance.transverse, disturbance.rate)
-            * complex(math.cos(disturbance.rate * time), math.sin(disturbance.rate * time))
-            for disturbance in spacecraft.disturbances
-            if disturbance.transverse and settles(spacecraft, disturbance)
-        ),
-        0.0 + 0.0j,
-    )
+    A, nutation_rate, steady = spacecraft.inertia.A, spacecraft.nutation_rate, 0.0 + 0.0j
+    for disturbance in spacecraft.disturbances:
+        if disturbance.transverse and settles(spacecraft, disturbance):
+            torque, rate = disturbance.transverse, disturbance.rate
+            turned = complex(math.cos(rate * time), math.sin(rate * time))
+            steady += response.steady_response(A, nutation_rate, torque, rate) * turned
+    return steady

@@ -36,9 +36,6 @@ EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the
 ROUNDING = 1e-12
 """Share by which an on-time may pass its bounds."""
 
-NEARLY, EXACT = 1.1, 1e-10
-"""Times what the plan leaves on the plain body, and rad, that commands may leave without another plan."""
-
 
 def plain(
     spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
@@ -48,11 +45,18 @@ def plain(
     Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
     ``room`` s longer at either end. Its moments are those with so many kg ``used``.
     """
-    lead, lag = (reach + room for reach in _reaches(spacecraft))
-    limits = spacecraft.limits
+    limits, channels, leads, lags = spacecraft.limits, list[Channel](), list[float](), list[float]()
+    for channel in spacecraft.channels:
+        shortest, longest = effective_on_times(channel)
+        if channel.valve is not None:
+            lead, lag = channel.valve.reaches(shortest, longest)
+            leads, lags = [*leads, lead], [*lags, lag]
+        least = effective_on_time(channel, shortest_on_time(spacecraft, channel)) * max(strongest, 1.0)
+        channels.append(channel.of(valve=None, min_on_time=least, max_on_time=longest * min(weakest, 1.0)))
+    lead, lag = max(leads, default=0.0) + room, max(lags, default=0.0) + room
     return replace(
         spacecraft,
-        channels=tuple(_plain(spacecraft, channel, weakest, strongest) for channel in spacecraft.channels),
+        channels=tuple(channels),
         cold=None,
         tank=None,
         center_of_mass_per_kg=None,
@@ -65,22 +69,6 @@ def plain(
             blackout=tuple((max(begins - lag, 0.0), ends + lead) for begins, ends in limits.blackout),
         ),
     )
-
-
-def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
-    """Longest extension of a command and its thrust before and after the rectangle, s, over all channels."""
-    reaches = [
-        channel.valve.reaches(*effective_on_times(channel))
-        for channel in spacecraft.channels
-        if channel.valve is not None
-    ]
-    return max((lead for lead, _ in reaches), default=0.0), max((lag for _, lag in reaches), default=0.0)
-
-
-def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: float) -> Channel:
-    least = effective_on_time(channel, shortest_on_time(spacecraft, channel))
-    most = effective_on_times(channel)[1]
-    return channel.of(valve=None, min_on_time=least * max(strongest, 1.0), max_on_time=most * min(weakest, 1.0))
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
@@ -138,7 +126,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         rounded = spacecraft.limits.tick is not None
         if work.exhausted() or not schedule.pulses:
             break
-        if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
+        if kept and (rounded or left <= 1.1 * _left(body, schedule, correct) + 1e-10):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
         room = max(2.0 * room, longer, 0.02 * max(pulse.on_time for pulse in schedule))
