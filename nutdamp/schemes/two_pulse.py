@@ -2,8 +2,8 @@
 
 With a steerable torquer the pulses are exact at any angle. Of two channels with torque directions d1, d2 the momentum
 shift closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both pulses together then oppose ω at a
-cost of 1/cos(ψ/2), where ψ is the angle by which the second direction misses the one that Magnus' scheme needs. With a target
-axis the two pulses are those of `pulse_pairs`, of which these are the case that H is to stay.
+cost of 1/cos(ψ/2), where ψ is the angle by which the second direction misses the one that Magnus' scheme needs. With a
+target axis the two pulses are those of `pulse_pairs`, of which these are the case that H is to stay.
 """
 
 from __future__ import annotations
