@@ -214,9 +214,7 @@ def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
 def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """First cone violated by an axis on the target; None where there is none, or no target."""
     target = spacecraft.goal.axis
-    if target is None:
-        return None
-    angles = (_seen(target, target, keep, math.inf) for keep in spacecraft.keep)
+    angles = [] if target is None else [_seen(target, target, keep, math.inf) for keep in spacecraft.keep]
     return next((aspect for aspect in angles if not aspect.kept), None)
 
 

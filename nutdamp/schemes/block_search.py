@@ -32,12 +32,6 @@ from nutdamp.spacecraft.requirements import SAME_COST, Part
 
 Array = NDArray[np.float64]
 
-ALL_DELAYS = 16
-"""Delays up to which all are looked at, if there are no more."""
-
-ALL_BLOCKS, ALL_FIRSTS = 400, 300
-"""Blocks after one wait up to which all are looked at, and the cheapest of them behind which others are."""
-
 WAITS = 24
 """Sun pulses that may pass before a block, so that its nutation meets the one before."""
 
@@ -91,9 +85,10 @@ class BlockSearch:
         self._kinds = list(itertools.product(channels, self._every))
         last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
         self._delays = np.asarray(np.arange(last_delay + 1) * step, dtype=np.float64)  # all that can be commanded
-        few = len(self._delays) <= ALL_DELAYS
+        self._few_delays = len(self._delays) <= 16
         widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
-        self.small = few and widths * len(self._delays) * self.allowed <= ALL_BLOCKS  # so that all are looked at
+        # So few blocks after one wait that all are looked at.
+        self.small = self._few_delays and widths * len(self._delays) * self.allowed <= 400
 
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -106,10 +101,10 @@ class BlockSearch:
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
                 firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
-                if self.small:  # the cheapest of all
+                if self.small:  # the 300 cheapest of all
                     start = self.model.start
-                    every = self.behind([START], start, self._grid(start, self.earliest), ALL_FIRSTS)
-                    firsts += sorted(every, key=lambda first: first.rank[1])[:ALL_FIRSTS]
+                    every = self.behind([START], start, self._grid(start, self.earliest), 300)
+                    firsts += sorted(every, key=lambda first: first.rank[1])[:300]
             else:
                 firsts = _promising(firsts, FIRST // 2)
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
@@ -390,7 +385,7 @@ class BlockSearch:
         widths = commandable_widths(self.commands, channel)[index // len(counts)][:, None, :, None]
         wait, count = np.array(waits)[:, None, None], counts[index % len(counts)][:, None, :, None]
         trial = Trial(wait, self._delays, widths, count, every)
-        if len(self._delays) <= ALL_DELAYS:
+        if self._few_delays:
             return trial
         best = list[Array]()
         if self.body.goal.axis is not None:

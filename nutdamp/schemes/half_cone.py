@@ -29,9 +29,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 MOST_CONES = 60
 """Cones tried at most where their number is not given."""
 
-PLACE = 1e-3
-"""Units of `work` of each moment at which a channel is looked at for the first pulse of a row."""
-
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
     """Schedule of ``options.cones`` half cones; if None the fewest of which one more would save less than 1 %.
@@ -146,7 +143,7 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
     best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
-    work.spend(PLACE * count * len(channels))
+    work.spend(1e-3 * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))

@@ -31,9 +31,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, steerable_pulse
 SPIN_SAMPLES = 256
 """Moments looked at in each turn of the spin axis, before the best is made exact."""
 
-ASIDE = np.linspace(-1.0, 1.0, 41)
-"""Places of H beside the best one, as shares of both jumps, for the case that the limits forbid that one."""
-
 COMPASS_STEPS = 2000
 """Steps of that search, at most."""
 
@@ -123,8 +120,9 @@ class SteerablePair:
             raise Infeasible(self.no_room(1))
         choice = self._best(times, np.zeros(len(times)), straight, 60)
         if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
-            some = slice(None, None, math.ceil(len(times) / 1000))
-            beside = np.repeat(times[some], len(ASIDE)), (ASIDE * free.cost[some, None]).ravel()
+            # The limits forbid the best place: others beside it, by shares of both jumps.
+            some, shares = slice(None, None, math.ceil(len(times) / 1000)), np.linspace(-1.0, 1.0, 41)
+            beside = np.repeat(times[some], len(shares)), (shares * free.cost[some, None]).ravel()
             other = self._best(*beside, straight, 12)
             if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
                 choice = other
@@ -231,9 +229,6 @@ BODY_SAMPLES = 96
 
 BODY_TURNS = 24
 """Turns of the body within which the first pulse comes, at most."""
-
-PAIR = 5e-5
-"""Units of `work` of each moment of each pair of channels."""
 
 
 OFF_LIMITS = "with commands on the ticks of limits.tick the two pulses touch another limit"
@@ -380,7 +375,7 @@ class _PairSearch:
             for further in range(60):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
-                work.spend(PAIR * len(times) * len(self.channels))
+                work.spend(5e-5 * len(times) * len(self.channels))
                 needed = after.body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())

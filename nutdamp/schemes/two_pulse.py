@@ -28,9 +28,6 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 
-DEAREST = 2.0
-"""Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
-
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
@@ -145,20 +142,15 @@ def _pair(
     start: float,
     wait: float,
     on_times: tuple[float, ...],
-) -> tuple[Pulse, Pulse]:
+) -> tuple[Pulse, ...]:
     """The two pulses against ω, the first from ``start`` s on."""
     builder = ImpulseBuilder(spacecraft)
-    pulses = []
-    for centre, on_time, half in zip(
-        (start + 0.5 * on_times[0], start + 0.5 * on_times[0] + wait), on_times, halves[:2], strict=True
-    ):
-        begin = builder.windows.nearest_tick(centre - 0.5 * on_time)
+    for later, on_time, half in zip((0.0, wait), on_times, halves[:2], strict=True):
+        begin = builder.windows.nearest_tick(start + 0.5 * on_times[0] + later - 0.5 * on_time)
         centre = begin + 0.5 * on_time
-        angle = cmath.phase(-builder.omega_at(centre))
         requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
-        pulses.append(steerable_pulse(torquer, centre, angle, **requested))
-        builder.fire(pulses[-1])
-    return pulses[0], pulses[1]
+        builder.fire(steerable_pulse(torquer, centre, cmath.phase(-builder.omega_at(centre)), **requested))
+    return tuple(builder.pulses)
 
 
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
@@ -271,7 +263,7 @@ def _promising(factor: Vector) -> Vector:
     better = np.flatnonzero(factor * CLOSE_IN_COST < before)
     cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
     chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
-    return np.asarray(chosen[factor[chosen] <= DEAREST])
+    return np.asarray(chosen[factor[chosen] <= 2.0])  # beyond, the second pulse would mostly undo the first
 
 
 def _place(
@@ -301,9 +293,9 @@ def _place(
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
         return None
-    needed = (grown * halves.first * factor, grown * halves.second * factor)
-    on_times = [_nearest(spacecraft, channel, impulse) for channel, impulse in zip((one, two), needed, strict=True)]
-    short = sum(_missing(spacecraft, *each) for each in zip((one, two), needed, on_times, strict=True)) / factor
+    long, lacks = _nearest(spacecraft, one, grown * halves.first * factor)
+    longer, more = _nearest(spacecraft, two, grown * halves.second * factor)
+    on_times, short = (long, longer), (lacks + more) / factor
     if short >= 1.0:
         return None
     first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
@@ -311,10 +303,8 @@ def _place(
         return None
     while first + wait + 0.5 * on_times[1] <= windows.horizon:
         starts = (first - 0.5 * on_times[0], first + wait - 0.5 * on_times[1])
-        blocked = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
-        delay = max(
-            (free - start for free, start in zip(blocked, starts, strict=True) if free is not None), default=0.0
-        )
+        free = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
+        delay = max((end - start for end, start in zip(free, starts, strict=True) if end is not None), default=0.0)
         if delay == 0.0:
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
             schedule = Schedule((channel_pulse(one, *timing[0]), channel_pulse(two, *timing[1])))
@@ -324,20 +314,18 @@ def _place(
     return None
 
 
-def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
-    """Deficit of a pulse of ``on_time`` s against the impulse ``needed`` N m s, over that for all nutation."""
-    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
-    width = response.width_factor(spacecraft.nutation_rate, slope, on_time)
-    return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
+def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> tuple[float, float]:
+    """On-time in s with which a channel comes nearest to the effective impulse ``needed`` N m s, and what is missing.
 
-
-def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
-    """On-time in s with which a channel gives the effective impulse ``needed`` N m s, or comes nearest to it."""
+    The latter over the impulse for all nutation.
+    """
     slope, longest = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C, channel.max_on_time
     on_time = response.on_time_for(needed, abs(channel.transverse), spacecraft.nutation_rate, slope, longest)
     if on_time is None:
         on_time = longest_useful(longest, spacecraft.body_period)
-    return max(on_time, channel.min_on_time)
+    on_time = max(on_time, channel.min_on_time)
+    width = response.width_factor(spacecraft.nutation_rate, slope, on_time)
+    return on_time, abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
 
 
 def _grown(spacecraft: Spacecraft, time: float) -> float:
