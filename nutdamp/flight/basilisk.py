@@ -21,11 +21,8 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
-TURN = 0.1
-"""Largest turn of the body within a default step, rad: its error is below rounding."""
-
-TURN_TURNING = 0.05
-"""rad; the same where a torque turns in the body: held constant for half of each pair of steps, to fourth order."""
+TURN, TURN_TURNING = 0.1, 0.05
+"""Largest turn of the body within a default step, rad, also where a torque turns in the body: errors below rounding."""
 
 MOST_STEPS = 200_000
 """Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
@@ -155,7 +152,8 @@ class _Hub:
         rotor = 0.01 * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
         self._body.hub.IHubPntBc_B = np.diag(self._moments + np.array([0.0, 0.0, rotor])).tolist()
         self._body.hub.omega_BN_BInit = _column(initial.rates)
-        self._body.hub.sigma_BNInit = _column(_to_mrp(initial.quaternion))
+        upper = -initial.quaternion if initial.quaternion[0] < 0.0 else initial.quaternion
+        self._body.hub.sigma_BNInit = _column(upper[1:] / (1.0 + upper[0]))  # MRPs e·tan(φ/4), |σ| <= 1
         self._torque = basilisk.extForceTorque.ExtForceTorque()
         self._torque.ModelTag = "torque"
         self._body.addDynamicEffector(self._torque)
@@ -233,12 +231,6 @@ def _modules() -> Any:
 def _column(vector: Vector) -> list[list[float]]:
     """Vector as a Basilisk column."""
     return [[float(component)] for component in vector]
-
-
-def _to_mrp(quaternion: Vector) -> Vector:
-    """MRPs e·tan(φ/4) of a unit quaternion (4,), |σ| <= 1; of q and -q the one whose scalar part is not negative."""
-    upper = -quaternion if quaternion[0] < 0.0 else quaternion
-    return np.asarray(upper[1:] / (1.0 + upper[0]))
 
 
 def _from_mrp(sigma: Vector) -> Vector:

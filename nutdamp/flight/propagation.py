@@ -485,9 +485,8 @@ def flown(
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(
-                Leg(now, now, dynamics.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0)
-            )
+            path, _ = dynamics.path(state, now, now, most=allowed)
+            legs.append(Leg(now, now, path, 0, jump=True, completed_at_end=0))
         for kick in kicks:
             state = light.halfway(dynamics, now).kicked(state, kick)
         if now == over:

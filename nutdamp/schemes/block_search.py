@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from heapq import nsmallest
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,14 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.schemes.block_legs import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
-from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly
+from nutdamp.flight.end_state import left_by
+from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly, fire_all
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, commandable_widths
+from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Part
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
+from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
 
@@ -44,11 +45,8 @@ FIRST = 24
 BLOCKS = 3
 """Blocks of a schedule, at most."""
 
-DOUBTFUL = 1.5
-"""Share of a bound up to which the closed form may err, so that a flight has to tell whether it is kept."""
-
-DOUBTS = 100
-"""Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
+DOUBTFUL, DOUBTS = 1.5, 100
+"""Share of a bound up to which the closed form may err, and sequences flown since that would make them good."""
 
 ALIKE = 4
 """Sequences that may come with the same blocks, over those that are wanted."""
@@ -58,6 +56,126 @@ CLOSEST, FEW = 24, 4
 
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
+
+Blocks = tuple[Block, ...]
+
+FLOWN = 12
+"""Sequences of blocks that are flown; as many more where none of them complies."""
+
+DEARER = 1.01
+"""Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
+
+
+class BlockSequence(NamedTuple):
+    """Blocks and their rank in closed form: the less, the better.
+
+    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
+    ``share``: the share.
+    """
+
+    blocks: Blocks
+    rank: tuple[float, float, float]
+    share: float = math.inf
+
+
+class FlownSequence(NamedTuple):
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
+
+    rank: tuple[bool, float, float, float]
+    schedule: Schedule
+    sequence: BlockSequence
+
+
+START = BlockSequence((), (math.inf, math.inf, math.inf))
+"""No blocks, before which all others come."""
+
+
+class BlockFlights:
+    """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to comply.
+
+    ``bounds``: what they are judged by.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.body, self.known = spacecraft, math.inf
+        self.bounds, lower = list(requirements.bounds(spacecraft)), 0.98 * spacecraft.nutation
+        if spacecraft.goal.axis is None and spacecraft.goal.spin is None:  # then blocks are to lower the nutation
+            for index, bound in enumerate(self.bounds):
+                if bound.part is Part.NUTATION:
+                    self.bounds[index] = bound._replace(most=min(bound.most, lower))
+        self.of: dict[Blocks, FlownSequence] = {}
+        self._fired: dict[Blocks, Schedule | Infeasible] = {}
+
+    def share(self, left: Left) -> NDArray[np.float64]:
+        """Largest share of a bound that is ``left``: 1 or less keeps all."""
+        return np.asarray(np.max(np.broadcast_arrays(*self.shares(left).values()), axis=0))
+
+    def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
+        """Share of each bound that is ``left``."""
+        parts = [(bound.part, bound.most) for bound in self.bounds]
+        return {part: np.asarray(requirements.left_of(part, left, self.body) / most) for part, most in parts}
+
+    def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
+        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
+
+        The pulses of a dozen of them are fired together.
+        """
+        for begin in range(0, len(sequences), FLOWN):
+            some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self.known * DEARER]
+            new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
+            if new:
+                self._fired.update(zip(new, self._together(new), strict=True))
+            yield from (each for each in some if each.rank[1] <= self.known * DEARER)
+
+    def _together(self, some: Sequence[Blocks]) -> Sequence[Schedule | Infeasible]:
+        """Pulses of sequences; one by one where the motion of one of them cannot be followed."""
+        try:
+            return fire_all(self.body, some)[0]
+        except Infeasible as reason:
+            return [reason] if len(some) == 1 else [self._together([blocks])[0] for blocks in some]
+
+    def flown(self, sequence: BlockSequence) -> FlownSequence:
+        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
+        if sequence.blocks not in self.of:
+            if sequence.blocks not in self._fired:
+                self._fired[sequence.blocks] = self._together([sequence.blocks])[0]
+            schedule = self._fired[sequence.blocks]
+            if isinstance(schedule, Infeasible):
+                raise schedule
+            share = float(self.share(left_by(propagation.flown(self.body, schedule))))
+            missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for a Sun pulse
+            rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
+            self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
+            if rank[:2] == (False, 0.0):
+                self.known = min(self.known, sequence.rank[1])
+        return self.of[sequence.blocks]
+
+    @property
+    def all(self) -> list[FlownSequence]:
+        """All flights so far, the best first."""
+        return sorted(self.of.values(), key=lambda flight: flight.rank)
+
+    @property
+    def complies(self) -> bool:
+        """True if a sequence complied in its flight."""
+        return math.isfinite(self.known)
+
+
+def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
+    """Sequences by their blocks, the last of equal ones at the place of the first."""
+    return {sequence.blocks: sequence for sequence in sequences}
+
+
+def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
+    """The first sequence of each kind, blocks with the same values of these fields: flights may differ.
+
+    By default the channel and the interval, where closed forms do not differ.
+    """
+    kinds: dict[tuple[object, ...], BlockSequence] = {}
+    fields = operator.attrgetter(*(names or ("channel", "every")))
+    for sequence in ranked:
+        kinds.setdefault(tuple(map(fields, sequence.blocks)), sequence)
+    return list(kinds.values())
 
 
 class BlockSearch:
@@ -200,7 +318,8 @@ class BlockSearch:
             shape = np.broadcast_shapes((len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation)))
             self.looked += math.prod(shape)
             work.spend(LOOKED * math.prod(shape))
-            severity, cost = self._severity(state, channel, trial, after, left, shape)
+            parts, rows = (self._severity(state, channel, trial, after, left), after.cost), shape[0] * shape[1]
+            severity, cost = (np.broadcast_to(part, shape).reshape(rows, shape[2] * shape[3]) for part in parts)
             doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
             keys = (
                 (_in_order(severity, cost), few),
@@ -220,26 +339,15 @@ class BlockSearch:
                 sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
         return sequences
 
-    def _severity(
-        self,
-        state: BlockState,
-        channel: Channel,
-        trial: Trial,
-        after: BlockState,
-        left: requirements.Left,
-        shape: tuple[int, ...],
-    ) -> tuple[Array, Array]:
-        """Largest share of a bound, infinite for blocks that may not be, and cost of blocks, by rows to choose from."""
+    def _severity(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState, left: Left) -> Array:
+        """Largest share of a bound, infinite for blocks that may not be."""
         severity = self.flights.share(left)
         over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
         over = over | self._dark(state, channel, trial, after)
         if self.body.goal.axis is not None:  # H has gone round the Sun the longer way to the target, or once more
             over = over | (np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi)
         over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
-        over = over | np.isnan(severity) | (after.cost >= self.most)
-        rows = shape[0] * shape[1], shape[2] * shape[3]
-        severity = np.broadcast_to(np.where(over, np.inf, severity), shape).reshape(rows)
-        return severity, np.broadcast_to(after.cost, shape).reshape(rows)
+        return np.asarray(np.where(over | np.isnan(severity) | (after.cost >= self.most), np.inf, severity))
 
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
@@ -358,8 +466,7 @@ class BlockSearch:
 
     def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
         """True where a pulse of the blocks is on in a blackout window, or just beside it."""
-        shape = np.shape(after.sun_pulse)
-        dark = np.zeros(shape, dtype=bool)
+        dark = np.zeros(np.shape(after.sun_pulse), dtype=bool)
         if not len(self.dark[0]):
             return dark
         work.spend(LOOKED * dark.size * len(self.dark[0]))

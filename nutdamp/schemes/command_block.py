@@ -1,9 +1,14 @@
-"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width and number."""
+"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width and number.
+
+Spin and turn are made leg by leg in one row of blocks. The impulse that turns H goes with |H3|: H is turned while that
+is smaller, before the spin is raised or once it is lowered. Trains that turn change the spin too where their channels
+have a torque about axis 3: the spin leg behind them is planned on what they leave, one before them ahead by as much.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +18,15 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_legs import FLOWN, FlownSequence, spin_and_turn
-from nutdamp.schemes.block_model import BlockModel, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, BlockSearch
+from nutdamp.schemes.block_legs import Legs
+from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
+from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
 from nutdamp.spacecraft.equipment import Channel
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -156,3 +161,90 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     if chosen.rank[1] > 1.0:
         notes += cures(search, chosen, most or BLOCKS)
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
+
+
+LEGS = 6
+"""Legs of a row of blocks, at most: spin and turn, and both mended twice."""
+
+MARGIN = 0.97
+"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
+
+Searched = Callable[[Spacecraft, int | None], Schedule]
+"""Blocks of one leg, of up to so many; raises Infeasible."""
+
+
+def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) -> FlownSequence:
+    """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the orders tried.
+
+    The other order is tried where the cheaper one does not comply. Raises Infeasible with the first reason.
+    """
+    goal, inertia = spacecraft.goal.spin, spacecraft.inertia
+    assert goal is not None
+    turns_first = abs(inertia.axial(goal)) >= abs(spacecraft.axial)
+    flights, why = BlockFlights(spacecraft), list[Infeasible]()
+    for first in (turns_first, not turns_first):
+        try:
+            gained = _flown(spacecraft, flights, searched, most, goal, turns_first=first)
+            if not first and gained != 0.0 and not work.exhausted():
+                _flown(spacecraft, flights, searched, most, goal - gained, turns_first=first)
+        except Infeasible as reason:
+            why.append(reason)
+        if flights.complies or work.exhausted():
+            break
+    if not flights.of:
+        raise next(iter(why), Infeasible("no pulse is needed"))
+    return flights.all[0]
+
+
+def _flown(
+    body: Spacecraft, flights: BlockFlights, searched: Searched, most: int | None, aim: float, *, turns_first: bool
+) -> float:
+    """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin, rad/s, by a second
+    leg that turned, where it takes the spin off its goal.
+    """
+    legs, goal, gained = Legs(body), body.goal.spin, 0.0
+    assert goal is not None
+    bounds = {bound.part: bound.most for bound in requirements.bounds(body)}
+    nutation, shift = bounds[Part.NUTATION], bounds.get(requirements.aim(body))
+    for number in range(LEGS):
+        here, turns = legs.here, turns_first == (number % 2 == 0)
+        here = replace(here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None))
+        slower = min(max(abs(body.inertia.axial(goal) / here.axial), 0.01), 1.0)  # nutation opens by its inverse
+        there = requirements.spins_at(here, aim)
+        if turns:
+            there = here.nutation <= nutation and (shift is None or here.to_turn <= shift)
+        room = None if most is None else most - len(legs.blocks) - (number == 0)
+        if turns and not requirements.spins_at(here, goal):
+            allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift
+            horizon = max(here.horizon - _least_time(here, goal), 0.5 * here.horizon)
+        elif turns:
+            allowed, horizon = (nutation, shift), here.horizon
+        else:
+            opened, off = here.nutation / slower / MARGIN, here.to_turn / MARGIN
+            allowed, horizon = (max(opened, nutation), None if shift is None else max(off, shift)), here.horizon
+            spinning = tuple(channel for channel in here.channels if not channel.damps)
+            here, aim = replace(here, goal=replace(here.goal, spin=aim), channels=spinning), goal
+        if there or (room is not None and room < 1):
+            continue
+        try:
+            leg = replace(here, requirement=Requirement(*allowed), limits=replace(here.limits, horizon=horizon))
+            legs.fire(searched(leg, room))
+        except Infeasible:
+            if number < 2:
+                raise
+            break
+        if turns and number == 1 and not requirements.spins_at(legs.here, goal):
+            gained = legs.here.spin - here.spin
+    if legs.blocks:
+        flights.flown(BlockSequence(tuple(legs.blocks), (0.0, 0.0, 0.0)))
+    return gained
+
+
+def _least_time(body: Spacecraft, spin: float) -> float:
+    """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives it."""
+    most, commands, change = 0.0, body.commands, spin - body.spin
+    assert commands is not None
+    for channel in body.channels:
+        on_times = acts(channel, commandable_widths(commands, channel)).on_time
+        most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
+    return (2.0 + 1.5 * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0

@@ -224,11 +224,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
 DEAREST = 3.0
 """Pairs that cost more than this times the floor are not looked at."""
 
-BODY_SAMPLES = 96
-"""Moments looked at in each turn of the body."""
-
-BODY_TURNS = 24
-"""Turns of the body within which the first pulse comes, at most."""
+BODY_SAMPLES, BODY_TURNS = 96, 24
+"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at most."""
 
 
 OFF_LIMITS = "with commands on the ticks of limits.tick the two pulses touch another limit"

@@ -33,11 +33,8 @@ from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse
 STEP = math.radians(2.0)
 """Angle that one ideal impulse turns H by, at most."""
 
-CLOSED = 0.3
-"""Phasors that sum to less than this many pulses count as closed: the rest is corrected."""
-
-OPEN = 1.2
-"""Sum of the phasors, in pulses, beyond which correction has no hope."""
+CLOSED, OPEN = 0.3, 1.2
+"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that has no hope."""
 
 MOST_PULSES = 600
 
@@ -435,9 +432,8 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
             train = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
-        if correction.left(spacecraft, train) > max(10.0 * EXACT, exact):
-            continue
-        return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
+        if correction.left(spacecraft, train) <= max(10.0 * EXACT, exact):
+            return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
     return "no other length was found that works"
 
 

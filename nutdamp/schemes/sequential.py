@@ -347,11 +347,10 @@ class SymmetricModel:
         channels = {channel.name: channel for channel in self.spacecraft.channels}
         windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
         for pulse in schedule:
-            channel = channels.get(pulse.channel)
-            if channel is None:
-                pulses.append(self._steered(pulse, windows, ready))
+            if pulse.channel in channels:
+                pulses.append(channel_pulse(channels[pulse.channel], pulse.t, pulse.on_time))
             else:
-                pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
+                pulses.append(self._steered(pulse, windows, ready))
             ready = pulses[-1].end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
