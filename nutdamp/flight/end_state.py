@@ -145,9 +145,6 @@ ROWS = 48
 CLOSE, LOOKS, FINER = 3, 3, 9
 """Extremes that are refined, rounds of refinement, points of each: a pulse on the way bends the curve."""
 
-TRIED = 8
-"""Turns of the axis that are examined closely."""
-
 
 class Aspect(NamedTuple):
     """Angles ``least`` and ``largest``, rad, from the direction of ``keep`` to the spin axis, with their times (s)."""
@@ -269,7 +266,7 @@ def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, 
 def _peaks(times: Vector, values: Vector) -> Vector:
     """Times of possible maxima of ``values`` (n,): the largest row, and vertices of parabolas through three rows.
 
-    Of the parabolas with their top between the three the `TRIED` highest count. Rows at the same time, before and after
+    Of the parabolas with their top between the three the eight highest count. Rows at the same time, before and after
     a jump, are no neighbours.
     """
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
@@ -279,5 +276,5 @@ def _peaks(times: Vector, values: Vector) -> Vector:
         peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
     before, after, rise, fall, way = (values[peaked] for values in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
-    highest = np.argsort(-heights)[:TRIED]
+    highest = np.argsort(-heights)[:8]
     return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

@@ -282,12 +282,8 @@ class Flight(Tabled):
     def final(self) -> Final:
         """Final direction of spin axis and angular momentum."""
         state, momentum = self.settled, self.last_momentum
-        return Final(
-            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense])),
-            momentum=np.asarray(momentum / np.linalg.norm(momentum)),
-            spin=state.spin,
-            nutation=self.residual.nutation,
-        )
+        axis = attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense]))
+        return Final(axis, np.asarray(momentum / np.linalg.norm(momentum)), state.spin, self.residual.nutation)
 
     @property
     def last_momentum(self) -> Vector:

@@ -333,10 +333,6 @@ class BlockState:
         return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
 
 
-NUMBERS = ("sun_angle", "longitude", "phasor", "sun_pulse", "spin", "used", "cost")
-"""Fields of `BlockState` that are numbers."""
-
-
 class BlockModel:
     """Closed form of one spacecraft, with the bounds by which its motion is judged."""
 

@@ -12,9 +12,10 @@ import math
 import operator
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import fields
 from heapq import nsmallest
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly, fire_all
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fire_all
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
@@ -293,10 +294,10 @@ class BlockSearch:
         states = [self.state(sequence.blocks) for sequence in before]
         if len(states) == 1:
             return states[0]
-        columns: dict[str, Any] = {
-            name: np.array([getattr(state, name) for state in states])[:, None, None, None] for name in NUMBERS
-        }
-        return BlockState(**columns)
+        names = [field.name for field in fields(BlockState)][:-1]  # of numbers
+        return BlockState(
+            *(np.array([getattr(state, name) for state in states])[:, None, None, None] for name in names)
+        )
 
     def behind(
         self,

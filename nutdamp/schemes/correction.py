@@ -28,10 +28,6 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 
-DIFFERENCE = 1e-6
-"""Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
-
-
 TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
@@ -171,9 +167,9 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    start, scale, lower, upper = np.concatenate([part.free for part in (*pulses, *common)]).T
-    some_seconds = 50_000  # steps of integration
-    x, _ = solve(lambda x: left(build(x)), start, scale, lower, upper, lambda: steps > some_seconds or work.exhausted())
+    free = np.concatenate([part.free for part in (*pulses, *common)])
+    # 50,000 steps of integration take some seconds.
+    x = solve(lambda x: left(build(x)), free, lambda: steps > 50_000 or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, schedule.notes, schedule.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
@@ -281,26 +277,26 @@ def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
     return effective_on_times(channel)[0], max(longest_on_time(spacecraft, channel), pulse.on_time)
 
 
-def solve(
-    residual: Callable[[Vector], Vector],
-    start: Vector,
-    scale: Vector,
-    lower: Vector,
-    upper: Vector,
-    enough: Callable[[], bool] = lambda: False,
-) -> tuple[Vector, float]:
-    """Unknowns (n,) within bounds that make ``residual`` (m,) least in norm, and that norm.
+def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
+    """Unknowns (n,) that make ``residual`` (m,) least in norm.
 
-    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution. It is
-    left as it is once there was ``enough`` work.
+    ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the nearest solution. It
+    is left as it is once there was ``enough`` work.
     """
+    start, scale, lower, upper = free.T
+    difference = 1e-6  # in scaled unknowns: the error of the slopes, far below their size
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
     for _ in range(30):
         if norm <= 1e-14 or enough():  # rad; a few roundings of the integration
             break
-        jacobian = _slopes(residual, x, value, scale)
+        columns = []
+        for index, size in enumerate(scale):
+            moved = x.copy()
+            moved[index] += difference * size
+            columns.append((residual(moved) - value) / difference)
+        jacobian = np.column_stack(columns)
         step = bounded_step(jacobian, value, x, scale, lower, upper)
         before = norm
         for shrink in range(8):
@@ -313,17 +309,7 @@ def solve(
         # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
         if norm > before * (1.0 - 0.01):
             break
-    return x, norm
-
-
-def _slopes(residual: Callable[[Vector], Vector], x: Vector, value: Vector, scale: Vector) -> Vector:
-    """Jacobian by the scaled unknowns, (m, n)."""
-    columns = []
-    for index, size in enumerate(scale):
-        moved = x.copy()
-        moved[index] += DIFFERENCE * size
-        columns.append((residual(moved) - value) / DIFFERENCE)
-    return np.column_stack(columns)
+    return x
 
 
 def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
@@ -440,10 +426,6 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
     return after, flown.steps
 
 
-MOMENTS = 16
-"""Earliest starts that are tried."""
-
-
 def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Schedule]) -> FlownBuilder:
     """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
 
@@ -458,8 +440,9 @@ def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Sc
     best: tuple[float, FlownBuilder] | None = None
     reason: Infeasible | None = None
     steps = 0
-    for number in range(MOMENTS):
-        earliest = here.limits.earliest + number * span / MOMENTS
+    moments = 16  # earliest starts that are tried
+    for number in range(moments):
+        earliest = here.limits.earliest + number * span / moments
         if number > 0 and earliest > 0.5 * here.horizon:  # the rest is for the turn
             break
         try:

@@ -228,10 +228,6 @@ BODY_SAMPLES, BODY_TURNS = 96, 24
 """Moments looked at in each turn of the body, and turns within which the first pulse comes, at most."""
 
 
-OFF_LIMITS = "with commands on the ticks of limits.tick the two pulses touch another limit"
-"""Reason why there are no two pulses."""
-
-
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     """Two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
 
@@ -243,9 +239,8 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
-        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, schedule.pulses):
-            raise Infeasible(OFF_LIMITS)
-        if torquer.torque is not None or not model_of(spacecraft).exact:
+        kept = spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses)
+        if kept and (torquer.torque is not None or not model_of(spacecraft).exact):
             schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
         return _checked(spacecraft, schedule)
     return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
@@ -254,7 +249,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Schedule, if it keeps the limits and comes near the target."""
     if not keeps_limits(spacecraft, schedule.pulses):
-        raise Infeasible(OFF_LIMITS)
+        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
     if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
         return schedule
     widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
@@ -278,9 +273,8 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     if best is None:
         raise Infeasible(search.reason())
     schedule = _checked(spacecraft, best)
-    floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
     first, two = (pulse.channel for pulse in schedule)
-    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / floor:.3f}"
+    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / search.floor:.3f}"
     return Schedule(schedule.pulses, (note("pulse-pair", first=first, second=two, wait_s=wait, ratio=ratio),))
 
 

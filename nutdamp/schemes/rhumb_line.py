@@ -121,10 +121,6 @@ class Train:
         )
         return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
-    def rounding(self, size: float) -> float:
-        """Residual, rad, by rounding the start of one pulse to a tick."""
-        return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
-
     def attempts(self) -> list[Attempt]:
         """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
         return self._free(self.left()) if self.options.on_time is None else self._held(self.left(), self.on_time)
@@ -378,11 +374,8 @@ def _ratio(whole: float, part: float) -> float:
     return whole / part if whole < 1e9 * part else 1e9
 
 
-EXACT = 1e-10
-"""rad of flown residual that counts as nothing."""
-
-CLEARLY = 0.01
-"""Relative saving that is worth more pulses."""
+EXACT, CLEARLY = 1e-10, 0.01
+"""rad of flown residual that count as nothing, and relative saving that is worth more pulses."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
@@ -391,11 +384,11 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
     expect_aim(spacecraft)
-    if options.on_time is None:
-        return _train(spacecraft, options)
     try:
         return _train(spacecraft, options)
     except Infeasible as why:
+        if options.on_time is None:
+            raise
         raise Infeasible(f"{why}; {_another(spacecraft, options)}") from None
 
 
@@ -445,7 +438,9 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     best: tuple[float, Schedule] | None = None
     before = sum(pulse.magnitude for pulse in builder.pulses)
     for attempt in train.attempts():
-        nothing = max(EXACT, train.rounding(attempt.size))
+        # What the rounding of the start of one pulse to a tick leaves counts as nothing.
+        rounding = train.turns_by(attempt.size) / train.h * abs(train.here.spin) * (train.here.limits.tick or 0.0)
+        nothing = max(EXACT, rounding)
         if best is not None and best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
         schedule, left = _flown(builder.fork(), train, attempt)

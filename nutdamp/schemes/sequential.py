@@ -108,10 +108,6 @@ class ImpulseBuilder:
         since = time - self.now
         return since if self._even else energy_sink.course(*self._sink(), since).turned
 
-    def _when(self, turned: float) -> float:
-        """Time at which `_turned` is ``turned`` s."""
-        return self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
-
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
         free, _ = self._coast(time)
@@ -179,7 +175,8 @@ class ImpulseBuilder:
         turns = alignment(self.ready)
         # Rounding to ticks or a disturbance may move 50 in a row to before the actuators are ready.
         for _ in range(len(self.windows.limits.blackout) + 50):
-            centre = self._when(first + turns * self.period)
+            turned = first + turns * self.period
+            centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:

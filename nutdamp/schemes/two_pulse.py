@@ -31,9 +31,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerabl
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
-STILL = 0.1
-"""Angle in rad: channels that turn no further within the horizon stand still in space, as those of a despun body."""
-
 SHORTLIST = 6
 """Candidates that are flown and corrected, at most."""
 
@@ -88,17 +85,25 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
-    inertia, windows = spacecraft.inertia, Windows(spacecraft)
+    inertia, windows, earliest = spacecraft.inertia, Windows(spacecraft), spacecraft.limits.earliest
     form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
     halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
-    placed = (
-        _pair(spacecraft, torquer, halves, start, wait, on_times)
-        for wait in (number * halves.wait for number in turns)
-        for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
-    )
-    best = next((pulses for pulses in placed if keeps_limits(spacecraft, pulses)), None)
+
+    def pair(start: float, wait: float) -> tuple[Pulse, ...]:
+        """The two pulses against ω, the first from ``start`` s on."""
+        builder = ImpulseBuilder(spacecraft)
+        for later, on_time, half in zip((0.0, wait), on_times, halves[:2], strict=True):
+            begin = windows.nearest_tick(start + 0.5 * on_times[0] + later - 0.5 * on_time)
+            centre = begin + 0.5 * on_time
+            requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
+            builder.fire(steerable_pulse(torquer, centre, cmath.phase(-builder.omega_at(centre)), **requested))
+        return tuple(builder.pulses)
+
+    waits = [number * halves.wait for number in turns]
+    starts = ((start, wait) for wait in waits for start in _starts(windows, earliest, on_times, wait))
+    best = next((pulses for pulses in itertools.starmap(pair, starts) if keeps_limits(spacecraft, pulses)), None)
     if best is None:
         raise Infeasible(
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
@@ -133,24 +138,6 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
     allowed = windows.allowed(starts, long, earliest) & (seconds > starts)  # not on one tick, however long that is
     allowed &= windows.allowed(seconds, longer, starts + long + windows.limits.gap)
     return [float(start) for start in starts[allowed]]
-
-
-def _pair(
-    spacecraft: Spacecraft,
-    torquer: Steerable,
-    halves: rigid_body.HalfPulses,
-    start: float,
-    wait: float,
-    on_times: tuple[float, ...],
-) -> tuple[Pulse, ...]:
-    """The two pulses against ω, the first from ``start`` s on."""
-    builder = ImpulseBuilder(spacecraft)
-    for later, on_time, half in zip((0.0, wait), on_times, halves[:2], strict=True):
-        begin = builder.windows.nearest_tick(start + 0.5 * on_times[0] + later - 0.5 * on_time)
-        centre = begin + 0.5 * on_time
-        requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
-        builder.fire(steerable_pulse(torquer, centre, cmath.phase(-builder.omega_at(centre)), **requested))
-    return tuple(builder.pulses)
 
 
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
@@ -219,8 +206,9 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
     rate = turning + C / A * spin / math.cos(0.5 * theta)
     to_go = math.pi - turn
-    if abs(rate) * spacecraft.horizon < STILL:  # the channels stand still in space: they close at any time, or never
-        if abs(cmath.phase(cmath.rect(1.0, to_go))) > STILL:
+    still = 0.1  # rad; channels that turn no further stand still in space: they close at any time, or never
+    if abs(rate) * spacecraft.horizon < still:
+        if abs(cmath.phase(cmath.rect(1.0, to_go))) > still:
             return []
         to_go, rate = -turn, turning  # until the second opposes ω as the first does
     if rate == 0.0:

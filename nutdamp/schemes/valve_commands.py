@@ -33,9 +33,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
 """Addition to the reasons of schemes, which know nothing of valves."""
 
-ROUNDING = 1e-12
-"""Share by which an on-time may pass its bounds."""
-
 
 def plain(
     spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
@@ -248,9 +245,9 @@ def _outside(
         level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
         if shed(spacecraft) is not None:
             level = planned_.on_time / pulse.on_time
-        if pulse.on_time > most * (1.0 + ROUNDING):
+        if pulse.on_time > most * (1.0 + 1e-12):
             weak.append(level)
-        if pulse.on_time < least * (1.0 - ROUNDING):
+        if pulse.on_time < least * (1.0 - 1e-12):
             strong.append(level)
     return weak, strong, longer
 
