@@ -167,7 +167,7 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    free = np.concatenate([part.free for part in (*pulses, *common)])
+    free = np.concatenate([*(pulse.free for pulse in pulses), *(factor.free for factor in common)])
     # 50,000 steps of integration take some seconds.
     x = solve(lambda x: left(build(x)), free, lambda: steps > 50_000 or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
