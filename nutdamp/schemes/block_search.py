@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import fields
 from heapq import nsmallest
 from itertools import islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -295,9 +295,8 @@ class BlockSearch:
         if len(states) == 1:
             return states[0]
         names = [field.name for field in fields(BlockState)][:-1]  # of numbers
-        return BlockState(
-            *(np.array([getattr(state, name) for state in states])[:, None, None, None] for name in names)
-        )
+        columns: dict[str, Any] = {name: np.array([getattr(state, name) for state in states]) for name in names}
+        return BlockState(**{name: column[:, None, None, None] for name, column in columns.items()})
 
     def behind(
         self,

@@ -309,7 +309,7 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
         # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
         if norm > before * (1.0 - 0.01):
             break
-    return x
+    return np.asarray(x)
 
 
 def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
