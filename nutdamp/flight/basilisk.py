@@ -1,15 +1,9 @@
 """Flight by Basilisk, an independent simulator (extra ``verify``): a check from outside the project.
 
-Basilisk's clock counts whole nanoseconds, its tasks run on a grid of equal steps, and a stop off the grid is made
-early. Every stretch of constant torque is therefore flown in a unit of time of its own, κ seconds, in which it lasts a
-whole number of steps: the rates go in as κω, the torque as κ²M, which leaves Euler's equations as they are. Pulses
-begin and end exactly; neither their times nor their impulses are rounded to nanoseconds.
-
-The hub is integrated by Runge-Kutta-Fehlberg 7(8) at a fixed step, attitude in modified Rodrigues parameters (MRPs).
-At the default step the flight agrees with `propagation.flown` to some 1e-12 rad over hundreds of radians.
-
-A wheel is a balanced reaction wheel without motor torque, whose rotor adds its own axial moment to the hub: the rotor
-keeps its momentum I_w (ω3 + Ω) = h, and the hub turns about axis 3 as if it were not there.
+Its clock counts whole nanoseconds, and a stop off the grid of its steps is made early. So every stretch of constant
+torque is flown in a unit of time of its own, κ seconds, in which it lasts a whole number of steps: the rates go in as
+κω, the torque as κ²M, which leaves Euler's equations as they are. A wheel is a balanced reaction wheel without motor
+torque, whose rotor adds its own axial moment to the hub: the rotor keeps its momentum I_w (ω3 + Ω) = h.
 """
 
 from __future__ import annotations
@@ -18,6 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,20 +21,11 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
-TURN = 0.1
-"""Largest turn of the body within a default step, rad: its error is below rounding."""
-
-TURN_TURNING = 0.05
-"""rad; the same where a torque turns in the body: held constant for half of each pair of steps, to fourth order."""
+TURN, TURN_TURNING = 0.1, 0.05
+"""Largest turn of the body within a default step, rad, also where a torque turns in the body: errors below rounding."""
 
 MOST_STEPS = 200_000
 """Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
-
-ROTOR = 0.01
-"""Axial moment of the rotor of a wheel, over that of the body: any will do."""
-
-ACCEPT_ALL = 1e30
-"""Tolerance that no step fails, so that the integrator keeps its step."""
 
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of the two Gauss nodes from the middle of an interval, over its length."""
@@ -155,7 +141,7 @@ class _Hub:
     """Rigid hub in Basilisk with a torque on it, in the state of ``spacecraft`` at t = 0, in principal axes."""
 
     def __init__(self, spacecraft: Spacecraft, longest: float) -> None:
-        basilisk = _Modules()
+        basilisk = _modules()
         self._longest = longest
         self._moments = np.asarray(spacecraft.inertia.moments)
         self._period = max(round(longest * 1e9), 1)
@@ -163,10 +149,11 @@ class _Hub:
         initial = spacecraft.initial
         self._body = basilisk.spacecraft.Spacecraft()
         self._body.ModelTag = "body"
-        rotor = ROTOR * self._moments[2] if spacecraft.inertia.wheel else 0.0
+        rotor = 0.01 * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
         self._body.hub.IHubPntBc_B = np.diag(self._moments + np.array([0.0, 0.0, rotor])).tolist()
         self._body.hub.omega_BN_BInit = _column(initial.rates)
-        self._body.hub.sigma_BNInit = _column(_to_mrp(initial.quaternion))
+        upper = -initial.quaternion if initial.quaternion[0] < 0.0 else initial.quaternion
+        self._body.hub.sigma_BNInit = _column(upper[1:] / (1.0 + upper[0]))  # MRPs e·tan(φ/4), |σ| <= 1
         self._torque = basilisk.extForceTorque.ExtForceTorque()
         self._torque.ModelTag = "torque"
         self._body.addDynamicEffector(self._torque)
@@ -183,7 +170,7 @@ class _Hub:
             self._body.addStateEffector(self._wheel)
         # Kept here, as all its objects are: Basilisk's own hold on them is a plain pointer.
         self._integrator = basilisk.svIntegrators.svIntegratorRKF78(self._body)
-        self._integrator.relTol = self._integrator.absTol = ACCEPT_ALL
+        self._integrator.relTol = self._integrator.absTol = 1e30  # no step fails, so that it keeps its step
         self._body.setIntegrator(self._integrator)
         self._simulation = basilisk.SimulationBaseClass.SimBaseClass()
         self._simulation.bskLogger.setLogLevel(basilisk.bskLogging.BSK_ERROR)  # handed on to the models
@@ -224,32 +211,26 @@ class _Hub:
             self._spun.setState([[(self._speed - float(rates[2])) * unit]])
 
 
-class _Modules:
-    """Modules of Basilisk for a flight, loaded on demand."""
+MODULES = {
+    "utilities": ("SimulationBaseClass",),
+    "architecture": ("bskLogging", "messaging"),
+    "simulation": ("spacecraft", "reactionWheelStateEffector", "extForceTorque", "svIntegrators"),
+}
+"""Modules of Basilisk for a flight."""
 
-    def __init__(self) -> None:
-        try:
-            import_module("Basilisk")
-            self.SimulationBaseClass: Any = import_module("Basilisk.utilities.SimulationBaseClass")
-            self.bskLogging: Any = import_module("Basilisk.architecture.bskLogging")
-            self.spacecraft: Any = import_module("Basilisk.simulation.spacecraft")
-            self.messaging: Any = import_module("Basilisk.architecture.messaging")
-            self.reactionWheelStateEffector: Any = import_module("Basilisk.simulation.reactionWheelStateEffector")
-            self.extForceTorque: Any = import_module("Basilisk.simulation.extForceTorque")
-            self.svIntegrators: Any = import_module("Basilisk.simulation.svIntegrators")
-        except ImportError as reason:
-            raise MissingExtra("verify", "flying with Basilisk") from reason
+
+def _modules() -> Any:
+    """The `MODULES` by name, loaded on demand."""
+    paths = {name: f"Basilisk.{package}.{name}" for package, names in MODULES.items() for name in names}
+    try:
+        return SimpleNamespace(**{name: import_module(path) for name, path in paths.items()})
+    except ImportError as reason:
+        raise MissingExtra("verify", "flying with Basilisk") from reason
 
 
 def _column(vector: Vector) -> list[list[float]]:
     """Vector as a Basilisk column."""
     return [[float(component)] for component in vector]
-
-
-def _to_mrp(quaternion: Vector) -> Vector:
-    """MRPs e·tan(φ/4) of a unit quaternion (4,), |σ| <= 1; of q and -q the one whose scalar part is not negative."""
-    upper = -quaternion if quaternion[0] < 0.0 else quaternion
-    return np.asarray(upper[1:] / (1.0 + upper[0]))
 
 
 def _from_mrp(sigma: Vector) -> Vector:

@@ -18,7 +18,6 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.common.numerics import gauss_legendre
-from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, energy_sink, taylor, triaxial
 from nutdamp.physics.taylor import Falling, Forcing, TaylorPiece
 from nutdamp.physics.thruster import Ramp, Tank
@@ -54,16 +53,12 @@ class Arc:
     state: SpinState
     growth: float = 0.0
     wheel: float = 0.0
+    steps: int = 0
 
     @classmethod
     def of(cls, inertia: Inertia, state: SpinState, start: float = 0.0) -> Arc:
         """Coast of a body without dissipation."""
         return cls(inertia.A, inertia.C, start, state, wheel=inertia.wheel)
-
-    @property
-    def steps(self) -> int:
-        """A closed form takes none."""
-        return 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
@@ -97,11 +92,7 @@ class FreeCoast:
     moments: tuple[float, float, float]
     start: float
     state: SpinState
-
-    @property
-    def steps(self) -> int:
-        """A closed form takes none."""
-        return 0
+    steps: int = 0
 
     def motion(self, times: Vector) -> tuple[Vector, Vector]:
         """Rates (n, 3) in rad/s and quaternions (n, 4) at ``times`` (n,) s."""
@@ -175,13 +166,6 @@ class Dynamics:
         """True if coasts are arcs of a symmetric body without external torque, known in closed form."""
         return self.moments[0] == self.moments[1] and not self.constant.any() and not self.forcing.turning
 
-    @property
-    def step_cost(self) -> float:
-        """Units of `work` of one step of integration."""
-        if self.forcing.growth != 0.0:
-            return SUNK_STEP
-        return SPUN_STEP if self.moments[0] == self.moments[1] else STEP
-
     def path(
         self,
         state: SpinState,
@@ -226,7 +210,8 @@ class Dynamics:
         pieces = taylor.integrate(
             self.moments, torque, state.rates, state.quaternion, start, end, self.forcing, most, slope, falling
         )
-        work.spend(PULSE + self.step_cost * len(pieces))
+        step = SPUN_STEP if self.moments[0] == self.moments[1] else STEP
+        work.spend(PULSE + (SUNK_STEP if self.forcing.growth != 0.0 else step) * len(pieces))
         rates_, quaternion_ = pieces[-1].final
         return Integrated(tuple(pieces)), SpinState(complex(rates_[0], rates_[1]), float(rates_[2]), quaternion_)
 
@@ -244,21 +229,11 @@ class Dynamics:
 def make_dynamics(spacecraft: Spacecraft) -> Dynamics:
     """Dynamics of the true principal moments and disturbances."""
     disturbances = spacecraft.disturbances
-    fixed = [disturbance for disturbance in disturbances if disturbance.rate == 0.0]
-    transverse = sum(disturbance.transverse for disturbance in fixed)
-    return Dynamics(
-        moments=spacecraft.inertia.moments,
-        constant=np.array(
-            [transverse.real, transverse.imag, math.fsum(disturbance.axial for disturbance in disturbances)]
-        ),
-        forcing=Forcing(
-            turning=tuple(
-                (disturbance.transverse, disturbance.rate) for disturbance in disturbances if disturbance.rate != 0.0
-            ),
-            growth=spacecraft.growth,
-            wheel=spacecraft.inertia.wheel,
-        ),
-    )
+    fixed = sum(disturbance.transverse for disturbance in disturbances if disturbance.rate == 0.0)
+    turning = tuple((each.transverse, each.rate) for each in disturbances if each.rate != 0.0)
+    axial = math.fsum(disturbance.axial for disturbance in disturbances)
+    forcing = Forcing(turning=turning, growth=spacecraft.growth, wheel=spacecraft.inertia.wheel)
+    return Dynamics(spacecraft.inertia.moments, np.array([fixed.real, fixed.imag, axial]), forcing)
 
 
 def shed(spacecraft: Spacecraft) -> Vector | None:
@@ -307,16 +282,6 @@ class Lightening:
         return body, Falling(-rate * self.per_kg, -growth * self.per_kg)
 
 
-EVEN = 0.01
-"""Share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse."""
-
-NODES = 6
-"""Nodes of the quadrature in each of them."""
-
-REPEATED, CLOSE = 60, 1e-14
-"""Iterations, and relative tolerance of the on-time for an impulse."""
-
-
 class Supply:
     """Supply state: pulses fired by channel, and propellant used, kg: numbers, or arrays of cases.
 
@@ -349,12 +314,6 @@ class Supply:
         """Propellant used since t = 0, kg."""
         tank = self.spacecraft.tank
         return self.used if tank is None else np.minimum(self.used, tank.propellant) - tank.used
-
-    def level(self, channel: str) -> Any:
-        """Thrust of the next pulse of ``channel``, over that of the file."""
-        cold, tank = self.spacecraft.cold, self.spacecraft.tank
-        level = 1.0 if cold is None else cold.factor(self.fired[channel])
-        return level if tank is None else level * tank.thrust_factor(self.used)
 
     def fire(self, pulse: Pulse, channel: Channel | None) -> Pulse:
         """Fire a pulse; returns it at its real strength."""
@@ -393,9 +352,9 @@ class Supply:
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
-        for _ in range(REPEATED if flow is not None else 0):
+        for _ in range(60 if flow is not None else 0):
             before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
-            if abs(on_time - before) <= CLOSE * on_time:
+            if abs(on_time - before) <= 1e-14 * on_time:
                 break
         return on_time
 
@@ -422,7 +381,7 @@ class Supply:
         flow, tank, cold = self.full_flow(channel), self.spacecraft.tank, self.spacecraft.cold
         warmth = 1.0 if cold is None else cold.factor(self.fired[channel.name])
         if flow is None or tank is None:
-            level = self.level(channel.name)
+            level = warmth if tank is None else warmth * tank.thrust_factor(self.used)
             propellant = None if flow is None else flow * on_time * level
         else:
             propellant, level = tank.burn(self.used, flow * warmth, on_time)
@@ -445,11 +404,6 @@ class Supply:
             return None
         return f"takes {self.used:.4g} kg of propellant, and the tank has {tank.propellant:.4g} kg"
 
-    def expect_to_last(self) -> None:
-        """Raise Infeasible where there is a `shortage`."""
-        if self.shortage is not None:
-            raise Infeasible(self.shortage)
-
 
 def weakened(pulse: Pulse, factor: float) -> Pulse:
     """Pulse at ``factor`` times the thrust; reversed where that is negative."""
@@ -468,8 +422,8 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
     gone, mean = tank.burn(used, flow, pulse.on_time)
     first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
-    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
-    nodes, weights = gauss_legendre(NODES)
+    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / 0.01)), list[Ramp](), 0.0, 0.0
+    nodes, weights = gauss_legendre(6)
     for ramp in command.ramps:
         length = (ramp.end - ramp.begin) / pieces
         for number in range(pieces):

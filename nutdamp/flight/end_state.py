@@ -56,9 +56,6 @@ def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
     return np.asarray(total)
 
 
-SHARE = 0.1
-"""Tolerance of the impulse sum, as a fraction of a bound of the requirement."""
-
 ANGLE = math.radians(0.01)
 """Tolerance where nothing is required, rad."""
 
@@ -85,11 +82,10 @@ def seen_at(flight: Flight, time: float) -> Flight:
     first, second, third = rates[0].tolist()
     begun = [begins < time or begins == ends == time for begins, ends in flight.spans]
     kept = [index for index, flag in enumerate(begun) if flag]
+    some = Schedule(tuple(flight.schedule.pulses[index] for index in kept))
     return replace(
         flight,
-        schedule=flight.schedule
-        if len(kept) == len(flight.schedule)
-        else Schedule(tuple(flight.schedule.pulses[index] for index in kept)),
+        schedule=flight.schedule if all(begun) else some,
         settled=SpinState(complex(first, second), third, quaternion[0]),
         spans=tuple((flight.spans[index][0], min(flight.spans[index][1], time)) for index in kept),
         until=time,
@@ -127,7 +123,7 @@ def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
 
     A tenth of what is required; `ANGLE` for a part that nothing bounds.
     """
-    required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
+    required = {bound.part: 0.1 * bound.most for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
 
@@ -148,9 +144,6 @@ ROWS = 48
 
 CLOSE, LOOKS, FINER = 3, 3, 9
 """Extremes that are refined, rounds of refinement, points of each: a pulse on the way bends the curve."""
-
-TRIED = 8
-"""Turns of the axis that are examined closely."""
 
 
 class Aspect(NamedTuple):
@@ -224,10 +217,8 @@ def broken(spacecraft: Spacecraft, flown: Flight) -> Aspect | None:
 
 def at_target(spacecraft: Spacecraft) -> Aspect | None:
     """First cone violated by an axis on the target; None where there is none, or no target."""
-    if spacecraft.goal.axis is None:
-        return None
     target = spacecraft.goal.axis
-    angles = (_seen(target, target, keep, math.inf) for keep in spacecraft.keep)
+    angles = [] if target is None else [_seen(target, target, keep, math.inf) for keep in spacecraft.keep]
     return next((aspect for aspect in angles if not aspect.kept), None)
 
 
@@ -282,7 +273,7 @@ def _closer(flown: Flight, keep: Keep, way: float, times: Vector, width: float, 
 def _peaks(times: Vector, values: Vector) -> Vector:
     """Times of possible maxima of ``values`` (n,): the largest row, and vertices of parabolas through three rows.
 
-    Of the parabolas with their top between the three the `TRIED` highest count. Rows at the same time, before and after
+    Of the parabolas with their top between the three the eight highest count. Rows at the same time, before and after
     a jump, are no neighbours.
     """
     before, after = np.diff(times)[:-1], np.diff(times)[1:]
@@ -292,5 +283,5 @@ def _peaks(times: Vector, values: Vector) -> Vector:
         peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
     before, after, rise, fall, way = (values[peaked] for values in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
-    highest = np.argsort(-heights)[:TRIED]
+    highest = np.argsort(-heights)[:8]
     return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

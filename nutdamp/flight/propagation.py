@@ -11,7 +11,6 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,38 +52,11 @@ class Track:
     pulse: NDArray[np.int64]
 
 
-def make_track(
-    moments: Array,
-    sense: float,
-    wheel: float,
-    t: Array,
-    rates: Array,
-    quaternion: Array,
-    pulse: NDArray[np.int64],
-) -> Track:
-    """Everything that follows from rates (n, 3) and attitude (n, 4) for a body with principal ``moments`` (kg m²).
-
-    These are (3,), or (n, 3) where they change; ``wheel`` is h in N m s. The spin axis is ``sense``·e3. The cone angles
-    are those of each moment; with I1 ≠ I2 they swing, see `widest`.
-    """
-    momentum = rates * moments + np.array([0.0, 0.0, wheel])
-    nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
-    body_cone = np.arctan2(np.hypot(rates[:, 0], rates[:, 1]), sense * rates[:, 2])
-    return Track(
-        t=t,
-        rates=rates,
-        quaternion=quaternion,
-        axis=attitude.rotate(quaternion, np.array([0.0, 0.0, sense])),
-        momentum=attitude.rotate(quaternion, momentum),
-        nutation=nutation,
-        body_cone=body_cone,
-        space_cone=nutation - body_cone,
-        pulse=pulse,
-    )
-
-
 def widest(track: Track, moments: Array, sense: float, wheel: float) -> Track:
-    """Track with the cone angles at the largest nutation of the free motion through each row, as `make_track`."""
+    """Track with the cone angles at the largest nutation of the free motion through each row.
+
+    ``moments`` (kg m²) are (3,), or (n, 3) where they change; ``wheel`` is h in N m s. The spin axis is ``sense``·e3.
+    """
     if np.array_equal(moments[..., 0], moments[..., 1]):
         return track
     nutation, body_cone = widest_cones(np.broadcast_to(moments, track.rates.shape).T, track.rates.T, sense, wheel)
@@ -97,18 +69,11 @@ def in_file_axes(track: Track, inertia: Inertia) -> Track:
     return replace(track, rates=rates, quaternion=quaternion)
 
 
-class EvenTimes(NamedTuple):
-    """Part of the even times (n,) s within a stretch; ``first`` and ``last`` part of it."""
-
-    times: Array
-    first: bool
-    last: bool
-
-
-def even_times(samples: int, until: float, start: float, end: float) -> Iterator[EvenTimes]:
+def even_times(samples: int, until: float, start: float, end: float) -> Iterator[tuple[Array, bool, bool]]:
     """Members of ``samples`` even times from 0 to ``until`` s between ``start`` and ``end``, `PIECE` at a time.
 
-    There is one part at least, which may be empty. The times are those of np.linspace.
+    Each part with marks of the first and of the last one. There is one at least, which may be empty. The times are
+    those of np.linspace.
     """
     step = until / max(samples - 1, 1)
     low, high = (min(max(int(time / step) + more, 0), samples) for time, more in ((start, -1), (end, 2)))
@@ -117,8 +82,7 @@ def even_times(samples: int, until: float, start: float, end: float) -> Iterator
         times: Array = np.asarray(index * step, dtype=np.float64)
         if samples > 1:
             times[index == samples - 1] = until
-        inside = times[(times > start) & (times < end)]
-        yield EvenTimes(inside, begin == low, begin + PIECE >= high)
+        yield times[(times > start) & (times < end)], begin == low, begin + PIECE >= high
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +107,8 @@ class Extremes:
 def extremes(pieces: Iterable[Track]) -> Extremes:
     """Extremes of the axis track over the rows of its pieces, at least one."""
     rows, until, start = 0, 0.0, np.zeros(3)
-    far, near = _Record(), _Record()
-    ranges, ascension = _Range(3), _Circle()
+    far, near, ascension = _Record(), _Record(), _Circle()
+    low, high = np.full(3, math.inf), np.full(3, -math.inf)
     for piece in pieces:
         if not len(piece.t):
             continue
@@ -154,10 +118,11 @@ def extremes(pieces: Iterable[Track]) -> Extremes:
         far.add(away, piece.t)
         near.add(-away, piece.t)
         declination = np.arctan2(piece.axis[:, 2], np.hypot(piece.axis[:, 0], piece.axis[:, 1]))
-        ranges.add(np.column_stack([np.arcsin(np.clip(piece.axis[:, :2], -1.0, 1.0)), declination]))
+        angles = np.column_stack([np.arcsin(np.clip(piece.axis[:, :2], -1.0, 1.0)), declination])
+        low, high = np.minimum(low, angles.min(axis=0)), np.maximum(high, angles.max(axis=0))
         ascension.add(np.arctan2(piece.axis[:, 1], piece.axis[:, 0]))
     nearest, when = near.first
-    x, y, declinations = ranges.pairs
+    x, y, declinations = zip(low.tolist(), high.tolist(), strict=True)
     return Extremes(rows, until, far.first, (-nearest, when), x, y, ascension.shortest, declinations)
 
 
@@ -182,20 +147,6 @@ class _Record:
     @property
     def first(self) -> tuple[float, float]:
         return float(self.values[0]), float(self.times[0])
-
-
-class _Range:
-    """Least and largest of some quantities."""
-
-    def __init__(self, count: int) -> None:
-        self.low, self.high = np.full(count, math.inf), np.full(count, -math.inf)
-
-    def add(self, values: Array) -> None:
-        self.low, self.high = np.minimum(self.low, values.min(axis=0)), np.maximum(self.high, values.max(axis=0))
-
-    @property
-    def pairs(self) -> list[tuple[float, float]]:
-        return list(zip(self.low.tolist(), self.high.tolist(), strict=True))
 
 
 class _Circle:
@@ -331,12 +282,8 @@ class Flight(Tabled):
     def final(self) -> Final:
         """Final direction of spin axis and angular momentum."""
         state, momentum = self.settled, self.last_momentum
-        return Final(
-            axis=attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense])),
-            momentum=np.asarray(momentum / np.linalg.norm(momentum)),
-            spin=state.spin,
-            nutation=self.residual.nutation,
-        )
+        axis = attitude.rotate(state.quaternion, np.array([0.0, 0.0, self.spacecraft.sense]))
+        return Final(axis, np.asarray(momentum / np.linalg.norm(momentum)), state.spin, self.residual.nutation)
 
     @property
     def last_momentum(self) -> Vector:
@@ -405,9 +352,18 @@ class Flight(Tabled):
             yield self._joined(motions)
 
     def _joined(self, motions: Iterable[Motion]) -> Track:
-        t, body, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
-        sense, wheel = self.spacecraft.sense, self.spacecraft.inertia.wheel
-        return make_track(self.moments_at(t), sense, wheel, t, body, quaternion, pulse)
+        t, rates, quaternion, pulse = (np.concatenate(column) for column in zip(*motions, strict=True))
+        return self._track(t, rates, quaternion, pulse)
+
+    def _track(self, t: Vector, rates: Vector, quaternion: Vector, pulse: NDArray[np.int64]) -> Track:
+        """All that follows from the motion. Cone angles are of each moment; with I1 ≠ I2 they swing: see `widest`."""
+        sense = self.spacecraft.sense
+        momentum = rates * self.moments_at(t) + np.array([0.0, 0.0, self.spacecraft.inertia.wheel])
+        nutation = np.arctan2(np.hypot(momentum[:, 0], momentum[:, 1]), sense * momentum[:, 2])
+        body_cone = np.arctan2(np.hypot(rates[:, 0], rates[:, 1]), sense * rates[:, 2])
+        axis = attitude.rotate(quaternion, np.array([0.0, 0.0, sense]))
+        in_space = attitude.rotate(quaternion, momentum)
+        return Track(t, rates, quaternion, axis, in_space, nutation, body_cone, nutation - body_cone, pulse)
 
     def _motions(self, samples: int, until: float) -> Iterator[Motion]:
         """Rows of a track by leg, and each leg in stretches of `track.PIECE` even times."""
@@ -415,9 +371,9 @@ class Flight(Tabled):
             if leg.start > until:
                 break
             end = min(leg.end, until)
-            for part in even_times(samples, until, leg.start, end):
-                times = np.concatenate([[leg.start], part.times]) if leg.jump and part.first else part.times
-                times = np.append(times, end) if part.last and end > leg.start else times
+            for times, first, last in even_times(samples, until, leg.start, end):
+                times = np.concatenate([[leg.start], times]) if leg.jump and first else times
+                times = np.append(times, end) if last and end > leg.start else times
                 body, quaternion = leg.path.motion(times)
                 completed = np.full(len(times), leg.completed)
                 completed[times == leg.end] = leg.completed_at_end
@@ -439,7 +395,7 @@ class Flight(Tabled):
         quaternion = np.concatenate([np.empty((0, 4)), *(turn for _, _, turn in states)])
         numbers = completed + np.arange(len(t), dtype=np.int64)
         moments, sense, wheel = self.moments_at(t), self.spacecraft.sense, self.spacecraft.inertia.wheel
-        return widest(make_track(moments, sense, wheel, t, body, quaternion, numbers), moments, sense, wheel)
+        return widest(self._track(t, body, quaternion, numbers), moments, sense, wheel)
 
 
 def by_impulses(spacecraft: Spacecraft, schedule: Schedule, until: float = 0.0) -> Flight:
@@ -525,9 +481,8 @@ def flown(
         # So late, start and end of a very short pulse may be the same number: then it too acts at once.
         kicks = [pulses[index].impulse for index in np.flatnonzero((starts == now) & (ends == now))]
         if kicks and now == 0.0:  # so that the motion just before the kick is there too
-            legs.append(
-                Leg(now, now, dynamics.path(state, now, now, most=allowed)[0], 0, jump=True, completed_at_end=0)
-            )
+            path, _ = dynamics.path(state, now, now, most=allowed)
+            legs.append(Leg(now, now, path, 0, jump=True, completed_at_end=0))
         for kick in kicks:
             state = light.halfway(dynamics, now).kicked(state, kick)
         if now == over:

@@ -19,7 +19,7 @@ from nutdamp.common import work
 from nutdamp.errors import Infeasible, MissingExtra
 from nutdamp.flight import basilisk, propagation
 from nutdamp.flight.dynamics import lacking, shed, supplied
-from nutdamp.flight.propagation import Flight, Residual
+from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude, response
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.constraints import commandable
@@ -109,10 +109,7 @@ class EulerEquations:
             constant = constant + torque
             slope = slope if rise is None else slope + rise
         pushed, rising = ((self.axes @ part).tolist() for part in (constant, slope))
-        disturbances = [
-            (disturbance.rate, disturbance.transverse, disturbance.axial)
-            for disturbance in self.spacecraft.disturbances
-        ]
+        disturbances = [(each.rate, each.transverse, each.axial) for each in self.spacecraft.disturbances]
         principal = self.axes.tolist()
 
         # Plain numbers: an evaluation takes a tenth of what it takes with arrays of three.
@@ -155,10 +152,8 @@ class EulerEquations:
             return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         size = math.sqrt(squared)
         cosine = sum(part * along for part, along in zip(momentum, self.axis, strict=True)) / size
-        drive = [
-            self.growth * cosine * (cosine * part - size * along)
-            for part, along in zip(momentum, self.axis, strict=True)
-        ]
+        pairs = zip(momentum, self.axis, strict=True)
+        drive = [self.growth * cosine * (cosine * part - size * along) for part, along in pairs]
         return drive, [part / squared for part in _cross(drive, momentum)]
 
 
@@ -323,19 +318,18 @@ def verify(
     end = schedule.end + spacecraft.inertial_period
     judge = propagation.flown(spacecraft, schedule, end)
     times = np.unique(np.concatenate([np.linspace(0.0, end, SAMPLES), [pulse.over for pulse in schedule]]))
-    reference = judge.motion(times)
     methods = [
-        _closed_form(judge, end, times, reference),
+        _closed_form(judge, end, times),
         Method("flown (Taylor series)", judge.residual.nutation, judge.residual.momentum_shift, 0.0, 0.0, 0.0),
     ]
     with work.steps(2.0 if find_spec("Basilisk") else 1.0):  # all else takes no time beside these two
         with work.steps(end):
-            methods.append(_by_dop853(judge, times, reference))
+            methods.append(_by_dop853(judge, times))
         methods.append(_by_basilisk(judge, end))
     return Verification(tuple(methods), *_conserved(judge), _budget(spacecraft, schedule, unrounded, expected=expected))
 
 
-def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vector, Vector]) -> Method:
+def _closed_form(judge: Flight, end: float, times: Vector) -> Method:
     """Exact arcs between effective impulses; where ω3 keeps between them, the rates by the sum (17) written out."""
     spacecraft, schedule = judge.spacecraft, judge.schedule
     arcs = propagation.by_impulses(spacecraft, schedule, end)
@@ -356,58 +350,47 @@ def _closed_form(judge: Flight, end: float, times: Vector, reference: tuple[Vect
         body = np.column_stack([omega.real, omega.imag, spin])
     outside = np.all([(times <= pulse.thrust[0]) | (times >= pulse.thrust[1]) for pulse in schedule], axis=0)
     between = np.broadcast_to(outside, times.shape)  # within a pulse the impulse has been given or not
-    return _method("impulse sum (17), arcs", judge, times, arcs.residual, (body, quaternion), reference, between)
+    residual = arcs.residual
+    name, left = "impulse sum (17), arcs", (residual.nutation, residual.momentum_shift)
+    return Method(name, *left, *_differences(judge, times, (body, quaternion), between))
 
 
-def _by_dop853(judge: Flight, times: Vector, reference: tuple[Vector, Vector]) -> Method:
+def _by_dop853(judge: Flight, times: Vector) -> Method:
     name = "DOP853, full tensor"
     try:
-        motion = integrate(judge.spacecraft, judge.schedule, times)
+        return _from_outside(name, judge, times, integrate(judge.spacecraft, judge.schedule, times))
     except Infeasible as reason:
         return Method(name, missing=str(reason), outside=True)
-    return _compared(name, judge, times, motion, reference)
 
 
 def _by_basilisk(judge: Flight, end: float) -> Method:
-    name = "Basilisk"
     if shed(judge.spacecraft) is not None:
-        return Method(name, missing="it flies with constant moments, and those of the file fall", outside=True)
+        return Method("Basilisk", missing="it flies with constant moments, and those of the file fall", outside=True)
     try:
         flown = basilisk.fly(judge.spacecraft, judge.schedule, end)
     except (MissingExtra, Infeasible) as reason:
-        return Method(name, missing=str(reason), outside=True)
-    return _compared(name, judge, flown.t, (flown.rates, flown.quaternion), judge.motion(flown.t))
+        return Method("Basilisk", missing=str(reason), outside=True)
+    return _from_outside("Basilisk", judge, flown.t, (flown.rates, flown.quaternion))
 
 
-def _compared(
-    name: str, judge: Flight, times: Vector, motion: tuple[Vector, Vector], reference: tuple[Vector, Vector]
-) -> Method:
+def _from_outside(name: str, judge: Flight, times: Vector, motion: tuple[Vector, Vector]) -> Method:
     """A method that gives motion only: its residual is read at the first time after the last pulse."""
-    last = int(np.searchsorted(times, judge.schedule.end - 1e-9))
-    craft = judge.spacecraft
+    last, craft = int(np.searchsorted(times, judge.schedule.end - 1e-9)), judge.spacecraft
+    rates, quaternion = (part[last] for part in motion)
     inertia = replace(craft.inertia, moments=judge.last_moments)
-    after = attitude.rotate(motion[1][last], inertia.momentum(motion[0][last]))
-    shift = float(attitude.angle_between(craft.momentum, after))
-    left = arc_cones(inertia.moments, motion[0][last], craft.sense, inertia.wheel)
-    residual = Residual(left.nutation, left.body, left.space, shift, shift)
-    method = _method(name, judge, times, residual, motion, reference, np.ones(len(times), dtype=bool))
-    return replace(method, outside=True)
+    shift = float(attitude.angle_between(craft.momentum, attitude.rotate(quaternion, inertia.momentum(rates))))
+    nutation = arc_cones(inertia.moments, rates, craft.sense, inertia.wheel).nutation
+    return Method(name, nutation, shift, *_differences(judge, times, motion), outside=True)
 
 
-def _method(
-    name: str,
-    judge: Flight,
-    times: Vector,
-    residual: Residual,
-    motion: tuple[Vector, Vector],
-    reference: tuple[Vector, Vector],
-    rows: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
-) -> Method:
-    """Largest differences between two motions at ``times`` (n,) s over the ``rows`` compared."""
+def _differences(
+    judge: Flight, times: Vector, motion: tuple[Vector, Vector], rows: Any = slice(None)
+) -> tuple[float, float, float]:
+    """Largest differences of a motion from the flown one at ``times`` (n,) s over the ``rows``: see `Method`."""
     moments, wheel = judge.moments_at(times), np.array([0.0, 0.0, judge.spacecraft.inertia.wheel])
     still = wheel[2] and float(np.linalg.norm(judge.spacecraft.momentum)) / max(judge.moments)
     spin_axis = np.array([0.0, 0.0, 1.0])
-    (body, turn), (other_body, other_turn) = motion, reference
+    (body, turn), (other_body, other_turn) = motion, judge.motion(times)
     differences = (
         attitude.angle_between(attitude.rotate(turn, spin_axis), attitude.rotate(other_turn, spin_axis)),
         attitude.angle_between(
@@ -416,7 +399,7 @@ def _method(
         np.linalg.norm(body - other_body, axis=1) / np.maximum(np.linalg.norm(other_body, axis=1), still),
     )
     axis, momentum, rate = (float(np.max(values[rows], initial=0.0)) for values in differences)
-    return Method(name, residual.nutation, residual.momentum_shift, axis, momentum, rate)
+    return axis, momentum, rate
 
 
 def _conserved(flown: Flight) -> tuple[Conservation, Conservation]:
@@ -458,7 +441,11 @@ def _budget(
         rows.append(("disturbances", spacecraft, sharp))
     rows.append((AS_FLOWN, spacecraft, schedule))
     if any(pulse.impulse[2] != 0.0 for pulse in exact):
-        rows.append((f"{WITHOUT}axial torque", ideal, _sharp(ideal, _transverse(exact))))
+        flat, pulses = np.array([1.0, 1.0, 0.0]), []
+        for pulse in exact:
+            torque = None if pulse.torque is None else pulse.torque * flat
+            pulses.append(replace(pulse, impulse=pulse.impulse * flat, torque=torque))
+        rows.append((f"{WITHOUT}axial torque", ideal, _sharp(ideal, Schedule(tuple(pulses)))))
     if not inertia.symmetric:
         mean = replace(inertia, moments=(inertia.A, inertia.A, inertia.C))
         rows.append((f"{WITHOUT}I1 ≠ I2", replace(ideal, inertia=mean), sharp))
@@ -467,36 +454,14 @@ def _budget(
     rows += [(f"{WITHOUT}{name}", *lacking(ideal, exact, name)) for name in spacecraft.thrust_laws]
     if spacecraft.disturbances and expected:
         rows.append((f"{WITHOUT}disturbances", replace(ideal, disturbances=()), sharp))
-    return tuple(
-        Imperfection(name, left.nutation, left.momentum_shift, left.axis_error)
-        for name, body, pulses in rows
-        for left in (propagation.flown(body, pulses).residual,)
-    )
+    ends = [(name, propagation.flown(body, fired).residual) for name, body, fired in rows]
+    return tuple(Imperfection(name, left.nutation, left.momentum_shift, left.axis_error) for name, left in ends)
 
 
 def _sharp(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Every pulse as an ideal impulse at its centre, at its effective strength on ω."""
-    effective = propagation.effective_impulses(spacecraft, schedule)
-    return Schedule(
-        tuple(
-            Pulse(
-                pulse.t,
-                0.0,
-                pulse.channel,
-                np.array([impulse.real, impulse.imag, pulse.impulse[2]]),
-                propellant=pulse.propellant,
-            )
-            for pulse, impulse in zip(schedule, effective, strict=True)
-        )
-    )
-
-
-def _transverse(schedule: Schedule) -> Schedule:
-    """Schedule without the axial parts of its torques."""
-    flat = np.array([1.0, 1.0, 0.0])
-    return Schedule(
-        tuple(
-            replace(pulse, impulse=pulse.impulse * flat, torque=None if pulse.torque is None else pulse.torque * flat)
-            for pulse in schedule
-        )
-    )
+    pulses = []
+    for pulse, effective in zip(schedule, propagation.effective_impulses(spacecraft, schedule), strict=True):
+        impulse = np.array([effective.real, effective.imag, pulse.impulse[2]])
+        pulses.append(Pulse(pulse.t, 0.0, pulse.channel, impulse, propellant=pulse.propellant))
+    return Schedule(tuple(pulses))

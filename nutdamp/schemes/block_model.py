@@ -32,15 +32,6 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
 
-SAMPLES = 32
-"""Samples of the Sun's azimuth in each spin turn, between which a Sun pulse is found."""
-
-ITERATIONS = 60
-"""Steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual."""
-
-EXACT = 1e-13
-"""Tolerance of the time of a Sun pulse, in spin turns."""
-
 BLIND = 32
 """Spin turns in a row without a Sun pulse, after which none is waited for."""
 
@@ -71,15 +62,15 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
     assert body.sun is not None
-    times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
+    times = np.linspace(0.0, until, max(int(32 * until / turn), 2) + 1)
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
-    for _ in range(ITERATIONS):
+    for _ in range(60):  # three or four are usual
         off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
         times_of += off * turn / (2.0 * math.pi)
-        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
+        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * 1e-13:
             break
     times_of = times_of[(times_of >= 0.0) & (times_of <= until)]
     angles = attitude.angle_between(flown.axis(times_of), body.sun)
@@ -210,7 +201,8 @@ def fire_all(
     the one before is over, and where the propellant does not last.
     """
     sun_pulses = SunPulses(spacecraft, [[n for block in blocks for n in block.sun_pulses] for blocks in sequences])
-    firings = [_Firing(spacecraft, blocks) for blocks in sequences]
+    supplies, pulses = [Supply(spacecraft) for _ in sequences], [list[Pulse]() for _ in sequences]
+    firings = [_firing(spacecraft, *each) for each in zip(sequences, supplies, strict=True)]
     clock, sensor, errors = sun_pulses.clock, spacecraft.sun_sensor, np.random.default_rng(seed)
     jitter, count = 0.0 if seed is None or sensor is None else sensor.jitter, len(sequences)
     arcs, per_kg = spacecraft.inertia.symmetric and not spacecraft.disturbances, shed(spacecraft)
@@ -220,7 +212,7 @@ def fire_all(
         delays, widths, given = motion.since * 0.0, np.zeros(count), dict[int, Pulse]()
         for flight in flights:
             try:
-                block, given[flight] = firings[flight].next()
+                block, given[flight] = next(firings[flight])
             except Infeasible as reason:
                 sun_pulses.fail(flight, reason)
                 continue
@@ -234,30 +226,24 @@ def fire_all(
         sheds = None if per_kg is None else per_kg[:, None] * spent
         starts = clock.fire(motion, delays, cast("float", widths), _together(given, count), sheds)
         for flight, pulse in given.items():
-            firings[flight].pulses.append(pulse.moved(float(starts[flight])))
+            pulses[flight].append(pulse.moved(float(starts[flight])))
         over[list(given)] = clock.over[list(given)]
-    for flight, firing in enumerate(firings):
-        if sun_pulses.failures[flight] is None and firing.supply.shortage is not None:
-            sun_pulses.fail(flight, Infeasible(firing.supply.shortage))
-    schedules = [Schedule(tuple(firing.pulses), blocks=tuple(firing.blocks)) for firing in firings]
+    for flight, supply in enumerate(supplies):
+        if sun_pulses.failures[flight] is None and supply.shortage is not None:
+            sun_pulses.fail(flight, Infeasible(supply.shortage))
+    schedules = [Schedule(tuple(row), blocks=tuple(blocks)) for row, blocks in zip(pulses, sequences, strict=True)]
     return [reason or each for reason, each in zip(sun_pulses.failures, schedules, strict=True)], sun_pulses.seen
 
 
-class _Firing:
-    """Pulses of ``blocks``, fired one after the other."""
-
-    def __init__(self, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
-        self.blocks, self.supply, self.pulses = blocks, Supply(spacecraft), list[Pulse]()
-        self._channels = {channel.name: channel for channel in spacecraft.channels}
-        self._left = ((block, number) for block in blocks for number in block.sun_pulses)
-
-    def next(self) -> tuple[Block, Pulse]:
-        """Block of the next pulse, and the pulse as from t = 0; raises Infeasible for a channel that is not known."""
-        block, _ = next(self._left)
-        channel = self._channels.get(block.channel)
-        if channel is None:
-            raise Infeasible(f"the spacecraft has no channel {block.channel}")
-        return block, self.supply.fire(on_command(channel, 0.0, block.width), channel)
+def _firing(spacecraft: Spacecraft, blocks: Sequence[Block], supply: Supply) -> Iterator[tuple[Block, Pulse]]:
+    """Each pulse of ``blocks``, as from t = 0, with its block; raises Infeasible for a channel that is not known."""
+    channels = {channel.name: channel for channel in spacecraft.channels}
+    for block in blocks:
+        for _ in block.sun_pulses:
+            if block.channel not in channels:
+                raise Infeasible(f"the spacecraft has no channel {block.channel}")
+            channel = channels[block.channel]
+            yield block, supply.fire(on_command(channel, 0.0, block.width), channel)
 
 
 def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
@@ -276,10 +262,6 @@ def _together(given: Mapping[int, Pulse], count: int) -> list[TorqueRamp]:
                 first[:, [flight]], last[:, [flight]] = ramp.first, ramp.last
         together.append(TorqueRamp(begin, end, first, last))
     return together
-
-
-INVERTED = 6
-"""Steps by which the number of pulses is found that turns H by so much, cold and at falling pressure."""
 
 
 class Trial(NamedTuple):
@@ -351,10 +333,6 @@ class BlockState:
         return replace(here, phasor=self.phasor + off.phasor, spin=self.spin + off.spin)
 
 
-NUMBERS = ("sun_angle", "longitude", "phasor", "sun_pulse", "spin", "used", "cost")
-"""Fields of `BlockState` that are numbers."""
-
-
 class BlockModel:
     """Closed form of one spacecraft, with the bounds by which its motion is judged."""
 
@@ -383,8 +361,7 @@ class BlockModel:
             used=supply.used,
             fired=supply.fired,
         )
-        self.turn = spin_turn(spacecraft)
-        self.steady = supply.steady
+        self.turn, self.steady = spin_turn(spacecraft), supply.steady
         self._tables: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
     def rate(self, spin: Any) -> Any:
@@ -413,23 +390,13 @@ class BlockModel:
         full, spent = self._tables[key]
         return full[at], spent[at]
 
-    def pulses(self, state: BlockState, channel: Channel, widths: Any, full: Any, most: int) -> Any:
-        """Numbers of pulses, nearly whole and about ``most`` at most, that are equivalent to ``full`` full ones."""
-        needed = full
-        for _ in range(0 if self.steady else INVERTED):
-            count = np.rint(needed).clip(1, most).astype(int)
-            needed = full + count - self.full_pulses(state, channel, widths, count)[0]
-        return needed
-
     def kicks(self, state: BlockState, channel: Channel, trial: Trial, step: Any, *, back: bool = False) -> Any:
         """Σ of the effective on-times of blocks from ``state``, s, the k-th turned by e^{ik step}; ``back``: the last
         has none, those before it e^{-i step} each.
         """
         full, _ = self.full_pulses(state, channel, trial.width, trial.count)
-        total, cold = (
-            precession.phasor_sum(trial.count, -step if back else step),
-            self._cold(state, channel, trial, step),
-        )
+        total = precession.phasor_sum(trial.count, -step if back else step)
+        cold = self._cold(state, channel, trial, step)
         mean = full / (trial.count - np.real(self._cold(state, channel, trial, 0.0)))
         if back and self.body.cold is not None:
             cold = cold * np.exp(-1j * (trial.count - 1) * step)
@@ -468,11 +435,9 @@ class BlockModel:
         interval, rate = trial.every * self.turn, self.rate(self.body.spin)
         kicks = channel.transverse * self.kicks(state, channel, trial, rate * interval)
         to_go = np.angle(-kicks / (state.phasor * np.exp(-1j * rate * trial.wait * self.turn)))
-        return (
-            (-to_go / rate - acts(channel, trial.width).centroid) % (2.0 * math.pi / abs(rate))
-            if rate != 0.0
-            else 0.0 * to_go
-        )
+        if rate == 0.0:
+            return 0.0 * to_go
+        return (-to_go / rate - acts(channel, trial.width).centroid) % (2.0 * math.pi / abs(rate))
 
     def course(self, state: BlockState) -> tuple[Any, Any]:
         """Heading to the target axis, and the way along the rhumb line, rad."""

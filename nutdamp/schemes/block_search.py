@@ -12,10 +12,10 @@ import math
 import operator
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from functools import cached_property
+from dataclasses import fields
 from heapq import nsmallest
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,48 +23,22 @@ from numpy.typing import NDArray
 from nutdamp.common import work
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
-from nutdamp.schemes.block_legs import FLOWN, START, BlockFlights, Blocks, BlockSequence, by_blocks, of_each_kind
-from nutdamp.schemes.block_model import NUMBERS, BlockModel, BlockState, Trial, acts, evenly
+from nutdamp.flight.end_state import left_by
+from nutdamp.schemes.block_model import BlockModel, BlockState, Trial, acts, evenly, fire_all
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.constraints import Windows, commandable_widths
+from nutdamp.spacecraft.constraints import Windows, commandable_widths, keeps_limits
 from nutdamp.spacecraft.equipment import Block, Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.requirements import SAME_COST, Part
+from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
+from nutdamp.spacecraft.schedule import Schedule
 
 Array = NDArray[np.float64]
-
-GENTLE = 10
-"""Multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too."""
-
-ALL_DELAYS = 16
-"""Delays up to which all are looked at, if there are no more."""
-
-ALL_BLOCKS, ALL_FIRSTS = 400, 300
-"""Blocks after one wait up to which all are looked at, and the cheapest of them behind which others are."""
-
-AROUND = (0, 1)
-"""Steps of the delay that are looked at, from the one below the best delay."""
 
 WAITS = 24
 """Sun pulses that may pass before a block, so that its nutation meets the one before."""
 
-MOST_WIDTHS = 24
-"""Widths that are looked at for a second and a third block, where more can be commanded."""
-
 WINDOWS = 8
 """Blackout windows after which a block is begun, or before which one ends, at most: the first ones."""
-
-BESIDE = 0.01
-"""Share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses."""
-
-SHARES = np.linspace(0.0, 1.0, 13)[1:]
-"""Shares of the way that a first block may go, where others follow."""
-
-CHEAPER = 0.9
-"""Multiple of the cost of a sequence below which one that leaves more is looked at, too."""
-
-DEAR = 1.5
-"""Multiple of the least cost of lowering the nutation above which further blocks are looked for though one complies."""
 
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
@@ -72,29 +46,137 @@ FIRST = 24
 BLOCKS = 3
 """Blocks of a schedule, at most."""
 
-DOUBTFUL = 1.5
-"""Share of a bound up to which the closed form may err, so that a flight has to tell whether it is kept."""
-
-DOUBTS = 100
-"""Sequences that are flown since they would be cheaper, if the closed form erred in their favour."""
+DOUBTFUL, DOUBTS = 1.5, 100
+"""Share of a bound up to which the closed form may err, and sequences flown since that would make them good."""
 
 ALIKE = 4
 """Sequences that may come with the same blocks, over those that are wanted."""
 
-CORRECTED = 4
-"""Flights whose neighbours are looked at where none complies."""
-
-SURELY = 3.0
-"""Largest difference of a block's length from the way to the target, over its end error."""
-
 CLOSEST, FEW = 24, 4
 """Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
 
-TOGETHER = 32
-"""Sequences behind which others are looked for at once."""
-
 LOOKED = 2e-6
 """Units of `work` of a block that is looked at."""
+
+Blocks = tuple[Block, ...]
+
+FLOWN = 12
+"""Sequences of blocks that are flown; as many more where none of them complies."""
+
+DEARER = 1.01
+"""Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
+
+
+class BlockSequence(NamedTuple):
+    """Blocks and their rank in closed form: the less, the better.
+
+    ``rank``: the share of a bound that is used up, zero where all are kept, then the cost, then the time of the end;
+    ``share``: the share.
+    """
+
+    blocks: Blocks
+    rank: tuple[float, float, float]
+    share: float = math.inf
+
+
+class FlownSequence(NamedTuple):
+    """Flight of a sequence; ``rank``: breaks a limit, share of a bound that is passed, cost, end in s."""
+
+    rank: tuple[bool, float, float, float]
+    schedule: Schedule
+    sequence: BlockSequence
+
+
+START = BlockSequence((), (math.inf, math.inf, math.inf))
+"""No blocks, before which all others come."""
+
+
+class BlockFlights:
+    """Flights of sequences of one spacecraft: ``of`` each, and the least cost that is ``known`` to comply.
+
+    ``bounds``: what they are judged by.
+    """
+
+    def __init__(self, spacecraft: Spacecraft) -> None:
+        self.body, self.known = spacecraft, math.inf
+        self.bounds, lower = list(requirements.bounds(spacecraft)), 0.98 * spacecraft.nutation
+        if spacecraft.goal.axis is None and spacecraft.goal.spin is None:  # then blocks are to lower the nutation
+            for index, bound in enumerate(self.bounds):
+                if bound.part is Part.NUTATION:
+                    self.bounds[index] = bound._replace(most=min(bound.most, lower))
+        self.of: dict[Blocks, FlownSequence] = {}
+        self._fired: dict[Blocks, Schedule | Infeasible] = {}
+
+    def share(self, left: Left) -> NDArray[np.float64]:
+        """Largest share of a bound that is ``left``: 1 or less keeps all."""
+        return np.asarray(np.max(np.broadcast_arrays(*self.shares(left).values()), axis=0))
+
+    def shares(self, left: Left) -> dict[Part, NDArray[np.float64]]:
+        """Share of each bound that is ``left``."""
+        parts = [(bound.part, bound.most) for bound in self.bounds]
+        return {part: np.asarray(requirements.left_of(part, left, self.body) / most) for part, most in parts}
+
+    def fired(self, sequences: Sequence[BlockSequence]) -> Iterator[BlockSequence]:
+        """The sequences, one after the other, but for those that cost more than one that complied in a flight.
+
+        The pulses of a dozen of them are fired together.
+        """
+        for begin in range(0, len(sequences), FLOWN):
+            some = [each for each in sequences[begin : begin + FLOWN] if each.rank[1] <= self.known * DEARER]
+            new = [sequence.blocks for sequence in some if sequence.blocks not in self._fired]
+            if new:
+                self._fired.update(zip(new, self._together(new), strict=True))
+            yield from (each for each in some if each.rank[1] <= self.known * DEARER)
+
+    def _together(self, some: Sequence[Blocks]) -> Sequence[Schedule | Infeasible]:
+        """Pulses of sequences; one by one where the motion of one of them cannot be followed."""
+        try:
+            return fire_all(self.body, some)[0]
+        except Infeasible as reason:
+            return [reason] if len(some) == 1 else [self._together([blocks])[0] for blocks in some]
+
+    def flown(self, sequence: BlockSequence) -> FlownSequence:
+        """The flight of the blocks, with its rank. Raises Infeasible where they cannot be flown."""
+        if sequence.blocks not in self.of:
+            if sequence.blocks not in self._fired:
+                self._fired[sequence.blocks] = self._together([sequence.blocks])[0]
+            schedule = self._fired[sequence.blocks]
+            if isinstance(schedule, Infeasible):
+                raise schedule
+            share = float(self.share(left_by(propagation.flown(self.body, schedule))))
+            missed = float(f"{share:.9g}") if share > 1.0 else 0.0  # rounding is no reason to wait for a Sun pulse
+            rank = not keeps_limits(self.body, schedule), missed, schedule.cost, schedule.end
+            self.of[sequence.blocks] = FlownSequence(rank, schedule, sequence)
+            if rank[:2] == (False, 0.0):
+                self.known = min(self.known, sequence.rank[1])
+        return self.of[sequence.blocks]
+
+    @property
+    def all(self) -> list[FlownSequence]:
+        """All flights so far, the best first."""
+        return sorted(self.of.values(), key=lambda flight: flight.rank)
+
+    @property
+    def complies(self) -> bool:
+        """True if a sequence complied in its flight."""
+        return math.isfinite(self.known)
+
+
+def by_blocks(sequences: Iterable[BlockSequence]) -> dict[tuple[Block, ...], BlockSequence]:
+    """Sequences by their blocks, the last of equal ones at the place of the first."""
+    return {sequence.blocks: sequence for sequence in sequences}
+
+
+def of_each_kind(ranked: Iterable[BlockSequence], *names: str) -> list[BlockSequence]:
+    """The first sequence of each kind, blocks with the same values of these fields: flights may differ.
+
+    By default the channel and the interval, where closed forms do not differ.
+    """
+    kinds: dict[tuple[object, ...], BlockSequence] = {}
+    fields = operator.attrgetter(*(names or ("channel", "every")))
+    for sequence in ranked:
+        kinds.setdefault(tuple(map(fields, sequence.blocks)), sequence)
+    return list(kinds.values())
 
 
 class BlockSearch:
@@ -110,11 +192,22 @@ class BlockSearch:
         self.most = math.inf  # what a sequence may cost
         self._states: dict[Blocks, BlockState] = {(): self.model.start}
         self.doubtful: list[BlockSequence] = []  # those that may comply in a flight, the cheapest first
-        limits = spacecraft.limits
-        self.allowed = self.commands.max_count if limits.max_pulses is None else limits.max_pulses
-        self.pause = math.ceil(limits.gap / self.model.turn)
+        limits, turn, step = spacecraft.limits, self.model.turn, commands.delay_step
+        self.allowed = commands.max_count if limits.max_pulses is None else min(commands.max_count, limits.max_pulses)
+        self.pause = math.ceil(limits.gap / turn)
         self.dark = Windows(spacecraft).dark
-        self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / self.model.turn), 0)
+        self.earliest = max(math.ceil((limits.earliest - self.model.start.sun_pulse) / turn), 0)
+        # Where the nutation alone is to be lowered, and H may end anywhere, delays alone meet phases: fewer waits do.
+        self._damps = spacecraft.goal.axis is None and spacecraft.goal.spin is None
+        self._waiting = WAITS // 3 if self._damps and Part.SHIFT not in self._most else WAITS
+        self._every = [every for every in commands.every if every * turn >= limits.gap + float(commands.widths[0])]
+        self._kinds = list(itertools.product(channels, self._every))
+        last_delay = math.floor(min(commands.delay_max, turn) / step * (1.0 + 1e-12))
+        self._delays = np.asarray(np.arange(last_delay + 1) * step, dtype=np.float64)  # all that can be commanded
+        self._few_delays = len(self._delays) <= 16
+        widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
+        # So few blocks after one wait that all are looked at.
+        self.small = self._few_delays and widths * len(self._delays) * self.allowed <= 400
 
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -127,7 +220,10 @@ class BlockSearch:
             if number == 2:
                 small = self._further([START], few=2) if abs(self.model.start.phasor) > 0.0 else []
                 firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
-                firsts += self._all_firsts() if self.small else []
+                if self.small:  # the 300 cheapest of all
+                    start = self.model.start
+                    every = self.behind([START], start, self._grid(start, self.earliest), 300)
+                    firsts += sorted(every, key=lambda first: first.rank[1])[:300]
             else:
                 firsts = _promising(firsts, FIRST // 2)
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
@@ -138,7 +234,7 @@ class BlockSearch:
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
         ranked = [next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)]
-        clear = nsmallest(GENTLE * FLOWN, ranked, key=_share)
+        clear = nsmallest(10 * FLOWN, ranked, key=_share)
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
         first = by_blocks((*ranked[: FLOWN // 2], *clear[: FLOWN // 2], *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
@@ -150,8 +246,11 @@ class BlockSearch:
     def least_cost(self, sequences: Iterable[BlockSequence]) -> float:
         """Least cost, kg, of the sequences that comply in closed form and when flown; infinite where none is known."""
         complying = (sequence for sequence in sequences if sequence.rank[0] <= 0.0)
-        cheapest = list(by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank)).values())
-        for sequence in self.flights.fired(cheapest[: DOUBTS if self.small else FLOWN]):
+        return self._first_complying(list(by_blocks(nsmallest(ALIKE * DOUBTS, complying, key=_rank)).values()))
+
+    def _first_complying(self, sequences: Sequence[BlockSequence]) -> float:
+        """Fly sequences until one complies, and return its cost, kg; infinite where none does."""
+        for sequence in self.flights.fired(sequences[: DOUBTS if self.small else FLOWN]):
             if work.exhausted():
                 break
             with suppress(Infeasible):
@@ -165,7 +264,7 @@ class BlockSearch:
 
         The least is what kicks cost that all point against ω, or two pulses.
         """
-        if self._free == 1:
+        if self._waiting == WAITS:
             return False
         kicked = abs(self.model.start.phasor) - math.tan(self._most[Part.NUTATION]) * abs(self.body.axial)
         least = math.inf
@@ -173,7 +272,7 @@ class BlockSearch:
             shortest = float(acts(channel, commandable_widths(self.commands, channel)).on_time.min())
             lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
             least = min(least, channel.cost_rate(by_propellant=True) * lasts)
-        return self.most > DEAR * least
+        return self.most > 1.5 * least
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
@@ -195,10 +294,9 @@ class BlockSearch:
         states = [self.state(sequence.blocks) for sequence in before]
         if len(states) == 1:
             return states[0]
-        columns: dict[str, Any] = {
-            name: np.array([getattr(state, name) for state in states])[:, None, None, None] for name in NUMBERS
-        }
-        return BlockState(**columns)
+        names = [field.name for field in fields(BlockState)][:-1]  # of numbers
+        columns: dict[str, Any] = {name: np.array([getattr(state, name) for state in states]) for name in names}
+        return BlockState(**{name: column[:, None, None, None] for name, column in columns.items()})
 
     def behind(
         self,
@@ -220,7 +318,8 @@ class BlockSearch:
             shape = np.broadcast_shapes((len(before), 1, 1, 1), *map(np.shape, (*trial, left.nutation)))
             self.looked += math.prod(shape)
             work.spend(LOOKED * math.prod(shape))
-            severity, cost = self._severity(state, channel, trial, after, left, shape)
+            parts, rows = (self._severity(state, channel, trial, after, left), after.cost), shape[0] * shape[1]
+            severity, cost = (np.broadcast_to(part, shape).reshape(rows, shape[2] * shape[3]) for part in parts)
             doubted = np.where(severity <= DOUBTFUL, cost, np.inf)
             keys = (
                 (_in_order(severity, cost), few),
@@ -240,33 +339,20 @@ class BlockSearch:
                 sequences.append(BlockSequence(blocks, (failed, spent, end), severe))
         return sequences
 
-    def _severity(
-        self,
-        state: BlockState,
-        channel: Channel,
-        trial: Trial,
-        after: BlockState,
-        left: requirements.Left,
-        shape: tuple[int, ...],
-    ) -> tuple[Array, Array]:
-        """Largest share of a bound, infinite for blocks that may not be, and cost of blocks, by rows to choose from."""
+    def _severity(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState, left: Left) -> Array:
+        """Largest share of a bound, infinite for blocks that may not be."""
         severity = self.flights.share(left)
         over = np.asarray(after.sun_pulse) > self.body.horizon + self.model.turn
-        over = over | self._dark(state, channel, trial, after) | self._longer_round(state, after)
+        over = over | self._dark(state, channel, trial, after)
+        if self.body.goal.axis is not None:  # H has gone round the Sun the longer way to the target, or once more
+            over = over | (np.abs(after.longitude - state.longitude - self.model.ahead(state)) > math.pi)
         over = over if self.body.tank is None else over | (after.used > self.body.tank.propellant)
-        over = over | np.isnan(severity) | (after.cost >= self.most)
-        rows = shape[0] * shape[1], shape[2] * shape[3]
-        severity = np.broadcast_to(np.where(over, np.inf, severity), shape).reshape(rows)
-        return severity, np.broadcast_to(after.cost, shape).reshape(rows)
-
-    def _spaced(self, every: int) -> bool:
-        """True where pulses in one of ``every`` spins keep limits.gap."""
-        return every * self.model.turn >= self.body.limits.gap + float(self.commands.widths[0])
+        return np.asarray(np.where(over | np.isnan(severity) | (after.cost >= self.most), np.inf, severity))
 
     def _counts(self, state: BlockState, every: int) -> NDArray[np.int64]:
         """Numbers of pulses up to the horizon."""
         most = int((self.body.horizon - float(np.min(state.sun_pulse))) / (every * self.model.turn)) + 1
-        return np.arange(1, max(min(most, self.commands.max_count, self.allowed), 0) + 1)
+        return np.arange(1, max(min(most, self.allowed), 0) + 1)
 
     def _single(self) -> list[BlockSequence]:
         """The best single blocks, of all widths, numbers and intervals at the delays that serve best.
@@ -274,10 +360,10 @@ class BlockSearch:
         What surely ends worse than the best ones found is left out: see `_short_by`.
         """
         start = self.model.start
-        waits = self._waits(start, self.earliest, WAITS // self._free if abs(start.phasor) > 0.0 else 1)
-        short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds()]
+        waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
+        short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
-        within = surely = DOUBTFUL if self._damps else SURELY
+        within = surely = DOUBTFUL if self._damps else 3.0
         while True:
             trials = (
                 (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
@@ -289,20 +375,6 @@ class BlockSearch:
             if enough <= within or within >= most or work.exhausted():
                 return sequences
             within = min(enough, 10.0 * within, most)
-
-    @property
-    def _damps(self) -> bool:
-        """True where blocks are to lower the nutation alone."""
-        return self.body.goal.axis is None and self.body.goal.spin is None
-
-    @property
-    def _free(self) -> int:
-        """Divisor of the waits that are tried: more than 1 where any heading will do, and delays alone meet phases."""
-        return 3 if self._damps and Part.SHIFT not in self._most else 1
-
-    def _kinds(self) -> Iterator[tuple[Channel, int]]:
-        """Channels and intervals that pulses may have."""
-        return itertools.product(self.channels, filter(self._spaced, self.commands.every))
 
     def _short_by(self, state: BlockState, channel: Channel, every: int) -> Array:
         """Least miss of blocks of each width and number, (k, w n) after each of k motions, in shares of its bound.
@@ -333,7 +405,7 @@ class BlockSearch:
 
     def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
         """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is left."""
-        step = TOGETHER if self.model.steady and not len(self.dark[0]) else 1
+        step = 32 if self.model.steady and not len(self.dark[0]) else 1
         least, sequences = self.pause if before and before[0].blocks else self.earliest, list[BlockSequence]()
         for begin in range(0, len(before), step):
             some = before[begin : begin + step]
@@ -344,8 +416,8 @@ class BlockSearch:
 
     def _rest(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """Blocks of the widths and numbers that may miss least, the cheapest and the nearest, and of few pulses."""
-        waits = self._waits(state, least, WAITS // self._free)
-        for channel, every in self._kinds():
+        waits = self._waits(state, least, self._waiting)
+        for channel, every in self._kinds:
             lacks, counts = self._short_by(state, channel, every), self._counts(state, every)
             if not lacks.size:
                 continue
@@ -362,51 +434,29 @@ class BlockSearch:
         """First blocks that go a part of the way to the target."""
         start, sequences = self.model.start, list[BlockSequence]()
         heading, way = self.model.course(start)
-        every = next(filter(self._spaced, self.commands.every), None)
-        if self.body.goal.axis is None or every is None:
+        if self.body.goal.axis is None or not self._every:
             return sequences
+        every, shares = self._every[0], np.linspace(0.0, 1.0, 13)[1:]
         for channel in (channel for channel in self.channels if channel.transverse):
             for width in evenly(commandable_widths(self.commands, channel), 3).tolist():
                 step = float(self.model.turned_by(channel, width, start.spin))
                 delay = self.commanded(self.model.delay(channel, heading, width))
                 first = start.sun_pulse + float(delay) + float(acts(channel, width).over)
                 fits = (self.dark[0][:WINDOWS] - first) / (every * self.model.turn) - self.earliest / every
-                counts = np.rint([*SHARES * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
+                counts = np.rint([*shares * float(way) / step, *np.floor(fits), *np.floor(fits) + 1.0])
                 counts = np.unique(counts.clip(1, self.commands.max_count).astype(int))
                 rows = np.meshgrid(self._waits(start, self.earliest, 1), counts)
                 wait, count = (row.reshape(-1, 1, 1) for row in rows)
                 sequences += self.behind([START], start, [(channel, Trial(wait, delay, width, count, every))], 1)
         return sequences
 
-    @cached_property
-    def small(self) -> bool:
-        """True where blocks are so few that all are looked at."""
-        widths = sum(len(commandable_widths(self.commands, channel)) for channel in self.channels)
-        return len(self._delays) <= ALL_DELAYS and widths * len(self._delays) * len(self._all_counts) <= ALL_BLOCKS
-
-    @property
-    def _delays(self) -> Array:
-        """All delays that can be commanded."""
-        most = round(float(self.commanded(np.array(math.inf))) / self.commands.delay_step)
-        return np.asarray(np.arange(most + 1) * self.commands.delay_step, dtype=np.float64)
-
-    @property
-    def _all_counts(self) -> NDArray[np.int64]:
-        return np.arange(1, min(self.commands.max_count, self.allowed) + 1)
-
     def _grid(self, state: BlockState, least: int) -> Iterator[tuple[Channel, Trial]]:
         """All blocks, from ``least`` Sun pulses on: by wait, width and number of pulses, and by delay."""
-        for channel, every in self._kinds():
-            widths = commandable_widths(self.commands, channel)
-            parts = np.meshgrid(self._waits(state, least, WAITS), widths, self._all_counts)
+        for channel, every in self._kinds:
+            widths, counts = commandable_widths(self.commands, channel), np.arange(1, self.allowed + 1)
+            parts = np.meshgrid(self._waits(state, least, WAITS), widths, counts)
             wait, width, count = (part.reshape(-1, 1) for part in parts)
             yield channel, Trial(wait, self._delays, width, count, every)
-
-    def _all_firsts(self) -> list[BlockSequence]:
-        """First blocks that cost less than is known to do, the cheapest of each channel, width and number first."""
-        start = self.model.start
-        firsts = self.behind([START], start, self._grid(start, self.earliest), ALL_FIRSTS)
-        return sorted(firsts, key=lambda first: first.rank[1])[:ALL_FIRSTS]
 
     def _waits(self, state: BlockState, least: int, few: int) -> list[int]:
         """Sun pulses that may be let pass before a block: the ``least`` few, and those up to the end of a blackout."""
@@ -414,16 +464,9 @@ class BlockSearch:
         later = after[(after > least) & (self.dark[1] < self.body.horizon)][:WINDOWS].astype(int).tolist()
         return sorted({begin + more for begin in (least, *later) for more in range(few + (begin != least))})
 
-    def _longer_round(self, before: BlockState, after: BlockState) -> NDArray[np.bool_]:
-        """True where H has gone round the Sun the longer way to the target, or once more."""
-        if self.body.goal.axis is None:
-            return np.zeros((), dtype=bool)
-        return np.asarray(np.abs(after.longitude - before.longitude - self.model.ahead(before)) > math.pi)
-
     def _dark(self, state: BlockState, channel: Channel, trial: Trial, after: BlockState) -> NDArray[np.bool_]:
         """True where a pulse of the blocks is on in a blackout window, or just beside it."""
-        shape = np.shape(after.sun_pulse)
-        dark = np.zeros(shape, dtype=bool)
+        dark = np.zeros(np.shape(after.sun_pulse), dtype=bool)
         if not len(self.dark[0]):
             return dark
         work.spend(LOOKED * dark.size * len(self.dark[0]))
@@ -431,7 +474,7 @@ class BlockSearch:
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
         interval = np.where(np.asarray(trial.count) > 1, interval, turn)
-        aside, lasts = BESIDE * turn, acts(channel, trial.width).over
+        aside, lasts = 0.01 * turn, acts(channel, trial.width).over  # aside: nutation moves Sun pulses
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
@@ -449,33 +492,27 @@ class BlockSearch:
         widths = commandable_widths(self.commands, channel)[index // len(counts)][:, None, :, None]
         wait, count = np.array(waits)[:, None, None], counts[index % len(counts)][:, None, :, None]
         trial = Trial(wait, self._delays, widths, count, every)
-        if len(self._delays) <= ALL_DELAYS:
+        if self._few_delays:
             return trial
         best = list[Array]()
         if self.body.goal.axis is not None:
             best.append(self.model.delay(channel, self.model.course(state)[0], widths))
         if np.any(state.phasor):
             best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
-        steps = [np.floor(delay / self.commands.delay_step) + around for delay in best for around in AROUND]
+        steps = [np.floor(delay / self.commands.delay_step) + more for delay in best for more in (0, 1)]
         alike = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
         return trial._replace(delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step))
 
     def commanded(self, delay: Array) -> Array:
         """The nearest delay that can be commanded, of those within a spin turn."""
-        step, longest = self.commands.delay_step, min(self.commands.delay_max, self.model.turn)
-        most = math.floor(longest / step * (1.0 + 1e-12))
-        return np.asarray(np.clip(np.rint(delay / step), 0, most) * step)
+        step = self.commands.delay_step
+        return np.asarray(np.clip(np.rint(delay / step), 0, len(self._delays) - 1) * step)
 
     def doubted(self) -> None:
         """Fly sequences cheaper than the best of the flights, the cheapest first, until one complies."""
         most = self.flights.known * (1.0 - SAME_COST)
-        cheaper = [each for each in self.doubtful if each.rank[1] < most and each.blocks not in self.flights.of]
-        for sequence in self.flights.fired(cheaper[: DOUBTS if self.small else FLOWN]):
-            if work.exhausted():
-                return
-            with suppress(Infeasible):
-                if self.flights.flown(sequence).rank[:2] == (False, 0.0):
-                    return
+        flown = self.flights.of
+        self._first_complying([each for each in self.doubtful if each.rank[1] < most and each.blocks not in flown])
 
     def nearer(self) -> list[BlockSequence]:
         """Neighbours of the best of the flights that leave least where the closed form errs as it does for those.
@@ -484,7 +521,7 @@ class BlockSearch:
         """
         sequences = list[BlockSequence]()
         best = of_each_kind(flight.sequence for flight in self.flights.all)
-        for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
+        for flight in (self.flights.of[each.blocks] for each in best[:4]):
             *earlier, last = flight.sequence.blocks
             before, state = START._replace(blocks=tuple(earlier)), self.state(tuple(earlier))
             off = self.model.apart(self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule))
@@ -493,26 +530,23 @@ class BlockSearch:
         other = (sequence for sequence in sequences if sequence.blocks not in self.flights.of)
         ranked = by_blocks(sorted(other, key=_rank))
         clear = nsmallest(FLOWN // 2, ranked.values(), key=_share)
-        chosen = (*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values()))
-        return [self._in_form(sequence) for sequence in by_blocks(chosen).values()]
-
-    def _in_form(self, sequence: BlockSequence) -> BlockSequence:
-        """The sequence, ranked by the closed form alone."""
-        share = float(self.flights.share(self.model.left(self.state(sequence.blocks))))
-        return sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
+        chosen = by_blocks((*islice(ranked.values(), FLOWN // 2), *clear, *of_each_kind(ranked.values())))
+        for blocks, sequence in chosen.items():  # ranked by the closed form alone
+            share = float(self.flights.share(self.model.left(self.state(blocks))))
+            chosen[blocks] = sequence._replace(rank=(share if share > 1.0 else 0.0, *sequence.rank[1:]), share=share)
+        return list(chosen.values())
 
     def _around(self, before: BlockSequence, last: Block) -> Trial:
         """Blocks about as long and as late as the ``last`` one, behind those ``before``."""
         channel, number = self._named[last.channel], _following(before.blocks)
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
-        widths = np.union1d(evenly(every, MOST_WIDTHS), every[max(at - 3, 0) : at + 4])
+        widths = np.union1d(evenly(every, 24), every[max(at - 3, 0) : at + 4])
         as_long = np.rint(last.count * acts(channel, np.array([last.width])).on_time / acts(channel, widths).on_time)
         waits = np.arange(-1, 2) + (last.first - number)
         waits = waits[waits >= (self.pause if before.blocks else self.earliest)]
         delays = self.commanded(np.asarray(last.delay + np.arange(-3, 4) * self.commands.delay_step, dtype=np.float64))
-        most = min(self.commands.max_count, self.allowed)
-        counts = (as_long[:, None] + np.arange(-2, 3)).clip(1, most).astype(int)
+        counts = (as_long[:, None] + np.arange(-2, 3)).clip(1, self.allowed).astype(int)
         parts = np.broadcast_arrays(waits[:, None, None], widths[:, None], counts)
         wait, width, count = (part.reshape(-1, 1) for part in parts)
         return Trial(wait, delays, width, count, last.every)
@@ -552,7 +586,7 @@ def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSeque
     return list(by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values())
 
 
-def _front(ranked: Iterable[BlockSequence], share: float = CHEAPER) -> list[BlockSequence]:
+def _front(ranked: Iterable[BlockSequence], share: float = 0.9) -> list[BlockSequence]:
     """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all before them."""
     front = list[BlockSequence]()
     for sequence in ranked:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.units import as_given, is_count, is_number
@@ -58,6 +58,9 @@ def _option(default: Any, kind: OptionKind, text: str) -> Any:
 class SchemeOptions:
     """Options of every scheme. Raises SenselessOption for an invalid value."""
 
+    equal: ClassVar[bool] = False
+    """True if the pulses are of one size, which corrections keep."""
+
     with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
 
     def __post_init__(self) -> None:
@@ -78,11 +81,6 @@ class SchemeOptions:
     @property
     def frees_axis(self) -> bool:
         """True if H may end anywhere."""
-        return False
-
-    @property
-    def equal(self) -> bool:
-        """True if the pulses are of one size, which corrections keep."""
         return False
 
     @property
@@ -143,13 +141,9 @@ class CommandBlockOptions(SchemeOptions):
 class RhumbLineOptions(SchemeOptions):
     """Options of rhumb-line; ``on_time`` None: an eighth of a spin turn."""
 
+    equal: ClassVar[bool] = True  # the width is one command
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
-
-    @property
-    def equal(self) -> bool:
-        """Always True: the width is one command."""
-        return True
 
     @property
     def resizable(self) -> bool:
@@ -164,11 +158,7 @@ class OptimalOptions(SchemeOptions):
     ``free_axis`` None: H may end anywhere unless the spacecraft or ``shift`` asks for something else.
     """
 
-    least: str = _option(
-        LEAST[0],
-        OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False),
-        "What to save.",
-    )
+    least: str = _option(LEAST[0], OptionKind(f"one of {', '.join(LEAST)}", names=LEAST, none=False), "What to save.")
     free_axis: bool | None = _option(None, dataclasses.replace(FLAG, none=True), "Let H end anywhere.")
     shift: float | None = _option(None, ANGLE, "How far from its target H may end: 0.2deg.")
 
@@ -247,19 +237,18 @@ def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme: its ``name``, the ``module`` with its function ``schedule``, and the class of its ``options``.
+    """A scheme: its ``name`` and the class of its ``options``.
 
     ``classic``: of Magnus 1970. ``points``: can turn the spin axis to a target, and is planned when there is one and
     none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
-    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a
-    function ``alternatives`` too, of schedules about as good. ``body_fixed``: fires channels of
-    the file only, no steerable torquer. ``reads_commands``: makes blocks of the ``commands``
-    of the file, and is planned where there are some. ``on_true_body``: needs no symmetric model. ``slow``: may take
-    seconds. ``by_turns``: fires at one phase of each spin turn, so that the body has to spin.
+    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a function ``alternatives`` too,
+    of schedules about as good. ``body_fixed``: fires channels of the file only, no steerable torquer.
+    ``reads_commands``: makes blocks of the ``commands`` of the file, and is planned where there are some.
+    ``on_true_body``: needs no symmetric model. ``slow``: may take seconds. ``by_turns``: fires at one phase of each
+    spin turn, so that the body has to spin.
     """
 
     name: str
-    module: str
     options: type[SchemeOptions] = SchemeOptions
     fires: bool = True
     classic: bool = False
@@ -274,27 +263,19 @@ class Scheme:
     slow: bool = False
     by_turns: bool = False
 
+    @property
+    def module(self) -> str:
+        """Module with its function ``schedule``, where it fires."""
+        return f"nutdamp.schemes.{'optimal.search' if self.name == 'optimal' else self.name.replace('-', '_')}"
 
-ONE_PULSE = Scheme("one-pulse", "nutdamp.schemes.one_pulse", classic=True)
-TWO_PULSE = Scheme(
-    "two-pulse", "nutdamp.schemes.two_pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True
-)
-FOUR_PULSE = Scheme("four-pulse", "nutdamp.schemes.four_pulse", FourPulseOptions, classic=True, body_fixed=True)
-OPTIMAL = Scheme(
-    "optimal",
-    "nutdamp.schemes.optimal.search",
-    OptimalOptions,
-    points=True,
-    sets_spin=True,
-    body_fixed=True,
-    slow=True,
-)
-HALF_CONE = Scheme(
-    "half-cone", "nutdamp.schemes.half_cone", HalfConeOptions, points=True, only_points=True, body_fixed=True
-)
+
+ONE_PULSE = Scheme("one-pulse", classic=True)
+TWO_PULSE = Scheme("two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True)
+FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True)
+OPTIMAL = Scheme("optimal", OptimalOptions, points=True, sets_spin=True, body_fixed=True, slow=True)
+HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(
     "rhumb-line",
-    "nutdamp.schemes.rhumb_line",
     RhumbLineOptions,
     points=True,
     only_points=True,
@@ -304,7 +285,6 @@ RHUMB_LINE = Scheme(
 )
 COMMAND_BLOCK = Scheme(
     "command-block",
-    "nutdamp.schemes.command_block",
     CommandBlockOptions,
     reads_commands=True,
     sets_spin=True,
@@ -313,7 +293,7 @@ COMMAND_BLOCK = Scheme(
     slow=True,
     by_turns=True,
 )
-NONE = Scheme("none", "nutdamp.schemes.none", fires=False)
+NONE = Scheme("none", fires=False)
 """Free motion, for comparison."""
 
 SCHEMES = {

@@ -1,9 +1,14 @@
-"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width and number."""
+"""Command blocks: pulses as spinners are commanded, by channel, delay after the Sun pulse, width and number.
+
+Spin and turn are made leg by leg in one row of blocks. The impulse that turns H goes with |H3|: H is turned while that
+is smaller, before the spin is raised or once it is lowered. Trains that turn change the spin too where their channels
+have a torque about axis 3: the spin leg behind them is planned on what they leave, one before them ahead by as much.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,39 +18,27 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.end_state import left_by
-from nutdamp.schemes.block_legs import FLOWN, FlownSequence, spin_and_turn
-from nutdamp.schemes.block_model import BlockModel, spin_turn
-from nutdamp.schemes.block_search import BLOCKS, BlockSearch
+from nutdamp.schemes.block_legs import Legs
+from nutdamp.schemes.block_model import BlockModel, acts, spin_turn
+from nutdamp.schemes.block_search import BLOCKS, FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import CommandBlockOptions
 from nutdamp.schemes.sequential import NO_AXIAL, at_hand
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import OFF_TICK, commandable_widths, usable
-from nutdamp.spacecraft.equipment import Channel, Commands
-from nutdamp.spacecraft.model import Spacecraft
+from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
-    form, flown = (
-        search.model.left(search.state(chosen.sequence.blocks)),
-        left_by(propagation.flown(search.body, chosen.schedule)),
-    )
+    form = search.model.left(search.state(chosen.sequence.blocks))
+    flown = left_by(propagation.flown(search.body, chosen.schedule))
     nutation, end = (math.degrees(abs(float(a) - b)) for a, b in zip(form[:2], flown[:2], strict=True))
     if first:
         return note("blocks-compared", compared=search.looked, nutation_deg=nutation, end_deg=end)
     return note("blocks-flown", nutation_deg=nutation, end_deg=end)
-
-
-def off_ticks(tick: float | None, commands: Commands) -> tuple[Note, ...]:
-    """Note on blocks off the ``tick`` (s); empty where all their steps are on it."""
-    if tick is None:
-        return ()
-    steps = np.array([commands.delay_step, *commands.widths]) / tick
-    if np.abs(steps - np.rint(steps)).max() <= OFF_TICK:
-        return ()
-    return (note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step),)
 
 
 def cures(search: BlockSearch, chosen: FlownSequence, most: int) -> list[Note]:
@@ -65,23 +58,15 @@ def too_coarse(model: BlockModel, channels: Sequence[Channel], missed: Mapping[P
     way, half = body.to_turn if body.goal.axis is not None else 0.0, 0.5 * commands.delay_step
     spin, damped = abs(body.spin), abs(model.rate(body.spin))
     aside = {Part.DISTANCE: half * spin * way, Part.NUTATION: half * damped * math.tan(body.nutation)}
-    steps = [step for channel in channels for step in _steps(model, channel)]
-    along = 0.5 * min(steps, default=0.0)
+    # The least by which pulses of neighbouring widths differ in turning H; none is a width too.
+    turned = [model.turned_by(channel, commandable_widths(commands, channel), body.spin) for channel in channels]
+    along = 0.5 * min(float(np.diff(np.sort(turns), prepend=0.0).min()) for turns in turned)
     for part in (Part.DISTANCE, Part.NUTATION):
         if aside[part] > missed.get(part, math.inf):
             change = math.degrees(2.0 * aside[part])
             yield note("finer-delay-step", delay_step_s=commands.delay_step, part=part.label, change_deg=change)
     if along > min(missed.values(), default=math.inf):
         yield note("finer-widths", change_deg=math.degrees(2.0 * along))
-
-
-def _steps(model: BlockModel, channel: Channel) -> Iterator[float]:
-    """Least difference, rad, by which pulses of neighbouring widths turn H; none is a width too."""
-    assert model.body.commands is not None
-    widths = commandable_widths(model.body.commands, channel)
-    if len(widths):
-        turned = np.sort(model.turned_by(channel, widths, model.body.spin))
-        yield float(np.diff(turned, prepend=0.0).min())
 
 
 def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
@@ -94,13 +79,6 @@ def used_up(body: Spacecraft, schedule: Schedule) -> Iterator[Note]:
         yield note("more-pulses", pulses=limits.max_pulses)
     if any(block.count == commands.max_count for block in schedule.blocks):
         yield note("larger-count", count=commands.max_count)
-
-
-FLOWN_PULSES = 2000
-"""Pulses that are flown, after which no further sequence is."""
-
-ROUNDS = 3
-"""Searches near the best flights so far."""
 
 
 def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
@@ -122,9 +100,12 @@ def schedule(spacecraft: Spacecraft, options: CommandBlockOptions) -> Schedule:
     else:
         chosen = spin_and_turn(spacecraft, lambda leg, few: _searched(leg, few).schedule, most)
         missed = [*used_up(spacecraft, chosen.schedule)] or [note("finer-commands")]
-        notes = (note("blocks-in-legs"), *missed * (chosen.rank[1] > 1.0))
-        chosen = chosen._replace(schedule=replace(chosen.schedule, notes=notes))
-    return replace(chosen.schedule, notes=(*chosen.schedule.notes, *off_ticks(tick, commands)))
+        in_legs = (note("blocks-in-legs"), *missed * (chosen.rank[1] > 1.0))
+        chosen = chosen._replace(schedule=replace(chosen.schedule, notes=in_legs))
+    notes, steps = chosen.schedule.notes, np.array([commands.delay_step, *commands.widths]) / (tick or 1.0)
+    if tick is not None and np.abs(steps - np.rint(steps)).max() > OFF_TICK:
+        notes = (*notes, note("tick-not-kept", tick_s=tick, delay_step_s=commands.delay_step))
+    return replace(chosen.schedule, notes=notes)
 
 
 def expect_spin(spacecraft: Spacecraft, spin: float, *, alone: bool) -> None:
@@ -154,13 +135,13 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     outside = " outside the blackout windows" if spacecraft.limits.blackout else ""
     why = f"no block that can be commanded ends within the horizon{outside}; a longer limits.horizon may help"
     best = search.best(most or BLOCKS)
-    for round_ in range(ROUNDS + 1):
+    for round_ in range(4):  # the best ones, and three searches near the best flights so far
         if round_ > 0 and search.flights.complies:
             break
         for number, sequence in enumerate(search.flights.fired(best if round_ == 0 else search.nearer())):
             pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
             enough = search.flights.complies and number >= FLOWN * (round_ == 0)
-            spent = pulses > FLOWN_PULSES * (1 + round_) or (work.exhausted() and pulses > 0)
+            spent = pulses > 2000 * (1 + round_) or (work.exhausted() and pulses > 0)
             if spent or enough:
                 break
             try:
@@ -170,7 +151,11 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     search.doubted()
     if not search.flights.of:
         raise Infeasible(why)
-    chosen = _cheapest(search.flights.all)
+    leading, *_ = flights = search.flights.all
+    # Of those that cost as much as the best the fewest pulses, then the earlier end.
+    alike = [flight for flight in flights if flight.rank[:2] == leading.rank[:2]]
+    equal = [flight for flight in alike if flight.rank[2] <= leading.rank[2] * (1.0 + SAME_COST)]
+    chosen = min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))
     first = chosen.sequence.rank[:2] <= best[0].rank[:2]
     notes = [scope_note(search, chosen, first=first)]
     if chosen.rank[1] > 1.0:
@@ -178,13 +163,88 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
 
 
-def _cheapest(flights: Sequence[FlownSequence]) -> FlownSequence:
-    """The best flight; of those that cost as much within `SAME_COST`, the fewest pulses, then the earlier end."""
-    best = min(flights, key=lambda flight: flight.rank)
-    broken, missed, cost, _ = best.rank
-    equal = [
-        flight
-        for flight in flights
-        if flight.rank[:2] == (broken, missed) and flight.rank[2] <= cost * (1.0 + SAME_COST)
-    ]
-    return min(equal, key=lambda flight: (len(flight.schedule), flight.schedule.end, flight.rank))
+LEGS = 6
+"""Legs of a row of blocks, at most: spin and turn, and both mended twice."""
+
+MARGIN = 0.97
+"""Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
+
+Searched = Callable[[Spacecraft, int | None], Schedule]
+"""Blocks of one leg, of up to so many; raises Infeasible."""
+
+
+def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) -> FlownSequence:
+    """Blocks, ``most`` of them, that bring the spin to its goal, and turn or damp: the best of the orders tried.
+
+    The other order is tried where the cheaper one does not comply. Raises Infeasible with the first reason.
+    """
+    goal, inertia = spacecraft.goal.spin, spacecraft.inertia
+    assert goal is not None
+    turns_first = abs(inertia.axial(goal)) >= abs(spacecraft.axial)
+    flights, why = BlockFlights(spacecraft), list[Infeasible]()
+    for first in (turns_first, not turns_first):
+        try:
+            gained = _flown(spacecraft, flights, searched, most, goal, turns_first=first)
+            if not first and gained != 0.0 and not work.exhausted():
+                _flown(spacecraft, flights, searched, most, goal - gained, turns_first=first)
+        except Infeasible as reason:
+            why.append(reason)
+        if flights.complies or work.exhausted():
+            break
+    if not flights.of:
+        raise next(iter(why), Infeasible("no pulse is needed"))
+    return flights.all[0]
+
+
+def _flown(
+    body: Spacecraft, flights: BlockFlights, searched: Searched, most: int | None, aim: float, *, turns_first: bool
+) -> float:
+    """Fly a row of legs, the first of the spin to ``aim`` rad/s; returns the change of the spin, rad/s, by a second
+    leg that turned, where it takes the spin off its goal.
+    """
+    legs, goal, gained = Legs(body), body.goal.spin, 0.0
+    assert goal is not None
+    bounds = {bound.part: bound.most for bound in requirements.bounds(body)}
+    nutation, shift = bounds[Part.NUTATION], bounds.get(requirements.aim(body))
+    for number in range(LEGS):
+        here, turns = legs.here, turns_first == (number % 2 == 0)
+        here = replace(here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None))
+        slower = min(max(abs(body.inertia.axial(goal) / here.axial), 0.01), 1.0)  # nutation opens by its inverse
+        there = requirements.spins_at(here, aim)
+        if turns:
+            there = here.nutation <= nutation and (shift is None or here.to_turn <= shift)
+        room = None if most is None else most - len(legs.blocks) - (number == 0)
+        if turns and not requirements.spins_at(here, goal):
+            allowed = MARGIN * slower * nutation, None if shift is None else MARGIN * shift
+            horizon = max(here.horizon - _least_time(here, goal), 0.5 * here.horizon)
+        elif turns:
+            allowed, horizon = (nutation, shift), here.horizon
+        else:
+            opened, off = here.nutation / slower / MARGIN, here.to_turn / MARGIN
+            allowed, horizon = (max(opened, nutation), None if shift is None else max(off, shift)), here.horizon
+            spinning = tuple(channel for channel in here.channels if not channel.damps)
+            here, aim = replace(here, goal=replace(here.goal, spin=aim), channels=spinning), goal
+        if there or (room is not None and room < 1):
+            continue
+        try:
+            leg = replace(here, requirement=Requirement(*allowed), limits=replace(here.limits, horizon=horizon))
+            legs.fire(searched(leg, room))
+        except Infeasible:
+            if number < 2:
+                raise
+            break
+        if turns and number == 1 and not requirements.spins_at(legs.here, goal):
+            gained = legs.here.spin - here.spin
+    if legs.blocks:
+        flights.flown(BlockSequence(tuple(legs.blocks), (0.0, 0.0, 0.0)))
+    return gained
+
+
+def _least_time(body: Spacecraft, spin: float) -> float:
+    """Time, s, that a change to ``spin`` rad/s takes, with some to spare; 0 where no channel gives it."""
+    most, commands, change = 0.0, body.commands, spin - body.spin
+    assert commands is not None
+    for channel in body.channels:
+        on_times = acts(channel, commandable_widths(commands, channel)).on_time
+        most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
+    return (2.0 + 1.5 * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0

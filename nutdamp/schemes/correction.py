@@ -11,6 +11,7 @@ import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,48 +28,50 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 
-CONVERGED = 1e-14
-"""rad; a few roundings of the integration."""
-
-DIFFERENCE = 1e-6
-"""Step of the difference quotients, in scaled unknowns: the error of the slopes, far below their size."""
-
-ALIKE = 1e-9
-"""Difference in size, relative, up to which pulses are equal."""
-
-STEPS = 30
-
-INTEGRATED = 50_000
-"""Steps of integration after which a correction stops: some seconds."""
-
-PROGRESS = 0.01
-"""Least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way."""
-
-
 TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
-MOVED = 8
-"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less."""
-
-BEFORE, AFTER = 12, 24
-"""Pulses of given length corrected before the equal ones, which damp the nutation, and at the end."""
-
-CLEARLY = 0.5
-"""Largest residual, over that of an earlier candidate, with which a later or dearer one is taken."""
+MOVED, BEFORE, AFTER = 8, 12, 24
+"""Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of given length so many
+before the equal ones, which damp the nutation, and at the end."""
 
 EXACT = 1e-11
 """rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
 
 
-def fired(spacecraft: Spacecraft, channels: Sequence[Channel], timing: Sequence[tuple[float, float]]) -> Schedule:
-    """One pulse of each channel, commandable: ``timing`` has the centre and the on-time of each, s."""
-    return Schedule(
-        tuple(
-            commandable(spacecraft, channel_pulse(channel, t, on_time))
-            for channel, (t, on_time) in zip(channels, timing, strict=True)
-        )
-    )
+CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
+"""Factors of cost and miss within which candidates count as equal: of those the one that ends first is preferred."""
+
+
+class PairCandidate(NamedTuple):
+    """Two channels with centre and on-time (s) of a pulse of each, which close to first order."""
+
+    cost: float
+    end: float
+    channels: tuple[Channel, Channel]
+    timing: tuple[tuple[float, float], tuple[float, float]]
+    short: float = 0.0
+    """Part of the impulse out of reach."""
+    miss: float = 0.0
+    """ψ, rad."""
+    factor: float = 1.0
+    """Impulse over A|ω0|."""
+
+    def fired(self, spacecraft: Spacecraft) -> Schedule:
+        """The two pulses, commandable."""
+        pairs = zip(self.channels, self.timing, strict=True)
+        return Schedule(tuple(commandable(spacecraft, channel_pulse(channel, *timing)) for channel, timing in pairs))
+
+
+def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list[PairCandidate]:
+    """At most ``most`` candidates to fly: up to ``near`` that are about the best, by their ends, then the others."""
+    ranked = sorted(candidates, key=lambda candidate: (candidate.short, candidate.cost))
+    if not ranked:
+        return []
+    short, cost = ranked[0].short * CLOSE_IN_SHORT, ranked[0].cost * CLOSE_IN_COST
+    alike = [candidate for candidate in ranked if candidate.short <= short and candidate.cost <= cost]
+    others = [candidate for candidate in ranked if candidate.short > short or candidate.cost > cost]
+    return [*sorted(alike, key=lambda candidate: candidate.end)[:near], *others][:most]
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
@@ -81,7 +84,7 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
             broken = broken or schedule
-        elif best is None or left < CLEARLY * best[0]:
+        elif best is None or left < 0.5 * best[0]:
             best = left, schedule
             if left <= EXACT:
                 break
@@ -95,6 +98,11 @@ def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
     Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
     """
     return _missed(propagation.flown(spacecraft, schedule))
+
+
+def left(spacecraft: Spacecraft, schedule: Schedule) -> float:
+    """Size of what a flown schedule `misses`, rad."""
+    return float(np.linalg.norm(misses(spacecraft, schedule)))
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
@@ -140,9 +148,10 @@ def correct(
     kept = tuple(pulse for index, pulse in enumerate(schedule) if index not in chosen)
     moving = [schedule.pulses[index] for index in chosen]
     pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(schedule, pulse))) for pulse in moving]
-    ends = np.cumsum([len(part.start) for part in pulses])
+    ends = np.cumsum([len(part.free) for part in pulses])
     together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
     common = [_Common(spacecraft, schedule)] if together else []
+    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
     def build(x: Vector) -> Schedule:
         parts = np.split(x, ends)
@@ -151,8 +160,6 @@ def correct(
         moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
         return Schedule(supplied(spacecraft, (*others, *moved)), schedule.notes, schedule.bounds)
 
-    steps, dynamics = 0, make_dynamics(spacecraft).remembering()
-
     def left(schedule: Schedule) -> Vector:
         nonlocal steps
         flown = propagation.flown(spacecraft, schedule, dynamics=dynamics)
@@ -160,16 +167,13 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    freedom = _stacked(*pulses, *common)
-    x, _ = solve(lambda x: left(build(x)), *freedom, lambda: steps > INTEGRATED or work.exhausted())
+    free = np.concatenate([*(pulse.free for pulse in pulses), *(factor.free for factor in common)])
+    # 50,000 steps of integration take some seconds.
+    x = solve(lambda x: left(build(x)), free, lambda: steps > 50_000 or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, schedule.notes, schedule.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
     return corrected if better and keeps_limits(spacecraft, corrected.pulses) else schedule
-
-
-MOST_CORRECTED = 1_000
-"""Pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,14 +188,12 @@ class Correction:
         """True if H too has an end condition."""
         return self.scheme.points and not self.options.frees_axis
 
-    @property
-    def equal(self) -> bool:
-        """True if the pulses are planned to be equal."""
-        return self.options.equal
-
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
-        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
-        if self.options.uncorrected or not schedule.pulses or len(schedule) > MOST_CORRECTED or work.exhausted():
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts.
+
+        One of more than 1000 pulses stays as it is: a correction flies all of them some twenty times.
+        """
+        if self.options.uncorrected or not 0 < len(schedule) <= 1_000 or work.exhausted():
             return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable
@@ -202,51 +204,36 @@ class Correction:
             chosen = (*damping[:BEFORE], *chosen)
         spin = self.scheme.sets_spin and spacecraft.goal.spin is not None
         if spin and whole:  # and the pulse that gives most to the spin
-            chosen = (
-                *chosen,
-                max(range(len(schedule)), key=lambda number: abs(float(schedule.pulses[number].impulse[2]))),
-            )
+            axial = [abs(float(pulse.impulse[2])) for pulse in schedule]
+            chosen = (*chosen, axial.index(max(axial)))
         sizes = {"equal": self.options.equal, "resizable": self.options.resizable}
         return correct(spacecraft, schedule, chosen=chosen, momentum=self.momentum, spin=spin, **sizes)
-
-
-def _stacked(*parts: _Movable | _Common) -> tuple[Vector, Vector, Vector, Vector]:
-    """Start, scale, lower and upper bound of all free parameters."""
-    start, scale, lower, upper = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "scale", "lower", "upper")
-    )
-    return start, scale, lower, upper
 
 
 def alike(schedule: Schedule, pulse: Pulse) -> bool:
     """True if a pulse is as large as the last one of a schedule."""
     last = schedule.pulses[-1]
     size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
-    return abs(size - other) <= ALIKE * other
+    return abs(size - other) <= 1e-9 * other
 
 
 class _Movable:
     """Free parameters of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
-    Without the last of them where it is not ``sized`` for itself.
+    Without the last of them where it is not ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper bound.
     """
 
     def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
         pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
-        self.channel = channel_of(spacecraft, pulse)
-        self.torquer = spacecraft.torquer
-        self.size = _size(pulse)
-        start, scale, lower, upper = [pulse.start], [pace], [earliest], [latest]
+        self.channel, self.torquer = channel_of(spacecraft, pulse), spacecraft.torquer
+        self.sized, self.size = sized, _size(pulse)
+        free = [(pulse.start, pace, earliest, latest)]
         if self.channel is None:
-            start.append(math.atan2(pulse.impulse[1], pulse.impulse[0]))
-            scale, lower, upper = [*scale, 1.0], [*lower, -math.inf], [*upper, math.inf]
+            free.append((math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf))
         if sized:
-            start, scale = [*start, self.size], [*scale, self.size]
-            least, most = _bounds(spacecraft, pulse)
-            lower, upper = [*lower, least], [*upper, most]
-        self.sized = sized
-        self.start, self.scale, self.lower, self.upper = map(np.array, (start, scale, lower, upper))
+            free.append((self.size, self.size, *_bounds(spacecraft, pulse)))
+        self.free = np.array(free)
 
     def turn(self, x: Vector, factor: float) -> Pulse:
         """Pulse with these settings; ``factor`` times as large where it is not sized for itself."""
@@ -260,22 +247,21 @@ class _Movable:
 
 
 class _Common:
-    """Common factor of equal pulses, on the size of all that are as large as the last one."""
-
-    start = scale = np.ones(1)
+    """Common factor of equal pulses, on the size of all that are as large as the last one: ``free`` as of a pulse."""
 
     def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
         self.spacecraft, self.made, last = spacecraft, schedule, schedule.pulses[-1]
         bounds = np.array([_bounds(spacecraft, pulse) for pulse in schedule if alike(schedule, pulse)]) / _size(last)
-        self.lower, self.upper = bounds[:, :1].max(axis=0), bounds[:, 1:].min(axis=0)
+        self.free = np.array([(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())])
 
     def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
         """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
-        return [self._resized(pulse, factor) if alike(self.made, pulse) else pulse for pulse in pulses]
-
-    def _resized(self, pulse: Pulse, factor: float) -> Pulse:
-        moved = _Movable(self.spacecraft, pulse, sized=False)
-        return replace(moved.turn(moved.start, factor), t=pulse.t)
+        resized = list(pulses)
+        for index, pulse in enumerate(resized):
+            if alike(self.made, pulse):
+                moved = _Movable(self.spacecraft, pulse, sized=False)
+                resized[index] = replace(moved.turn(moved.free[:, 0], factor), t=pulse.t)
+        return resized
 
 
 def _size(pulse: Pulse) -> float:
@@ -291,50 +277,39 @@ def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
     return effective_on_times(channel)[0], max(longest_on_time(spacecraft, channel), pulse.on_time)
 
 
-def solve(
-    residual: Callable[[Vector], Vector],
-    start: Vector,
-    scale: Vector,
-    lower: Vector,
-    upper: Vector,
-    enough: Callable[[], bool] = lambda: False,
-) -> tuple[Vector, float]:
-    """Unknowns (n,) within bounds that make ``residual`` (m,) least in norm, and that norm.
+def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
+    """Unknowns (n,) that make ``residual`` (m,) least in norm.
 
-    ``scale`` (n,) is a natural size of each unknown. With more unknowns than equations the nearest solution. It is
-    left as it is once there was ``enough`` work.
+    ``free`` (n, 4): start, natural size and bounds of each. With more unknowns than equations the nearest solution. It
+    is left as it is once there was ``enough`` work.
     """
+    start, scale, lower, upper = free.T
+    difference = 1e-6  # in scaled unknowns: the error of the slopes, far below their size
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
-    for _ in range(STEPS):
-        if norm <= CONVERGED or enough():
+    for _ in range(30):
+        if norm <= 1e-14 or enough():  # rad; a few roundings of the integration
             break
-        jacobian = _slopes(residual, x, value, scale)
+        columns = []
+        for index, size in enumerate(scale):
+            moved = x.copy()
+            moved[index] += difference * size
+            columns.append((residual(moved) - value) / difference)
+        jacobian = np.column_stack(columns)
         step = bounded_step(jacobian, value, x, scale, lower, upper)
-        best, best_value, best_norm = x, value, norm
+        before = norm
         for shrink in range(8):
             trial = np.clip(x + step * 0.5**shrink, lower, upper)
             trial_value = residual(trial)
             trial_norm = float(np.linalg.norm(trial_value))
-            if trial_norm < best_norm:
-                best, best_value, best_norm = trial, trial_value, trial_norm
+            if trial_norm < before:
+                x, value, norm = trial, trial_value, trial_norm
                 break
-        stalled = best_norm > norm * (1.0 - PROGRESS)
-        x, value, norm = best, best_value, best_norm
-        if stalled:
+        # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
+        if norm > before * (1.0 - 0.01):
             break
-    return x, norm
-
-
-def _slopes(residual: Callable[[Vector], Vector], x: Vector, value: Vector, scale: Vector) -> Vector:
-    """Jacobian by the scaled unknowns, (m, n)."""
-    columns = []
-    for index, size in enumerate(scale):
-        moved = x.copy()
-        moved[index] += DIFFERENCE * size
-        columns.append((residual(moved) - value) / DIFFERENCE)
-    return np.column_stack(columns)
+    return np.asarray(x)
 
 
 def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lower: Vector, upper: Vector) -> Vector:
@@ -349,13 +324,6 @@ def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lowe
             break
         free &= ~outward
     return step
-
-
-LEFT_OVER = 0.05
-"""Largest residual, over nutation and turn together, of a schedule that reaches the target."""
-
-LEFT_OVER_BY_TICKS = 0.5
-"""Largest residual where the resolution of commands may be to blame."""
 
 
 ROUNDING = 1e-12
@@ -380,12 +348,6 @@ class FlownBuilder:
         self.steps = 0
         self.pulses: list[Pulse] = []
         self._before: list[tuple[float, Spacecraft]] = []
-
-    @property
-    def allowed(self) -> float:
-        """Number of further pulses within the limits."""
-        most = self.here.limits.max_pulses
-        return math.inf if most is None else most
 
     @property
     def left(self) -> float:
@@ -435,7 +397,7 @@ class FlownBuilder:
 
 def tolerable(spacecraft: Spacecraft) -> float:
     """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
-    share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
+    share = 0.05 if spacecraft.limits.tick is None else 0.5
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
@@ -464,19 +426,7 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
     return after, flown.steps
 
 
-MOMENTS = 16
-"""Earliest starts that are tried."""
-
-PREDAMPING_INTEGRATED = 20_000
-"""Steps of integration after which no more of them are tried."""
-
-Planned = Callable[[Spacecraft, SchemeOptions], Schedule]
-
-IN_REACH = 0.5
-"""Share of the horizon within which the damping begins: the rest is for the turn."""
-
-
-def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
+def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Schedule]) -> FlownBuilder:
     """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
 
     H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
@@ -490,9 +440,10 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
     best: tuple[float, FlownBuilder] | None = None
     reason: Infeasible | None = None
     steps = 0
-    for number in range(MOMENTS):
-        earliest = here.limits.earliest + number * span / MOMENTS
-        if number > 0 and earliest > IN_REACH * here.horizon:
+    moments = 16  # earliest starts that are tried
+    for number in range(moments):
+        earliest = here.limits.earliest + number * span / moments
+        if number > 0 and earliest > 0.5 * here.horizon:  # the rest is for the turn
             break
         try:
             damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
@@ -509,7 +460,7 @@ def damped(start: FlownBuilder, scheme: Planned) -> FlownBuilder:
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps
-        if steps > PREDAMPING_INTEGRATED or work.exhausted():
+        if steps > 20_000 or work.exhausted():
             break
     if best is None:
         text = "the nutation is to be taken out first, and"

@@ -11,7 +11,7 @@ from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import usable
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
+from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
 
 def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
@@ -51,23 +51,20 @@ def _turning(
 ) -> None:
     """Alignment after alignment, whichever helpful channel comes first."""
     while not builder.full and not builder.settled:
-        pulses = [_next(builder, channel, on_times[channel.name], options.coarse) for channel in channels]
+        pulses = []
+        for channel in channels:  # a full one, or in fine damping one of the remaining size
+            full = on_times[channel.name]
+            just_enough = None if options.coarse else builder.on_time_for(channel, builder.left, full)
+            pulses.append(builder.align(channel, full if just_enough is None else just_enough))
         helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
         if not helpful:
             return
         builder.fire(min(helpful, key=lambda pulse: pulse.t))
 
 
-def _next(builder: ImpulseBuilder, channel: Channel, on_time: float, coarse: bool) -> Pulse | None:
-    """Next pulse of ``channel``: a full one, or in fine damping one of the remaining size."""
-    just_enough = None if coarse else builder.on_time_for(channel, builder.left, on_time)
-    return builder.align(channel, on_time if just_enough is None else just_enough)
-
-
 def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPulseOptions) -> None:
     """Pulses on a sphere: ω does not turn, so the channels beside -ω share it, |cos φ| + |sin φ| for ±1, ±2."""
-    shares = _shares(channels, -builder.A * builder.omega)
-    for channel, impulse in shares:
+    for channel, impulse in _shares(channels, -builder.A * builder.omega):
         unit = impulse / abs(channel.transverse)
         longest = channel.max_on_time if options.on_time is None else options.on_time
         count = 1 if math.isinf(longest) else max(math.ceil(unit / longest - 1e-9), 1)
@@ -97,10 +94,6 @@ def _shares(channels: list[Channel], target: complex) -> list[tuple[Channel, flo
             least = first + second
             best = [(left, first), (right, second)]
     if not best:
-        along = {
-            channel.name: (target * channel.transverse.conjugate()).real / abs(channel.transverse)
-            for channel in channels
-        }
-        nearest = max(channels, key=lambda channel: along[channel.name])
-        best = [(nearest, along[nearest.name])]
+        along = [(target * channel.transverse.conjugate()).real / abs(channel.transverse) for channel in channels]
+        best = [max(zip(channels, along, strict=True), key=lambda share: share[1])]
     return [(channel, impulse) for channel, impulse in best if impulse > 1e-12 * abs(target)]

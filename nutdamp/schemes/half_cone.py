@@ -1,16 +1,13 @@
 """Half cones in a row: the spin axis swings along the great circle to the target, half a nutation turn at a time.
 
 From a pure spin n half cones cost 2n C|ω3| tan(β/2n) in n + 1 pulses: one puts H half-way ahead of the spin axis, each
-further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is not removed
-first: the first pulse comes at the moment from which the whole row is cheapest, and jumps straight onto its first cone.
-The last cone is the acquisition of `pair_search`, which takes out what the others left. Only a nutation that one pulse
-cannot take out is damped first (`predamping`).
+further one half a turn later puts it ahead again, the last stops it on the target. A nutation at t = 0 is damped first
+only where one pulse cannot take it out: else the first one jumps straight onto its first cone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -29,36 +26,8 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
-WORTH_A_CONE = 0.01
-"""Share of the cost that one more cone must save; else the fewer cones are taken, which end earlier."""
-
 MOST_CONES = 60
 """Cones tried at most where their number is not given."""
-
-PATIENCE = 5
-"""Numbers of cones that may fail before the search ends."""
-
-SHARES = np.linspace(0.6, 1.3, 15)
-"""Sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone needs."""
-
-WORTH_WAITING = 0.05
-"""Share of one pulse that waiting for a better phase must save."""
-
-UNEQUAL = 0.3
-"""Largest relative difference of a cone from equal ones: enough for a channel to be in phase."""
-
-LAGGING = 1.1
-"""Largest ratio of the remaining cones to equal ones after a pulse; beyond, the last have too much to do."""
-
-SAMPLES = 96
-"""Moments looked at in each turn of the body."""
-
-LONGEST_SEARCH = 6000
-"""Moments looked at for one pulse, at most."""
-
-
-PLACE = 1e-3
-"""Units of `work` of each moment at which a channel is looked at for the first pulse of a row."""
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
@@ -74,32 +43,25 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         return _row(builder, options.cones)
     here = builder.here
     best: Schedule | None = None
-    reason: Infeasible | None = None
-    failed = 0
-    for cones in _counts(_fewest(here), _most(here)):
+    reasons = list[Infeasible]()
+    cones, most = _fewest(here), _most(here)
+    while cones <= most:
         try:
             row = _row(builder.fork(), cones)
         except Infeasible as why:
-            reason, failed = why, failed + 1
-            if best is not None or failed > PATIENCE or work.exhausted():
+            reasons.append(why)
+            if best is not None or len(reasons) > 5:
                 break
-            continue
-        if best is not None and row.cost > (1.0 - WORTH_A_CONE) * best.cost:
-            break
-        best = row
+        else:
+            if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
+                break
+            best = row
         if work.exhausted():
             break
+        cones += 1 + cones // 6  # where there are many, in steps of a sixth
     if best is None:
-        raise reason or _no_time(here)
+        raise reasons[-1] if reasons else _no_time(here)
     return best
-
-
-def _counts(fewest: int, most: int) -> Iterator[int]:
-    """Numbers of cones to try: one after the other, where there are many in steps of a sixth."""
-    cones = fewest
-    while cones <= most:
-        yield cones
-        cones += 1 + cones // 6
 
 
 def _reach(spacecraft: Spacecraft) -> float:
@@ -107,10 +69,8 @@ def _reach(spacecraft: Spacecraft) -> float:
     torquer, spin = spacecraft.torquer, spacecraft.spin
     if torquer is not None:
         return math.inf if torquer.torque is None else precession.reach(torquer.torque, spin, math.inf)
-    return max(
-        (precession.reach(abs(channel.transverse), spin, channel.max_on_time) for channel in usable(spacecraft)),
-        default=0.0,
-    )
+    channels = usable(spacecraft)
+    return max((precession.reach(abs(each.transverse), spin, each.max_on_time) for each in channels), default=0.0)
 
 
 def _fewest(spacecraft: Spacecraft) -> int:
@@ -150,8 +110,9 @@ def _no_time(spacecraft: Spacecraft) -> Infeasible:
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
     """Row of half cones, each planned from the motion that the one before leaves."""
     spacecraft, damped = builder.here, len(builder.pulses)
-    if builder.allowed < cones + 1:
-        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {builder.allowed}")
+    most = spacecraft.limits.max_pulses
+    if most is not None and most < cones + 1:
+        raise Infeasible(f"{cones} half cones take {cones + 1} pulses, and limits.max_pulses leaves {most}")
     for remaining in range(cones, 1, -1):
         here = builder.here
         steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
@@ -173,26 +134,27 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
     and what it misses then is made up for by the cones that follow.
     """
-    h, windows, target, channels = abs(here.axial), Windows(here), here.target_axis, usable(here)
-    step = 2.0 * math.pi / here.fastest / SAMPLES
+    windows, channels = Windows(here), usable(here)
+    step = 2.0 * math.pi / here.fastest / 96  # so many moments in each turn of the body
     share = (windows.horizon - here.limits.earliest) / (cones + 1)
     span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)
-    count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
+    count = min(int(max(span, 0.0) / step) + 1, 6000)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
     best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
-    work.spend(PLACE * count * len(channels))
+    work.spend(1e-3 * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
-        costs, sizes = _costs(here, channel, push, cones, h, target)
+        costs, sizes = _costs(here, channel, push, cones)
         on_times = precession.on_times_to_turn(sizes, abs(channel.transverse), here.spin)
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
+    worth_waiting = 0.05 * _equal(here, cones)[1]
     for costs, on_times, channel in choices:
-        for row in np.flatnonzero(costs <= least + WORTH_WAITING * _equal(here, cones)[1])[:1]:
+        for row in np.flatnonzero(costs <= least + worth_waiting)[:1]:
             pulse = channel_pulse(channel, float(times[row]), float(on_times[row]))
             if best is None or (pulse.end, costs[row]) < best[:2]:
                 best = pulse.end, float(costs[row]), pulse
@@ -212,25 +174,24 @@ def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
     return equal, abs(here.axial) * (math.tan(here.nutation) + math.tan(equal))
 
 
-def _costs(
-    here: Spacecraft, channel: Channel, push: Vector, cones: int, h: float, target: Vector
-) -> tuple[Vector, Vector]:
+def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tuple[Vector, Vector]:
     """Cost of the rest of the row, (n,) N m s, after pushes of H along ``push`` (n, 3), and their sizes, (n,) N m s.
 
     The rest is the row of cones - 1 half cones from the far end of the cone that the push makes.
     """
     equal, nominal = _equal(here, cones)
-    reach = _reach(here)
+    h, reach = abs(here.axial), _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
-    for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
+    for size in np.unique(np.minimum(nominal * np.linspace(0.6, 1.3, 15), 0.999 * reach)):
         on_time = float(precession.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
         momentum = here.momentum + size * push
         half_angle = np.arccos(np.minimum(h / np.linalg.norm(momentum, axis=1), 1.0))
-        rest = np.abs(attitude.angle_between(momentum, target) - half_angle) / (2 * (cones - 1))
+        rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (2 * (cones - 1))
         costs = abs(channel.transverse) * on_time + h * (np.tan(half_angle) + 2 * (cones - 1) * np.tan(rest))
-        costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
+        # Cones may differ by so much for a channel to be in phase, but the last must not have too much to do.
+        costs[(np.abs(half_angle - equal) > 0.3 * equal) | (rest > 1.1 * equal)] = np.inf
         costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
         better = costs < best
         best[better], chosen[better] = costs[better], size

@@ -10,12 +10,9 @@ from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
-from nutdamp.spacecraft.equipment import Channel, Steerable
+from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-
-TRAIN_SHARE = 0.25
-"""Longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width."""
 
 LEFT_OVER = 0.01
 """Share of A|ω0| from which a remainder counts against a channel."""
@@ -29,7 +26,8 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     """
     torquer = spacecraft.torquer
     if torquer is not None:
-        builder = _steered(spacecraft, torquer)
+        torque = math.inf if torquer.torque is None else torquer.torque
+        builder = _train(spacecraft, torque, 0.0, math.inf, lambda builder, impulse: builder.steer(torquer, impulse))
         if builder.pulses:
             return builder.schedule()
         raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
@@ -37,18 +35,13 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)
-    best = min(trains, key=_preference)
-    return best.schedule()
+    return min(trains, key=_preference).schedule()
 
 
 def _preference(builder: ImpulseBuilder) -> tuple[bool, int, float, float]:
     chosen = builder.schedule()
-    return (
-        not builder.settled and builder.left > LEFT_OVER * builder.spacecraft.least_impulse,
-        len(chosen),
-        chosen.cost,
-        chosen.end,
-    )
+    lacks = not builder.settled and builder.left > LEFT_OVER * builder.spacecraft.least_impulse
+    return lacks, len(chosen), chosen.cost, chosen.end
 
 
 def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
@@ -56,18 +49,11 @@ def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
 
     def fire(builder: ImpulseBuilder, impulse: float) -> Pulse | None:
         on_time = builder.on_time_for(channel, impulse)
-        return builder.align(
-            channel, longest_useful(channel.max_on_time, builder.period) if on_time is None else on_time
-        )
+        longest = longest_useful(channel.max_on_time, builder.period)
+        return builder.align(channel, longest if on_time is None else on_time)
 
     slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
     return _train(spacecraft, abs(channel.transverse), slope, channel.max_on_time, fire)
-
-
-def _steered(spacecraft: Spacecraft, torquer: Steerable) -> ImpulseBuilder:
-    """Pulses of a steerable torquer, one behind the other."""
-    torque = math.inf if torquer.torque is None else torquer.torque
-    return _train(spacecraft, torque, 0.0, math.inf, lambda builder, impulse: builder.steer(torquer, impulse))
 
 
 def _train(
@@ -88,7 +74,7 @@ def _train(
     longest = longest_useful(max_on_time, start.period)
     count = 1
     single = math.isinf(torque) or response.on_time_for(start.left, torque, start.turning, slope, longest)
-    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
+    share = capacity(min(max_on_time, 0.25 * start.period))  # a pulse as wide as that loses 10 % of its impulse
     if not single and share > 0.0:
         most = start.most
         count = math.ceil(min(start.left / share, most + 1.0))

@@ -9,25 +9,18 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
-from nutdamp.schemes.catalogue import (
-    POINTING,
-    SCHEMES,
-    Options,
-    Scheme,
-    SchemeOptions,
-)
+from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
+from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import as_given
 
 if TYPE_CHECKING:
     from nutdamp.schemes.sequential import SymmetricModel
     from nutdamp.spacecraft.model import Spacecraft
-    from nutdamp.spacecraft.schedule import Schedule
 
 
 Choice = Options | SchemeOptions | None
@@ -63,33 +56,25 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
 
     scheme = SCHEMES[name]
     chosen = settled(scheme, options, spacecraft)
+    if not scheme.fires:
+        return Schedule()
     if scheme.by_turns and spacecraft.spin == 0.0:
         raise Infeasible("the body does not turn about axis 3: there is no spin turn to fire once in")
     if scheme.on_true_body:
-        return cast("Schedule", _loaded(scheme).schedule(spacecraft, chosen))
+        return cast("Schedule", import_module(scheme.module).schedule(spacecraft, chosen))
     if spacecraft.thrust_laws:
         from nutdamp.schemes import correction, valve_commands
 
         on_plain = valve_commands.options(spacecraft, chosen)
-        return valve_commands.planned(
-            spacecraft,
-            lambda body: schedule(name, body, on_plain),
-            correction.Correction(scheme, on_plain),
-        )
-    model = model_of(spacecraft, turning=chosen.equal)
-
-    def planned(body: Spacecraft) -> Schedule:
-        return cast("Schedule", _loaded(scheme).schedule(body, chosen))
-
+        on_true_body = correction.Correction(scheme, on_plain)
+        return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), on_true_body)
+    model, module = model_of(spacecraft, turning=chosen.equal), import_module(scheme.module)
     try:
-        made = planned(model.body)
+        planned: Schedule = module.schedule(model.body, chosen)
     except TooShort as short:
-        raise TooShort(short.why, short.cure or _longer_horizon(model.body, planned)) from None
-    return _corrected(scheme, model, made, chosen)
-
-
-LONGER = 4.0
-"""Multiple of the horizon, and of the default one, up to which a sufficient horizon is sought."""
+        cure = short.cure or _longer_horizon(model.body, lambda body: module.schedule(body, chosen))
+        raise TooShort(short.why, cure) from None
+    return _corrected(scheme, model, planned, chosen)
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
@@ -106,7 +91,7 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
             return None
 
     usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
-    for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
+    for horizon in sorted({usual, 4.0 * max(usual, spacecraft.horizon)}):
         over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
         if over:
             step = 10.0 ** (math.floor(math.log10(over)) - 3)
@@ -135,9 +120,8 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
         schedules = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
         return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
-    return [
-        _corrected(scheme, model, schedule, chosen) for schedule in _loaded(scheme).alternatives(model.body, chosen)
-    ]
+    schedules = import_module(scheme.module).alternatives(model.body, chosen)
+    return [_corrected(scheme, model, schedule, chosen) for schedule in schedules]
 
 
 def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: Choice = None) -> Schedule:
@@ -150,11 +134,6 @@ def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: 
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
     return valve_commands.as_commands(spacecraft, schedule, correction.Correction(scheme, chosen))
-
-
-def _loaded(scheme: Scheme) -> ModuleType:
-    """Module of the scheme, loaded when it is planned first."""
-    return import_module(scheme.module)
 
 
 def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions) -> Schedule:

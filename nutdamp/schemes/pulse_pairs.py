@@ -21,7 +21,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
 from nutdamp.schemes import correction
-from nutdamp.schemes.correction import tolerable
+from nutdamp.schemes.correction import PairCandidate, shortlist, tolerable
 from nutdamp.schemes.sequential import at_hand, model_of, turn_of
 from nutdamp.spacecraft.constraints import Windows, commandable, for_pairs, keeps_limits
 from nutdamp.spacecraft.equipment import Channel, Steerable
@@ -31,44 +31,11 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, steerable_pulse
 SPIN_SAMPLES = 256
 """Moments looked at in each turn of the spin axis, before the best is made exact."""
 
-SPIN_TURNS = 4
-"""Turns of the spin axis looked at from the earliest start, and one more from the end of each blackout window."""
-
-MOST_WINDOWS = 40
-"""Blackout windows after which a turn is looked at."""
-
-FURTHER_TURNS = 60
-"""Further whole turns that the second pulse may wait for, at most."""
-
-FURTHER_BESIDE = 12
-"""The same for the search beside the best places."""
-
-MOST_BESIDE = 1000
-"""Moments looked at in that search, at most."""
-
-ASIDE = np.linspace(-1.0, 1.0, 41)
-"""Places of H beside the best one, as shares of both jumps, for the case that the limits forbid that one."""
-
-NARROWEST = 1e-7
-"""Share of the first steps at which the search for the best choice ends; the cost is flat there to its square."""
-
 COMPASS_STEPS = 2000
 """Steps of that search, at most."""
 
-ROUNDING = 1e-14
-"""Relative gain that counts as one while the best choice is made exact."""
-
 EQUAL = 1e-9
 """Costs that differ by less, relatively, are equal: then the earlier end wins."""
-
-SMALLEST = 0.1
-"""Least share of both jumps that each real pulse of the two gets."""
-
-APART = 0.5
-"""Least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a turn to five."""
-
-NOTHING = 1e-12
-"""Jumps below this times C|ω3| are left out."""
 
 
 class SteerablePair:
@@ -78,18 +45,13 @@ class SteerablePair:
         self.spacecraft, self.torquer = spacecraft, torquer
         self.A, self.h = spacecraft.inertia.A, abs(spacecraft.axial)
         self.momentum, self.target = spacecraft.momentum, spacecraft.target_axis
-        self.start = spacecraft.initial
-        self.windows = Windows(spacecraft)
-
-    # --- the motion --------------------------------------------------------------------------------------------------
+        self.start, self.windows = spacecraft.initial, Windows(spacecraft)
+        self.step = spacecraft.inertial_period / SPIN_SAMPLES
 
     def axes(self, times: Vector) -> Vector:
         """Spin axis S at ``times`` (n,) s, (n, 3), inertial."""
-        _, quaternions = self._arc(0.0, self.start).motion(times)
+        _, quaternions = Arc.of(self.spacecraft.inertia, self.start).motion(times)
         return attitude.rotate(quaternions, np.array([0.0, 0.0, self.spacecraft.sense]))
-
-    def _arc(self, since: float, state: SpinState) -> Arc:
-        return Arc.of(self.spacecraft.inertia, state, since)
 
     def on_times(self, jumps: Vector) -> Vector:
         """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no pulse can."""
@@ -106,10 +68,10 @@ class SteerablePair:
         """Pulses that bring H to the given vectors (3,) N m s at the given moments, in order."""
         pulses, state, now, momentum = [], self.start, 0.0, self.momentum
         for moment, after in jumps:
-            rates, quaternions = self._arc(now, state).motion(np.array([moment]))
+            rates, quaternions = Arc.of(self.spacecraft.inertia, state, now).motion(np.array([moment]))
             body = attitude.matrix(quaternions[0]).T @ (after - momentum)
             push = complex(body[0], body[1])
-            if abs(push) > NOTHING * self.h:
+            if abs(push) > 1e-12 * self.h:
                 on_time = float(self.on_times(np.array([abs(push)]))[0])
                 requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
@@ -119,15 +81,12 @@ class SteerablePair:
             now, momentum = moment, after
         return tuple(pulses)
 
-    # --- what can be chosen ------------------------------------------------------------------------------------------
-
     def moments(self) -> Vector:
-        """Moments (n,) s of the first pulse worth looking at."""
-        period = self.spacecraft.inertial_period
-        first = self.spacecraft.limits.earliest
-        turn = np.arange(SPIN_SAMPLES) * (period / SPIN_SAMPLES)
-        ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:MOST_WINDOWS]
-        parts = [first + number * period + turn for number in range(SPIN_TURNS)] + [end + turn for end in ends]
+        """Moments (n,) s of the first pulse worth looking at: four turns, and one after each blackout window."""
+        period, first = self.spacecraft.inertial_period, self.spacecraft.limits.earliest
+        turn = np.arange(SPIN_SAMPLES) * self.step
+        ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:40]
+        parts = [first + number * period + turn for number in range(4)] + [end + turn for end in ends]
         times = np.unique(np.concatenate(parts))
         return np.asarray(times[times <= self.windows.horizon])
 
@@ -146,25 +105,25 @@ class SteerablePair:
         if len(times) == 0 or not np.isfinite(costs.min()):
             raise Infeasible(self.no_room(cones))
         best = float(times[np.flatnonzero(costs <= costs.min() * (1.0 + EQUAL))[0]])
-        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), self._steps(0.0)[:1])
+        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), np.array([self.step]))
         moment = float(point[0])
         return self.pulses([(moment, cost(np.array([moment]))[1][0])])
 
     def two(self, straight: bool = False) -> tuple[Pulse, ...]:
         """Two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
         times = self.moments()
-        plain = np.zeros(len(times))
         if len(times) == 0:
             raise Infeasible(self.no_room(1))
         free = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target)
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
         if not np.isfinite(least):
             raise Infeasible(self.no_room(1))
-        choice = self._best(times, plain, straight, FURTHER_TURNS)
+        choice = self._best(times, np.zeros(len(times)), straight, 60)
         if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
-            some = slice(None, None, math.ceil(len(times) / MOST_BESIDE))
-            beside = np.repeat(times[some], len(ASIDE)), (ASIDE * free.cost[some, None]).ravel()
-            other = self._best(*beside, straight, FURTHER_BESIDE)
+            # The limits forbid the best place: others beside it, by shares of both jumps.
+            some, shares = slice(None, None, math.ceil(len(times) / 1000)), np.linspace(-1.0, 1.0, 41)
+            beside = np.repeat(times[some], len(shares)), (shares * free.cost[some, None]).ravel()
+            other = self._best(*beside, straight, 12)
             if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
                 choice = other
         if choice is None:
@@ -172,13 +131,10 @@ class SteerablePair:
         point = _descend(
             lambda points: self._costs(points[:, 0], points[:, 1], choice.further, straight)[0],
             np.array([choice.moment, choice.aside]),
-            self._steps(0.0 if straight else 0.02 * choice.jumps),
+            np.array([self.step, 0.0 if straight else 0.02 * choice.jumps]),
         )
         _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
         return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
-
-    def _steps(self, aside: float) -> Vector:
-        return np.array([self.spacecraft.inertial_period / SPIN_SAMPLES, aside])
 
     def _costs(
         self, times: Vector, aside: Vector, further: int, straight: bool
@@ -192,8 +148,8 @@ class SteerablePair:
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
         if self.torquer.torque is not None:
             # Widths are corrected on both pulses: both must be there, and not do the same a whole turn apart.
-            allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
-            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART
+            allowed &= np.minimum(jumps.first, jumps.second) > 0.1 * jumps.cost
+            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > 0.5  # a sixth of a turn to five
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
@@ -253,12 +209,12 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
     best = float(cost(point[None, :])[0])
     narrowed = 1.0
     for _ in range(COMPASS_STEPS if len(rose) else 0):
-        if narrowed <= NARROWEST:
+        if narrowed <= 1e-7:  # the cost is flat there to its square
             break
         around = point + narrowed * rose
         costs = cost(around)
         index = int(np.argmin(costs))
-        if costs[index] < best * (1.0 - ROUNDING):
+        if costs[index] < best * (1.0 - 1e-14):
             best, point = float(costs[index]), around[index]
         else:
             narrowed *= 0.5
@@ -268,29 +224,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
 DEAREST = 3.0
 """Pairs that cost more than this times the floor are not looked at."""
 
-CLOSE_IN_COST = 1.02
-"""Among candidates within this factor of the cheapest the one that ends first is preferred."""
-
-SHORTLIST = 8
-"""Candidates that are flown and corrected, at most."""
-
-BODY_SAMPLES = 96
-"""Moments looked at in each turn of the body."""
-
-BODY_TURNS = 24
-"""Turns of the body within which the first pulse comes, at most."""
-
-FURTHER = 60
-"""Further whole turns of the spin axis that the second pulse may wait for, at most."""
-
-PAIR = 5e-5
-"""Units of `work` of each moment of each pair of channels."""
-
-ON_CONE = 1e-3
-"""Share of its natural size below which the first jump counts as nothing."""
-
-BESIDE = 0.05
-"""Distance beside the target, over the angles at hand, of a search that finds nothing on it."""
+BODY_SAMPLES, BODY_TURNS = 96, 24
+"""Moments looked at in each turn of the body, and turns within which the first pulse comes, at most."""
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
@@ -304,9 +239,8 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
     torquer = spacecraft.torquer
     if torquer is not None:
         schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
-        if spacecraft.limits.tick is not None and not keeps_limits(spacecraft, schedule.pulses):
-            raise Infeasible(_off_limits())
-        if torquer.torque is not None or not model_of(spacecraft).exact:
+        kept = spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses)
+        if kept and (torquer.torque is not None or not model_of(spacecraft).exact):
             schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
         return _checked(spacecraft, schedule)
     return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
@@ -315,71 +249,45 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     """Schedule, if it keeps the limits and comes near the target."""
     if not keeps_limits(spacecraft, schedule.pulses):
-        raise Infeasible(_off_limits())
-    if not _left(spacecraft, schedule) <= tolerable(spacecraft):
-        raise Infeasible(_too_wide(spacecraft, schedule.pulses))
-    return schedule
-
-
-def _off_limits() -> str:
-    return "with commands on the ticks of limits.tick the two pulses touch another limit"
-
-
-def _too_wide(spacecraft: Spacecraft, pulses: tuple[Pulse, ...]) -> str:
-    widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in pulses), default=0.0)
+        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
+    if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
+        return schedule
+    widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
     if widest == 0.0:
-        return "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
-    return (
+        raise Infeasible(
+            "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
+        )
+    raise Infeasible(
         f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
         "target; half-cone with more cones or rhumb-line take smaller ones"
     )
 
 
-def _left(spacecraft: Spacecraft, schedule: Schedule) -> float:
-    return float(np.linalg.norm(correction.misses(spacecraft, schedule)))
-
-
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
-class PairCandidate(NamedTuple):
-    """Two channels, the moments (s) at which ideal impulses of theirs acquire the target, and their on-times (s)."""
-
-    cost: float
-    end: float
-    channels: tuple[Channel, Channel]
-    timing: tuple[tuple[float, float], tuple[float, float]]
 
 
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
     search = _PairSearch(spacecraft, channels)
-    candidates = sorted(search.all_candidates(), key=lambda candidate: candidate.cost)
-    if not candidates:
-        raise Infeasible(search.reason())
-    near = [candidate for candidate in candidates if candidate.cost <= candidates[0].cost * CLOSE_IN_COST]
-    near.sort(key=lambda candidate: candidate.end)
-    others = [candidate for candidate in candidates if candidate.cost > candidates[0].cost * CLOSE_IN_COST]
-    best, _ = correction.best_of(spacecraft, _tried(spacecraft, [*near[: SHORTLIST // 2], *others][:SHORTLIST]))
+    best, _ = correction.best_of(spacecraft, _tried(spacecraft, shortlist(search.all_candidates(), 4, 8)))
     if best is None:
         raise Infeasible(search.reason())
     schedule = _checked(spacecraft, best)
-    floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
     first, two = (pulse.channel for pulse in schedule)
-    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / floor:.3f}"
+    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / search.floor:.3f}"
     return Schedule(schedule.pulses, (note("pulse-pair", first=first, second=two, wait_s=wait, ratio=ratio),))
 
 
 def _tried(spacecraft: Spacecraft, candidates: list[PairCandidate]) -> Iterator[tuple[Schedule, float]]:
     """Candidates, corrected on the flown motion, with the residual (rad) of each."""
     for candidate in candidates:
-        schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
+        schedule = candidate.fired(spacecraft)
         if spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses):
             schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-            yield schedule, _left(spacecraft, schedule)
+            yield schedule, correction.left(spacecraft, schedule)
 
 
-Indices = NDArray[np.intp]
+Rows = NDArray[np.intp]
 
 
 class _PairSearch:
@@ -431,13 +339,13 @@ class _PairSearch:
         That is where the target lies on the cone of the spin axis itself.
         """
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
-        if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
+        if abs(self.h - self.momentum @ self.target) > 1e-3 * wide**2 * self.h:
             return self.candidates()
         candidates, target = [], self.target
         side = np.cross(self.momentum, target)
         for beside in (side, np.cross(side, target)):
             for sense in (1.0, -1.0):
-                moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
+                moved = target + sense * 0.05 * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
                 self.target = moved / float(np.linalg.norm(moved))
                 candidates += self.candidates()
         self.target = target
@@ -455,10 +363,10 @@ class _PairSearch:
                 break
             after = self.after(one, times)
             promising = adjoining & (after.first + after.second <= DEAREST * self.floor)[:-1]
-            for further in range(FURTHER):
+            for further in range(60):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
-                work.spend(PAIR * len(times) * len(self.channels))
+                work.spend(5e-5 * len(times) * len(self.channels))
                 needed = after.body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())
@@ -468,7 +376,7 @@ class _PairSearch:
         return candidates
 
     def _placed(
-        self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Indices
+        self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Rows
     ) -> list[PairCandidate]:
         """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
         if len(crosses) == 0:
@@ -493,7 +401,7 @@ class _PairSearch:
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
             cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
             pairs.append(PairCandidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
-        return sorted(pairs, key=lambda candidate: candidate.cost)[:SHORTLIST]
+        return sorted(pairs, key=lambda candidate: candidate.cost)[:8]
 
     def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
         """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number beyond its reach."""

@@ -1,13 +1,10 @@
 """Sun-synchronous pulse train: short pulses at a fixed inertial phase, one or more in each spin turn.
 
-Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, and from one pulse to the next that phasor turns by
-2πC/(AK) for K pulses a turn. So N pulses leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation, φ = 2πC/(AK): N is
-chosen so that they close, a nutation at t = 0 included. All pulses are equal, as the width is one command: it is chosen
-so that they just reach the target. An excess is bent away: the train heads a little to one side of its course (a
-spiral), and on the flown motion the last pulses are moved until nothing is left. Near φ = 2π, which is C = A for one
-pulse a turn, and C = 2A too, every pulse meets the nutation in the same phase.
-
-The phase is that of the great circle to the target, or fixed against the Sun: then H follows a rhumb line.
+Each pulse turns H by J/(C|ω3|) and gives the nutation a phasor, which from one to the next turns by φ = 2πC/(AK) for K
+pulses a turn. So N leave (J/C|ω3|)|sin(Nφ/2)/sin(φ/2)| of nutation: N is chosen so that they close, a nutation at t = 0
+included, their equal width so that they just reach the target. An excess is bent away by heading a little aside (a
+spiral), and on the flown motion the last pulses are moved until nothing is left. The phase is that of the great circle
+to the target, or fixed against the Sun: then H follows a rhumb line.
 """
 
 from __future__ import annotations
@@ -20,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from nutdamp.common import work
-from nutdamp.common.results import Note, note
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, span
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
-from nutdamp.schemes import correction, one_pulse, sequential
+from nutdamp.schemes import correction, one_pulse
 from nutdamp.schemes.catalogue import RhumbLineOptions
 from nutdamp.schemes.correction import ROUNDING, FlownBuilder, tolerable
 from nutdamp.schemes.sequential import expect_aim
@@ -33,20 +30,11 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
-TURN_SHARE = 0.125
-"""Default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc."""
-
-WIDEST = 0.4
-"""Share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost."""
-
 STEP = math.radians(2.0)
 """Angle that one ideal impulse turns H by, at most."""
 
-CLOSED = 0.3
-"""Phasors that sum to less than this many pulses count as closed: the rest is corrected."""
-
-OPEN = 1.2
-"""Sum of the phasors, in pulses, beyond which correction has no hope."""
+CLOSED, OPEN = 0.3, 1.2
+"""Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that has no hope."""
 
 MOST_PULSES = 600
 
@@ -55,28 +43,6 @@ LAST = 20
 
 TRIES = 4
 """Counts that are flown, at most."""
-
-SPARE = 3e-3
-"""Pulses that a train has to spare: by so much it may bend, without which its phases could not bring H nearer."""
-
-ROOM = 1.0
-"""Times twice the spare pulses that it takes at least to close the phasors by the phases of the last pulses."""
-
-LEAST_RATIO = 0.1
-"""Inertia ratio below which the phases of pulses hardly matter to the nutation."""
-
-BENT = 10.0
-"""Times as many spare pulses for a last try."""
-
-WIDEST_BEND = 1.3
-"""rad by which the heading of a train may differ from the course to the target."""
-
-
-class Shot(NamedTuple):
-    """A moment (s) at which a channel, or with None the steerable torquer, has the right phase; all undisturbed."""
-
-    t: float
-    channel: Channel | None
 
 
 class Attempt(NamedTuple):
@@ -110,11 +76,11 @@ class Train:
             assert here.torquer is not None
             self.torque = math.inf if here.torquer.torque is None else here.torquer.torque
             self.shortest, self.longest = 0.0, math.inf
-        given = options.on_time
-        if given is not None:
-            self._check(given)
-        self.on_time = min(self.longest, TURN_SHARE * self.turn) if given is None else given
-        self.on_time = max(self.on_time, self.shortest)
+        if options.on_time is not None:
+            self._check(options.on_time)
+        # By default an eighth of a spin turn: 2.6 % of the impulse is lost to the arc.
+        given = min(self.longest, 0.125 * self.turn) if options.on_time is None else options.on_time
+        self.on_time = max(given, self.shortest)
         if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
             raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
         self.ahead, self.way = precession.course(here.momentum, here.target_axis, self.sun)
@@ -155,14 +121,9 @@ class Train:
         )
         return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
 
-    def rounding(self, size: float) -> float:
-        """Residual, rad, by rounding the start of one pulse to a tick."""
-        return self.turns_by(size) / self.h * abs(self.here.spin) * (self.here.limits.tick or 0.0)
-
     def attempts(self) -> list[Attempt]:
         """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
-        left = self.left_by(self.shots())
-        return self._free(left) if self.options.on_time is None else self._held(left, self.options.on_time)
+        return self._free(self.left()) if self.options.on_time is None else self._held(self.left(), self.on_time)
 
     def _spare(self, count: int, left: Vector) -> float:
         """Spare pulses of a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
@@ -170,11 +131,12 @@ class Train:
         A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
         of its square.
         """
-        needed = float(left[count - 1]) / max(abs(self.here.nutation_rate / self.here.spin), LEAST_RATIO)
-        return SPARE + ROOM * needed**2 / min(count, LAST)
+        ratio = abs(self.here.nutation_rate / self.here.spin)  # below 0.1 the phases of pulses hardly matter
+        # Without 3e-3 to spare, by which a train may bend, its phases could not bring H nearer.
+        return 3e-3 + (float(left[count - 1]) / max(ratio, 0.1)) ** 2 / min(count, LAST)
 
     def _free(self, left: Vector) -> list[Attempt]:
-        """Trains of pulses of any length: `left_by` of 1, 2, … pulses is ``left`` (n,)."""
+        """Trains of pulses of any length: `left` by 1, 2, … pulses is ``left`` (n,)."""
         fewest = self.fewest()
         if fewest > len(left):
             wide = STEP * self.h if math.isinf(self.torque) else self.turns_by(self.widest)
@@ -192,13 +154,10 @@ class Train:
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
         free = self.here.limits.tick is None
         tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
-        if free:
-            tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]))
-        else:
-            tried.sort(key=lambda attempt: attempt.pulses * attempt.size)
+        tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size)
         tried = tried[:TRIES]
         for count in [attempt.pulses for attempt in tried[:2]]:
-            tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
+            tried.append(Attempt(count, self.size(count, 10.0 * self._spare(count, left)), False, free))
         widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
         possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
         if not possible:
@@ -227,7 +186,7 @@ class Train:
 
     def lengths_near(self, given: float) -> list[float]:
         """On-times (s) of trains that may close, in the order of their distance from the ``given`` one."""
-        left = self.left_by(self.shots())
+        left = self.left()
         closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
         sizes = {self.size(count, self._spare(count, left)) for count in closing}
         if self.here.limits.tick is not None:
@@ -237,8 +196,8 @@ class Train:
 
     @property
     def widest(self) -> float:
-        """Longest pulse (s) worth firing, unless a longer one is given."""
-        return min(self.longest, WIDEST * self.turn)
+        """Longest pulse (s) worth firing, unless a longer one is given: a quarter of its impulse is lost to the arc."""
+        return min(self.longest, 0.4 * self.turn)
 
     def fewest(self) -> int:
         """Least number of pulses with the on-time given; two at least, to close."""
@@ -252,20 +211,20 @@ class Train:
             allowed = min(allowed, int(_ratio(self.h * self.way, self.turns_by(self.shortest))))
         return allowed
 
-    def left_by(self, shots: list[Shot]) -> Vector:
+    def left(self) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
-        start, A = self.here.initial, self.here.inertia.A
+        start, A, shots = self.here.initial, self.here.inertia.A, self._shots()
         pushes = np.array(
             [_in_body(self.here, self.ahead, t) if channel is None else channel.transverse for t, channel in shots]
         )
-        turned = self.here.nutation_rate * np.array([shot.t for shot in shots])
+        turned = self.here.nutation_rate * np.array([t for t, _ in shots])
         sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
         counts = np.arange(1, len(shots) + 1)
         return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
 
-    def shots(self) -> list[Shot]:
-        """Moments of right phase, one pulse after the other as the limits allow them."""
-        shots: list[Shot] = []
+    def _shots(self) -> list[tuple[float, Channel | None]]:
+        """Moments (s) of right phase of a channel, or with None of the torquer, within the limits; undisturbed."""
+        shots: list[tuple[float, Channel | None]] = []
         ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
         firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
@@ -274,25 +233,21 @@ class Train:
             if start is None or len(shots) == MOST_PULSES:
                 break
             centre = start + 0.5 * on_time
-            if firsts:
-                moments = [
-                    (first + max(math.ceil((centre - first) / self.turn - 1e-9), 0) * self.turn, number)
-                    for number, (first, _) in enumerate(firsts)
-                ]
-                t, number = min(moments)
-                shot = Shot(t, firsts[number][1])
-            else:
-                shot = Shot(centre, None)
-            if shot.t + 0.5 * on_time > self.windows.horizon:
+            moments: list[tuple[float, Channel | None]] = [
+                (first + max(math.ceil((centre - first) / self.turn - 1e-9), 0) * self.turn, channel)
+                for first, channel in firsts
+            ]
+            t, channel = min(moments, key=lambda moment: moment[0], default=(centre, None))
+            if t + 0.5 * on_time > self.windows.horizon:
                 break
-            free = self.windows.blocked_until(shot.t - 0.5 * on_time, on_time)
+            free = self.windows.blocked_until(t - 0.5 * on_time, on_time)
             if free is not None:
                 ready = max(free, ready + 0.25 * self.turn)
                 continue
-            shots.append(shot)
-            ready = shot.t + 0.5 * on_time + gap
+            shots.append((t, channel))
+            ready = t + 0.5 * on_time + gap
             if not firsts:
-                ready = max(shot.t + self.turn / self.options.per_turn - 0.5 * on_time, shot.t + 0.5 * on_time + gap)
+                ready = max(t + self.turn / self.options.per_turn - 0.5 * on_time, ready)
         return shots
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
@@ -318,7 +273,7 @@ class Train:
         """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
         ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
-        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
+        bend = math.acos(max(share, math.cos(1.3))) if share < 1.0 else 0.0
         aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
         return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
@@ -337,8 +292,19 @@ class Train:
         return None
 
     def _in_phase(self, fewest: int, most: int, left: Vector) -> Infeasible:
-        nutation = float(left[fewest - 1 : most].min()) * self.way / most
-        return Infeasible(sequential.in_phase(self.here, self.options.per_turn, fewest, most, nutation))
+        """Error where trains of ``fewest`` to ``most`` pulses leave nutation."""
+        ratio = self.here.axial / (self.here.inertia.A * self.here.spin * self.options.per_turn)
+        least = math.degrees(float(left[fewest - 1 : most].min()) * self.way / most)
+        if abs(ratio - round(ratio)) * most >= 1.0:
+            return Infeasible(
+                f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
+                f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
+            )
+        return Infeasible(
+            f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
+            f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
+            f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
+        )
 
     def _too_few(self, needed: int, moments: int) -> Infeasible:
         """Message on limits that leave too few times or pulses."""
@@ -408,20 +374,8 @@ def _ratio(whole: float, part: float) -> float:
     return whole / part if whole < 1e9 * part else 1e9
 
 
-MOVED = (6, 12, LAST)
-"""Numbers of last pulses that are moved, one after the other until nothing is left."""
-
-SHORT = 60
-"""Pulses up to which their size is corrected on the flown motion too: a longer train has little to spare."""
-
-EXACT = 1e-10
-"""rad of flown residual that counts as nothing."""
-
-CLEARLY = 0.01
-"""Relative saving that is worth more pulses."""
-
-OTHERS = 4
-"""Other lengths of the pulses that are tried where the one requested does not do."""
+EXACT, CLEARLY = 1e-10, 0.01
+"""rad of flown residual that count as nothing, and relative saving that is worth more pulses."""
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
@@ -430,11 +384,11 @@ def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
     ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
     """
     expect_aim(spacecraft)
-    if options.on_time is None:
-        return _train(spacecraft, options)
     try:
         return _train(spacecraft, options)
     except Infeasible as why:
+        if options.on_time is None:
+            raise
         raise Infeasible(f"{why}; {_another(spacecraft, options)}") from None
 
 
@@ -464,16 +418,15 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
-    for length in lengths[:OTHERS]:
+    for length in lengths[:4]:
         digits = 3 - math.floor(math.log10(length))
         rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
         try:
             train = _train(spacecraft, replace(options, on_time=rounded))
         except Infeasible:
             continue
-        if float(np.linalg.norm(correction.misses(spacecraft, train))) > max(10.0 * EXACT, exact):
-            continue
-        return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
+        if correction.left(spacecraft, train) <= max(10.0 * EXACT, exact):
+            return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
     return "no other length was found that works"
 
 
@@ -485,25 +438,26 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     best: tuple[float, Schedule] | None = None
     before = sum(pulse.magnitude for pulse in builder.pulses)
     for attempt in train.attempts():
-        nothing = max(EXACT, train.rounding(attempt.size))
+        # What the rounding of the start of one pulse to a tick leaves counts as nothing.
+        rounding = train.turns_by(attempt.size) / train.h * abs(train.here.spin) * (train.here.limits.tick or 0.0)
+        nothing = max(EXACT, rounding)
         if best is not None and best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
         schedule, left = _flown(builder.fork(), train, attempt)
-        left = max(left, nothing)
-        if best is None or left < 0.5 * best[0] or (left <= best[0] and _cheaper(schedule, best[1], before)):
+        left, cost = max(left, nothing), schedule.total_impulse - before
+        cheaper = best is not None and cost < (1.0 - CLEARLY) * (best[1].total_impulse - before)
+        if best is None or left < 0.5 * best[0] or (left <= best[0] and cheaper):
             best = left, schedule
         cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
         # Of pulses of a given length the trains come in the order of their cost.
         if work.exhausted() or (left <= nothing and (cheap or train.options.on_time is not None)):
             break
     if best is None or best[0] > tolerable(train.here):
-        raise Infeasible(_reason(train, best))
+        requested = train.options.on_time
+        held = "" if requested is None else f" of {requested:.4g} s"
+        text = f"no train of equal pulses{held} was found that ends on the target within the limits"
+        raise Infeasible(text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°")
     return best[1]
-
-
-def _cheaper(schedule: Schedule, other: Schedule, before: float) -> bool:
-    """True if a train costs clearly less than another, ``before`` N m s of earlier pulses apart."""
-    return schedule.total_impulse - before < (1.0 - CLEARLY) * (other.total_impulse - before)
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
@@ -515,21 +469,18 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
             break
         builder.fire((pulse,))
     fired = min(count, len(builder.pulses))
-    for last in MOVED:
+    for last in (6, 12, LAST):
         before = builder.left
         if before < EXACT or work.exhausted():
             break
-        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
+        # A train of more than 60 pulses has little to spare: its size is not corrected.
+        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= 60 else 0)
         if train.here.limits.tick is not None and builder.left > 0.5 * before:
             break  # what is left is the rounding of starts
-    notes = (_note(builder, train, count),) if builder.pulses else ()
-    return builder.schedule(*notes), builder.left
-
-
-def _note(builder: FlownBuilder, train: Train, count: int) -> Note:
-    """Description of the train."""
+    if not builder.pulses:
+        return builder.schedule(), builder.left
     on_time = builder.pulses[-1].on_time
-    return note(
+    description = note(
         "great-circle-train" if train.sun is None else "rhumb-line-train",
         count=count,
         channels=", ".join(channel.name for channel in train.channels) or "the steerable torquer",
@@ -538,11 +489,4 @@ def _note(builder: FlownBuilder, train: Train, count: int) -> Note:
         efficiency=float(precession.arc_efficiency(train.here.spin, on_time)),
         damping=max(len(builder.pulses) - count, 0),
     )
-
-
-def _reason(train: Train, best: tuple[float, Schedule] | None) -> str:
-    """Reason why the ``best`` train, with its residual (rad), is none."""
-    requested = train.options.on_time
-    held = "" if requested is None else f" of {requested:.4g} s"
-    text = f"no train of equal pulses{held} was found that ends on the target within the limits"
-    return text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°"
+    return builder.schedule(description), builder.left

@@ -18,22 +18,15 @@ from nutdamp.errors import Infeasible, TooShort, listed
 from nutdamp.physics import attitude, energy_sink, response
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
-from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
 
-MISSED = 50
-"""Alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready."""
-
 MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
-
-
-CORRECTED = 1e-4
-"""Share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles only."""
 
 
 class ImpulseBuilder:
@@ -51,8 +44,10 @@ class ImpulseBuilder:
         self.omega = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         self.spin = spacecraft.spin
         self.now = 0.0
-        self.ready = spacecraft.limits.earliest
+        self.ready, most = spacecraft.limits.earliest, spacecraft.limits.max_pulses
+        self.most = MOST_PULSES if most is None else min(most, MOST_PULSES)
         self.pulses: list[Pulse] = []
+        self._even = spacecraft.growth == 0.0 or self.wheel != 0.0
 
     @property
     def left(self) -> float:
@@ -62,24 +57,14 @@ class ImpulseBuilder:
     @property
     def settled(self) -> bool:
         """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
-        corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
+        # `response.width_factor` holds at small angles only.
+        corrected = 0.0 if self.spacecraft.growth == 0.0 else 1e-4 * self.spacecraft.least_impulse
         return self.left <= max(1e-13 * abs(self.C * self.spin + self.wheel), corrected)
-
-    @property
-    def growing(self) -> bool:
-        """True if the nutation grows by itself."""
-        return self.spacecraft.growth > 0.0
 
     @property
     def full(self) -> bool:
         """True if no more pulses are allowed."""
         return len(self.pulses) >= self.most
-
-    @property
-    def most(self) -> int:
-        """Pulses that are allowed."""
-        most = self.spacecraft.limits.max_pulses
-        return MOST_PULSES if most is None else min(most, MOST_PULSES)
 
     def rate(self, spin: float) -> float:
         """Rate ν in rad/s at which ω turns in the body at a ``spin``."""
@@ -95,11 +80,6 @@ class ImpulseBuilder:
         """Nutation period in the body at the present spin, s; infinite for a sphere."""
         rate = abs(self.turning)
         return 2.0 * math.pi / rate if rate > 0.0 else math.inf
-
-    @property
-    def uniform(self) -> bool:
-        """True if ω turns in the body at a constant rate between pulses."""
-        return not self.spacecraft.disturbances and self.spacecraft.growth == 0.0
 
     def _coast(self, time: float) -> tuple[complex, float]:
         """ω and ω3 at ``time`` s if nothing more is fired and no disturbance drives ω."""
@@ -128,31 +108,18 @@ class ImpulseBuilder:
         since = time - self.now
         return since if self._even else energy_sink.course(*self._sink(), since).turned
 
-    def _when(self, turned: float) -> float:
-        """Time at which `_turned` is ``turned`` s."""
-        return self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
-
-    @property
-    def _even(self) -> bool:
-        return self.spacecraft.growth == 0.0 or self.wheel != 0.0
-
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
         free, _ = self._coast(time)
         if not self.spacecraft.disturbances:
             return free
-        since = time - self.now
-        return free + sum(self._driven(disturbance, since) for disturbance in self.spacecraft.disturbances)
-
-    def _driven(self, disturbance: Disturbance, since: float) -> complex:
-        """Contribution of a turning disturbance to ω since the last pulse (`response.rotating_torques` for one)."""
-        if disturbance.transverse == 0.0:
-            return 0.0 + 0.0j
-        torque = disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)
-        driven = response.rotating_torques(
-            np.array([since]), 0.0, self.turning, self.A, np.array([torque]), np.array([disturbance.rate])
-        )
-        return complex(driven[0])
+        since, driven = np.array([time - self.now]), 0.0 + 0.0j
+        for disturbance in self.spacecraft.disturbances:
+            if disturbance.transverse != 0.0:
+                torque = np.array([disturbance.transverse * cmath.exp(1j * disturbance.rate * self.now)])
+                rate = np.array([disturbance.rate])
+                driven += complex(response.rotating_torques(since, 0.0, self.turning, self.A, torque, rate)[0])
+        return free + driven
 
     def acts(self, pulse: Pulse) -> complex:
         """Effective impulse of ``pulse`` on ω, J1 + iJ2 in N m s."""
@@ -206,11 +173,13 @@ class ImpulseBuilder:
             return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
 
         turns = alignment(self.ready)
-        for _ in range(len(self.windows.limits.blackout) + MISSED):
-            centre = self._when(first + turns * self.period)
+        # Rounding to ticks or a disturbance may move 50 in a row to before the actuators are ready.
+        for _ in range(len(self.windows.limits.blackout) + 50):
+            turned = first + turns * self.period
+            centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
             if math.isinf(centre):  # dissipation stops the spin before
                 return None
-            if not self.uniform:
+            if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
                 centre = self._opposed_near(channel, centre, on_time)
             start = centre - 0.5 * on_time
             if self.windows.limits.tick is not None:
@@ -240,21 +209,18 @@ class ImpulseBuilder:
 
     def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
         """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
-        if steerable.torque is None:
-            start = self.windows.earliest_start(0.0, self.ready)
-            if start is None:
+        on_time, given = 0.0, {"impulse": impulse}
+        if steerable.torque is not None:
+            needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
+            if needed is None:
                 return None
-            return steerable_pulse(steerable, start, cmath.phase(-self.omega_at(start)), impulse=impulse)
-        needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
-        if needed is None:
-            return None
-        on_time = self.windows.on_time(needed, 0.0, math.inf)
+            on_time = self.windows.on_time(needed, 0.0, math.inf)
+            given = {"on_time": on_time}
         start = self.windows.earliest_start(on_time, self.ready)
         if start is None:
             return None
         centre = start + 0.5 * on_time
-        angle = cmath.phase(-self.omega_at(centre))
-        return steerable_pulse(steerable, centre, angle, on_time=on_time)
+        return steerable_pulse(steerable, centre, cmath.phase(-self.omega_at(centre)), **given)
 
 
 FADED = 1e-6
@@ -320,15 +286,14 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
-    pulses = [builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period)) for channel in channels]
-    there = [pulse for pulse in pulses if pulse is not None]
+    pulses = [(each, builder.align(each, max(each.min_on_time, 1e-6 * builder.period))) for each in channels]
+    there = [(channel, pulse) for channel, pulse in pulses if pulse is not None]
     if not there:
         flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
-        return Infeasible(f"no channel ever opposes the nutation{flat * builder.growing}")
-    by_name = {channel.name: channel for channel in channels}
-    ends = [_end(builder, by_name[pulse.channel], pulse) for pulse in there if builder.helps(pulse)]
+        return Infeasible(f"no channel ever opposes the nutation{flat * (spacecraft.growth > 0.0)}")
+    ends = [_end(builder, channel, pulse) for channel, pulse in there if builder.helps(pulse)]
     if not ends:
-        best = min(there, key=builder.left_after)
+        best = min((pulse for _, pulse in there), key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
             return Infeasible(
@@ -343,22 +308,6 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
     return TooShort(
         f"no channel opposes the nutation before the horizon of {spacecraft.horizon:.4g} s",
         f"the first pulse that does would end at {min(ends):.6g} s: set limits.horizon beyond that",
-    )
-
-
-def in_phase(spacecraft: Spacecraft, per_turn: int, fewest: int, most: int, left: float) -> str:
-    """Error where trains of ``fewest`` to ``most`` pulses leave nutation: the best of them ``left`` rad."""
-    ratio = spacecraft.axial / (spacecraft.inertia.A * spacecraft.spin * per_turn)
-    off, least = abs(ratio - round(ratio)), math.degrees(left)
-    if off * most >= 1.0:
-        return (
-            f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
-            f"back to nothing: {least:.3g}° would be left; a longer horizon or another --per-turn can help"
-        )
-    return (
-        f"C/(A × pulses per turn) = {ratio:.4g} is so near a whole number that pulse after pulse meets the "
-        f"nutation in nearly the same phase: even the best train, of {fewest} to {most} pulses, "
-        f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
     )
 
 
@@ -395,11 +344,10 @@ class SymmetricModel:
         channels = {channel.name: channel for channel in self.spacecraft.channels}
         windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
         for pulse in schedule:
-            channel = channels.get(pulse.channel)
-            if channel is None:
-                pulses.append(self._steered(pulse, windows, ready))
+            if pulse.channel in channels:
+                pulses.append(channel_pulse(channels[pulse.channel], pulse.t, pulse.on_time))
             else:
-                pulses.append(channel_pulse(channel, pulse.t, pulse.on_time))
+                pulses.append(self._steered(pulse, windows, ready))
             ready = pulses[-1].end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
@@ -434,12 +382,15 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel
     scale = np.array([circle, 1.0 / circle])
     stretch = scale * A / np.array([first, second])  # for torques and impulses
     size = float(np.mean(stretch)) if turning else 1.0
+    torquer = undisturbed.steerable
+    if torquer is not None and torquer.torque is not None:  # the stretch differs by direction: near enough for a plan
+        torquer = replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
     body = replace(
         undisturbed,
         inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
         omega0=np.array([*(scale * undisturbed.omega0[:2] / size), undisturbed.omega0[2]]),
         channels=tuple(_stretched(channel, stretch if not turning else np.ones(2)) for channel in undisturbed.channels),
-        steerable=_stretched_torquer(undisturbed.steerable, stretch),
+        steerable=torquer,
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
     return SymmetricModel(spacecraft, _aimed(body, spacecraft), stretch)
@@ -464,17 +415,9 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
 
 
 def _stretched(channel: Channel, stretch: Vector) -> Channel:
-    def thruster(thruster: Thruster) -> Thruster:
-        return replace(thruster, torque=thruster.torque * np.array([*stretch, 1.0]))
-
-    return replace(channel, thrusters=tuple(thruster(one) for one in channel.thrusters), spends=channel.strength)
-
-
-def _stretched_torquer(torquer: Steerable | None, stretch: Vector) -> Steerable | None:
-    """Torquer under the mean stretch, which differs by direction: near enough for a plan that is corrected."""
-    if torquer is None or torquer.torque is None:
-        return torquer
-    return replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
+    factors = np.array([*stretch, 1.0])
+    thrusters = tuple(replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters)
+    return replace(channel, thrusters=thrusters, spends=channel.strength)
 
 
 def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
@@ -485,16 +428,10 @@ def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
     if not spacecraft.disturbances:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
-    left = tuple(
-        replace(disturbance, transverse=0.0 + 0.0j) if settles(spacecraft, disturbance) else disturbance
-        for disturbance in spacecraft.disturbances
-    )
+    left = [replace(each, transverse=0j) if settles(spacecraft, each) else each for each in spacecraft.disturbances]
+    lasting = tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse)
     omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
-    return replace(
-        spacecraft,
-        omega0=omega0,
-        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
-    )
+    return replace(spacecraft, omega0=omega0, disturbances=lasting)
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
@@ -505,13 +442,10 @@ def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     """Steady-state ω of the settling disturbances at ``time`` s, which needs no damping."""
-    inertia = spacecraft.inertia
-    return sum(
-        (
-            response.steady_response(inertia.A, spacecraft.nutation_rate, disturbance.transverse, disturbance.rate)
-            * complex(math.cos(disturbance.rate * time), math.sin(disturbance.rate * time))
-            for disturbance in spacecraft.disturbances
-            if disturbance.transverse and settles(spacecraft, disturbance)
-        ),
-        0.0 + 0.0j,
-    )
+    A, nutation_rate, steady = spacecraft.inertia.A, spacecraft.nutation_rate, 0.0 + 0.0j
+    for disturbance in spacecraft.disturbances:
+        if disturbance.transverse and settles(spacecraft, disturbance):
+            torque, rate = disturbance.transverse, disturbance.rate
+            turned = complex(math.cos(rate * time), math.sin(rate * time))
+            steady += response.steady_response(A, nutation_rate, torque, rate) * turned
+    return steady

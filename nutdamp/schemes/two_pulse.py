@@ -1,19 +1,17 @@
 """Two pulses half an inertial nutation turn apart, Magnus 1970 (22): no nutation, and H back where it was.
 
-With a target axis the two pulses are those of `pair_search`, of which these are the case that H is to stay.
-
-With a steerable torquer the pulses are exact at any angle. Body-fixed channels are searched: for two channels with
-torque directions d1, d2 the momentum shift closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and
-both pulses together then oppose ω at cost 1/cos(ψ/2), where ψ is the angle by which the second direction misses
-the one that Magnus' scheme needs. The chosen pair is corrected on the real pulse widths.
+With a steerable torquer the pulses are exact at any angle. Of two channels with torque directions d1, d2 the momentum
+shift closes to first order whenever ω3 Δt = π + arg d1 - arg d2 (mod 2π), and both pulses together then oppose ω at a
+cost of 1/cos(ψ/2), where ψ is the angle by which the second direction misses the one that Magnus' scheme needs. With a
+target axis the two pulses are those of `pulse_pairs`, of which these are the case that H is to stay.
 """
 
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,27 +21,15 @@ from nutdamp.physics import body as rigid_body
 from nutdamp.physics import energy_sink, response
 from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import TwoPulseOptions
-from nutdamp.schemes.correction import tolerable
+from nutdamp.schemes.correction import CLOSE_IN_COST, PairCandidate, tolerable
 from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, bounded_by, model_of
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
-DEAREST = 2.0
-"""Pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first."""
-
-CLOSE_IN_COST = 1.02
-"""Among candidates within this factor of the cheapest the one that ends first is preferred."""
-
-CLOSE_IN_SHORT = 1.1
-"""Factor of the miss within which candidates count as equal, with on-times that cannot give the whole impulse."""
-
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
-
-STILL = 0.1
-"""Angle in rad: channels that turn no further within the horizon stand still in space, as those of a despun body."""
 
 SHORTLIST = 6
 """Candidates that are flown and corrected, at most."""
@@ -80,7 +66,7 @@ def _wide(spacecraft: Spacecraft) -> Schedule | None:
         schedule = _damping(spacecraft, TwoPulseOptions())
     except Infeasible:
         return None
-    return schedule if float(np.linalg.norm(correction.misses(spacecraft, schedule))) <= tolerable(spacecraft) else None
+    return schedule if correction.left(spacecraft, schedule) <= tolerable(spacecraft) else None
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
@@ -99,17 +85,25 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
-    inertia, windows = spacecraft.inertia, Windows(spacecraft)
+    inertia, windows, earliest = spacecraft.inertia, Windows(spacecraft), spacecraft.limits.earliest
     form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
     halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
     on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
-    placed = (
-        _pair(spacecraft, torquer, halves, start, wait, on_times)
-        for wait in (number * halves.wait for number in turns)
-        for start in _starts(windows, spacecraft.limits.earliest, on_times, wait)
-    )
-    best = next((pulses for pulses in placed if keeps_limits(spacecraft, pulses)), None)
+
+    def pair(start: float, wait: float) -> tuple[Pulse, ...]:
+        """The two pulses against ω, the first from ``start`` s on."""
+        builder = ImpulseBuilder(spacecraft)
+        for later, on_time, half in zip((0.0, wait), on_times, halves[:2], strict=True):
+            begin = windows.nearest_tick(start + 0.5 * on_times[0] + later - 0.5 * on_time)
+            centre = begin + 0.5 * on_time
+            requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
+            builder.fire(steerable_pulse(torquer, centre, cmath.phase(-builder.omega_at(centre)), **requested))
+        return tuple(builder.pulses)
+
+    waits = [number * halves.wait for number in turns]
+    starts = ((start, wait) for wait in waits for start in _starts(windows, earliest, on_times, wait))
+    best = next((pulses for pulses in itertools.starmap(pair, starts) if keeps_limits(spacecraft, pulses)), None)
     if best is None:
         raise Infeasible(
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
@@ -148,45 +142,7 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
     return [float(start) for start in starts[allowed]]
 
 
-def _pair(
-    spacecraft: Spacecraft,
-    torquer: Steerable,
-    halves: rigid_body.HalfPulses,
-    start: float,
-    wait: float,
-    on_times: tuple[float, ...],
-) -> tuple[Pulse, Pulse]:
-    """The two pulses against ω, the first from ``start`` s on."""
-    builder = ImpulseBuilder(spacecraft)
-    pulses = []
-    for centre, on_time, half in zip(
-        (start + 0.5 * on_times[0], start + 0.5 * on_times[0] + wait), on_times, halves[:2], strict=True
-    ):
-        begin = builder.windows.nearest_tick(centre - 0.5 * on_time)
-        centre = begin + 0.5 * on_time
-        angle = cmath.phase(-builder.omega_at(centre))
-        requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
-        pulses.append(steerable_pulse(torquer, centre, angle, **requested))
-        builder.fire(pulses[-1])
-    return pulses[0], pulses[1]
-
-
 # --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
-class HalfPulseCandidate(NamedTuple):
-    """Two channels and moments that close to first order; ``short`` is the part of the impulse out of reach."""
-
-    short: float
-    cost: float
-    end: float
-    channels: tuple[Channel, Channel]
-    timing: tuple[tuple[float, float], tuple[float, float]]
-    """Centre and on-time of both pulses, s."""
-    miss: float
-    """ψ, rad."""
-    factor: float
-    """Impulse over A|ω0|."""
 
 
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
@@ -215,32 +171,17 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOpt
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
-    """Most promising candidates, corrected, with the flown residual (rad) of each."""
-    candidates = sorted(
-        (candidate for a in channels for b in channels for candidate in _candidates(spacecraft, a, b, options.literal)),
-        key=lambda candidate: (candidate.short, candidate.cost),
-    )
-    if not candidates:
-        return
-    cheapest = candidates[0]
-    short, cost = cheapest.short * CLOSE_IN_SHORT, cheapest.cost * CLOSE_IN_COST
-    near = [candidate for candidate in candidates if candidate.short <= short and candidate.cost <= cost]
-    near.sort(key=lambda candidate: candidate.end)
-    others = [candidate for candidate in candidates if candidate not in near]
-    for candidate in [*near, *others][:SHORTLIST]:
-        yield _corrected(spacecraft, candidate, options.literal)
+    """Most promising candidates, commandable and corrected on the real widths, each with its flown residual (rad)."""
+    pairs = (_candidates(spacecraft, one, two, options.literal) for one in channels for two in channels)
+    for candidate in correction.shortlist(itertools.chain.from_iterable(pairs), SHORTLIST, SHORTLIST):
+        schedule = candidate.fired(spacecraft)
+        if not options.literal:
+            schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+        left = correction.left(spacecraft, schedule)
+        yield Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
 
 
-def _corrected(spacecraft: Spacecraft, candidate: HalfPulseCandidate, literal: bool) -> tuple[Schedule, float]:
-    """The candidate's schedule, corrected on the real widths and made commandable, and its flown residual in rad."""
-    schedule = correction.fired(spacecraft, candidate.channels, candidate.timing)
-    if not literal:
-        schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-    left = float(np.linalg.norm(correction.misses(spacecraft, schedule)))
-    return Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
-
-
-def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Schedule) -> tuple[Note, ...]:
+def _remark(spacecraft: Spacecraft, candidate: PairCandidate, schedule: Schedule) -> tuple[Note, ...]:
     inertia = spacecraft.inertia
     spin = inertia.equivalent(spacecraft.spin)
     halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
@@ -258,7 +199,7 @@ def _remark(spacecraft: Spacecraft, candidate: HalfPulseCandidate, schedule: Sch
     return (apart, *missed)
 
 
-def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[HalfPulseCandidate]:
+def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[PairCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
     inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
     A, C, turning, spin = inertia.A, inertia.C, spacecraft.nutation_rate, inertia.equivalent(spacecraft.spin)
@@ -267,8 +208,9 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
     rate = turning + C / A * spin / math.cos(0.5 * theta)
     to_go = math.pi - turn
-    if abs(rate) * spacecraft.horizon < STILL:  # the channels stand still in space: they close at any time, or never
-        if abs(cmath.phase(cmath.rect(1.0, to_go))) > STILL:
+    still = 0.1  # rad; channels that turn no further stand still in space: they close at any time, or never
+    if abs(rate) * spacecraft.horizon < still:
+        if abs(cmath.phase(cmath.rect(1.0, to_go))) > still:
             return []
         to_go, rate = -turn, turning  # until the second opposes ω as the first does
     if rate == 0.0:
@@ -311,7 +253,7 @@ def _promising(factor: Vector) -> Vector:
     better = np.flatnonzero(factor * CLOSE_IN_COST < before)
     cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
     chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
-    return np.asarray(chosen[factor[chosen] <= DEAREST])
+    return np.asarray(chosen[factor[chosen] <= 2.0])  # beyond, the second pulse would mostly undo the first
 
 
 def _place(
@@ -322,7 +264,7 @@ def _place(
     wait: float,
     miss: float,
     literal: bool,
-) -> HalfPulseCandidate | None:
+) -> PairCandidate | None:
     """First allowed moment at which the pair opposes ω; None where the limits leave none."""
     windows, turning = Windows(spacecraft), spacecraft.nutation_rate
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
@@ -341,9 +283,9 @@ def _place(
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
         return None
-    needed = (grown * halves.first * factor, grown * halves.second * factor)
-    on_times = [_nearest(spacecraft, channel, impulse) for channel, impulse in zip((one, two), needed, strict=True)]
-    short = sum(_missing(spacecraft, *each) for each in zip((one, two), needed, on_times, strict=True)) / factor
+    long, lacks = _nearest(spacecraft, one, grown * halves.first * factor)
+    longer, more = _nearest(spacecraft, two, grown * halves.second * factor)
+    on_times, short = (long, longer), (lacks + more) / factor
     if short >= 1.0:
         return None
     first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
@@ -351,35 +293,29 @@ def _place(
         return None
     while first + wait + 0.5 * on_times[1] <= windows.horizon:
         starts = (first - 0.5 * on_times[0], first + wait - 0.5 * on_times[1])
-        blocked = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
-        delay = max(
-            (free - start for free, start in zip(blocked, starts, strict=True) if free is not None), default=0.0
-        )
+        free = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
+        delay = max((end - start for end, start in zip(free, starts, strict=True) if end is not None), default=0.0)
         if delay == 0.0:
-            pulses = (channel_pulse(one, first, on_times[0]), channel_pulse(two, first + wait, on_times[1]))
-            schedule = Schedule(pulses)
             timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            return HalfPulseCandidate(
-                short if short > 1e-9 else 0.0, schedule.cost, schedule.end, (one, two), timing, miss, factor
-            )
+            schedule = Schedule((channel_pulse(one, *timing[0]), channel_pulse(two, *timing[1])))
+            short = short if short > 1e-9 else 0.0
+            return PairCandidate(schedule.cost, schedule.end, (one, two), timing, short, miss, factor)
         first += delay if turning == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 
 
-def _missing(spacecraft: Spacecraft, channel: Channel, needed: float, on_time: float) -> float:
-    """Deficit of a pulse of ``on_time`` s against the impulse ``needed`` N m s, over that for all nutation."""
-    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
-    width = response.width_factor(spacecraft.nutation_rate, slope, on_time)
-    return abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
+def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> tuple[float, float]:
+    """On-time in s with which a channel comes nearest to the effective impulse ``needed`` N m s, and what is missing.
 
-
-def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> float:
-    """On-time in s with which a channel gives the effective impulse ``needed`` N m s, or comes nearest to it."""
+    The latter over the impulse for all nutation.
+    """
     slope, longest = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C, channel.max_on_time
     on_time = response.on_time_for(needed, abs(channel.transverse), spacecraft.nutation_rate, slope, longest)
     if on_time is None:
         on_time = longest_useful(longest, spacecraft.body_period)
-    return max(on_time, channel.min_on_time)
+    on_time = max(on_time, channel.min_on_time)
+    width = response.width_factor(spacecraft.nutation_rate, slope, on_time)
+    return on_time, abs(needed - abs(channel.transverse) * on_time * abs(width)) / spacecraft.least_impulse
 
 
 def _grown(spacecraft: Spacecraft, time: float) -> float:

@@ -33,18 +33,6 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
 """Addition to the reasons of schemes, which know nothing of valves."""
 
-ROUNDING = 1e-12
-"""Share by which an on-time may pass its bounds."""
-
-ROOM = 0.02
-"""Share of the longest pulse that the next plan leaves at either end of all, where there was too little room."""
-
-NEARLY, EXACT = 1.1, 1e-10
-"""Times what the plan leaves on the plain body, and rad, that commands may leave without another plan."""
-
-PLANS = 6
-"""Plans, at most, each with on-times that leave room for the weakest pulse of the one before."""
-
 
 def plain(
     spacecraft: Spacecraft, weakest: float = 1.0, strongest: float = 1.0, room: float = 0.0, used: float = 0.0
@@ -54,11 +42,18 @@ def plain(
     Their pulses may be as weak and as strong as ``weakest`` and ``strongest`` times the thrust of the file, and
     ``room`` s longer at either end. Its moments are those with so many kg ``used``.
     """
-    lead, lag = (reach + room for reach in _reaches(spacecraft))
-    limits = spacecraft.limits
+    limits, channels, leads, lags = spacecraft.limits, list[Channel](), list[float](), list[float]()
+    for channel in spacecraft.channels:
+        shortest, longest = effective_on_times(channel)
+        if channel.valve is not None:
+            lead, lag = channel.valve.reaches(shortest, longest)
+            leads, lags = [*leads, lead], [*lags, lag]
+        least = effective_on_time(channel, shortest_on_time(spacecraft, channel)) * max(strongest, 1.0)
+        channels.append(channel.of(valve=None, min_on_time=least, max_on_time=longest * min(weakest, 1.0)))
+    lead, lag = max(leads, default=0.0) + room, max(lags, default=0.0) + room
     return replace(
         spacecraft,
-        channels=tuple(_plain(spacecraft, channel, weakest, strongest) for channel in spacecraft.channels),
+        channels=tuple(channels),
         cold=None,
         tank=None,
         center_of_mass_per_kg=None,
@@ -71,22 +66,6 @@ def plain(
             blackout=tuple((max(begins - lag, 0.0), ends + lead) for begins, ends in limits.blackout),
         ),
     )
-
-
-def _reaches(spacecraft: Spacecraft) -> tuple[float, float]:
-    """Longest extension of a command and its thrust before and after the rectangle, s, over all channels."""
-    reaches = [
-        channel.valve.reaches(*effective_on_times(channel))
-        for channel in spacecraft.channels
-        if channel.valve is not None
-    ]
-    return max((lead for lead, _ in reaches), default=0.0), max((lag for _, lag in reaches), default=0.0)
-
-
-def _plain(spacecraft: Spacecraft, channel: Channel, weakest: float, strongest: float) -> Channel:
-    least = effective_on_time(channel, shortest_on_time(spacecraft, channel))
-    most = effective_on_times(channel)[1]
-    return channel.of(valve=None, min_on_time=least * max(strongest, 1.0), max_on_time=most * min(weakest, 1.0))
 
 
 def options(spacecraft: Spacecraft, chosen: SchemeOptions) -> SchemeOptions:
@@ -114,7 +93,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
-    for _ in range(PLANS):
+    for _ in range(6):
         body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             schedule = plan(body)
@@ -144,16 +123,14 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         rounded = spacecraft.limits.tick is not None
         if work.exhausted() or not schedule.pulses:
             break
-        if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
+        if kept and (rounded or left <= 1.1 * _left(body, schedule, correct) + 1e-10):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
-        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
+        room = max(2.0 * room, longer, 0.02 * max(pulse.on_time for pulse in schedule))
     assert schedule is not None
-    return (
-        min(tried, key=lambda trial: trial[:2])[2]
-        if tried
-        else as_commands(spacecraft, schedule, correct, body.inertia)
-    )
+    if not tried:
+        return as_commands(spacecraft, schedule, correct, body.inertia)
+    return min(tried, key=lambda trial: trial[:2])[2]
 
 
 def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
@@ -184,7 +161,8 @@ def as_commands(
                 supply.take(channels[pulse.channel], pulse.on_time)
             else:
                 supply.count((pulse,))
-        supply.expect_to_last()
+        if supply.shortage is not None:
+            raise Infeasible(supply.shortage)
     fired = [pulse for pulse, command in zip(schedule, commands, strict=True) if command.magnitude > 0.0]
     notes = _weakened(spacecraft, list(zip(fired, corrected, strict=True)), firing, correct)
     return replace(firing, notes=(*firing.notes, *notes))
@@ -194,22 +172,17 @@ def _weakened(
     spacecraft: Spacecraft, pairs: list[tuple[Pulse, Pulse]], firing: Schedule, correct: Correction
 ) -> Iterator[Note]:
     """Note on weakening by falling pressure and cold nozzles; ``pairs`` of pulses and their commands."""
-    if correct.equal and pairs:
-        yield from _unequal(pairs)
+    if correct.options.equal and pairs:
+        last = pairs[-1][0].on_time
+        alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
+        shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
+        if f"{shortest:.4g}" != f"{longest:.4g}":
+            yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
     tank = spacecraft.tank
     if tank is not None and firing.pulses:
         full, left = 1e-5 * tank.pressure, 1e-5 * tank.pressure_after(firing.propellant or 0.0)
         if f"{full:.4g}" != f"{left:.4g}":
             yield note("pressure-falls", full_bar=full, left_bar=left)
-
-
-def _unequal(pairs: list[tuple[Pulse, Pulse]]) -> Iterator[Note]:
-    """Note on the last equal pulses of a plan whose commands differ."""
-    last = pairs[-1][0].on_time
-    alike = [command.loaded[1] for pulse, command in pairs if pulse.on_time == last and command.magnitude > 0.0]
-    shortest, longest = min(alike, default=0.0), max(alike, default=0.0)
-    if f"{shortest:.4g}" != f"{longest:.4g}":
-        yield note("unequal-commands", shortest_s=shortest, longest_s=longest)
 
 
 def _firing(schedule: Schedule) -> Schedule:
@@ -272,9 +245,9 @@ def _outside(
         level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
         if shed(spacecraft) is not None:
             level = planned_.on_time / pulse.on_time
-        if pulse.on_time > most * (1.0 + ROUNDING):
+        if pulse.on_time > most * (1.0 + 1e-12):
             weak.append(level)
-        if pulse.on_time < least * (1.0 - ROUNDING):
+        if pulse.on_time < least * (1.0 - 1e-12):
             strong.append(level)
     return weak, strong, longer
 

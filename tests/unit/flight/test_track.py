@@ -193,9 +193,9 @@ def test_even_times_are_those_of_linspace(samples: int, first: float, second: fl
     start, end = min(first, second), max(first, second)
     even = np.linspace(0.0, until, samples)
     parts = list(propagation.even_times(samples, until, start, end))
-    assert np.concatenate([part.times for part in parts]).tolist() == even[(even > start) & (even < end)].tolist()
-    assert [part.first for part in parts] == [True] + [False] * (len(parts) - 1)
-    assert [part.last for part in parts] == [False] * (len(parts) - 1) + [True]
+    assert np.concatenate([times for times, _, _ in parts]).tolist() == even[(even > start) & (even < end)].tolist()
+    assert [begins for _, begins, _ in parts] == [True] + [False] * (len(parts) - 1)
+    assert [ends for _, _, ends in parts] == [False] * (len(parts) - 1) + [True]
 
 
 @pytest.mark.parametrize("samples", [1, 2, 50, 333])

@@ -15,9 +15,9 @@ from support.spinners import flown_by_reference, some_body
 
 from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
-from nutdamp.schemes.block_legs import LEGS
 from nutdamp.schemes.block_search import BLOCKS
 from nutdamp.schemes.catalogue import Options
+from nutdamp.schemes.command_block import LEGS
 from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import SPIN_TOLERANCE
 

@@ -353,11 +353,3 @@ def test_what_was_fired_before_counts_in_the_search_and_in_the_flight() -> None:
     form, flown = turns(worn, block)
     assert form == pytest.approx(flown, abs=2e-3 * FED.to_turn)
     assert abs(turns(FED, block)[0] - flown) > 0.02 * FED.to_turn
-
-
-@pytest.mark.parametrize("feed", [{}, {"tank": None}, {"cold": None}], ids=["both", "cold", "tank"])
-def test_the_number_of_weak_pulses_worth_so_many_full_ones_is_found(feed: dict[str, Any]) -> None:
-    model, jet, widths, counts = BlockModel(replace(FED, **feed)), FED.channels[0], np.array([0.3]), np.arange(1, 60)
-    full, _ = model.full_pulses(model.start, jet, widths, counts)
-    assert float(counts[-1] - full[-1]) > 1.0
-    assert np.rint(model.pulses(model.start, jet, widths, full, 100)).astype(int).tolist() == counts.tolist()

@@ -26,9 +26,8 @@ from nutdamp.physics import attitude
 from nutdamp.planning import decision
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import usual
-from nutdamp.schemes.block_legs import FLOWN, BlockFlights, BlockSequence, FlownSequence
 from nutdamp.schemes.block_model import BlockModel, Trial, fired
-from nutdamp.schemes.block_search import BlockSearch
+from nutdamp.schemes.block_search import FLOWN, BlockFlights, BlockSearch, BlockSequence, FlownSequence
 from nutdamp.schemes.catalogue import Options
 from nutdamp.schemes.command_block import scope_note
 from nutdamp.spacecraft import requirements
