@@ -30,7 +30,7 @@ from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
-from nutdamp.views.tolerances import correlation_json, in_words, size_text
+from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
@@ -219,10 +219,8 @@ def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
     clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
     if clock is not None and clock.refusal:
         yield clock.refusal
-    alike: dict[str, list[str]] = {}
-    for name, reason in () if dispersions is None else reachable(spacecraft)[1]:
-        alike.setdefault(reason, []).append(in_words(name))
-    yield from (f"dispersions without effect: {', '.join(names)}: {reason}" for reason, names in alike.items())
+    for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):
+        yield f"dispersions without effect: {names}: {reason}"
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
         yield f"never fired for damping, more axial than transverse: {', '.join(idle)}"

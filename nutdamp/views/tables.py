@@ -247,13 +247,16 @@ class DataTable:
         style = "" if met is None else "green" if met else "bold red"
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
-    def transposed(self, place: str, corner: str = "") -> FittedColumns:
-        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading."""
+    def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
+        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading.
+
+        ``names``: style of the names of the quantities.
+        """
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
             cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))
-            table.add_row(Text(column.headed(", "), style="dim"), *cells)
+            table.add_row(Text(column.headed(", "), style=names), *cells)
         return table
 
     def array(self, place: str = "csv") -> NDArray[np.void]:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
@@ -200,12 +199,18 @@ def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
     return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
 
 
-def unused_table(unused: Iterable[Unused]) -> Table:
-    """Inputs without effect; names that share a reason are listed together."""
+def unused_table(unused: Iterable[Unused]) -> list[RenderableType]:
+    """Inputs without effect under their heading; nothing where there are none."""
+    rows = list(without_effect(unused))
+    return [Text(), Text("Unused dispersions", style="bold"), facts(rows)] if rows else []
+
+
+def without_effect(unused: Iterable[Unused]) -> Iterator[tuple[str, str]]:
+    """Inputs without effect and the reasons; names that share a reason are listed together."""
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
         reasons.setdefault(reason, []).append(in_words(name))
-    return facts((", ".join(names), reason) for reason, names in reasons.items())
+    return ((", ".join(names), reason) for reason, names in reasons.items())
 
 
 def in_words(name: str) -> str:
