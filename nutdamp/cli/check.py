@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 @set_option
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @screen_options
-@quiet_option
 def check_command(
     files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
 ) -> None:
@@ -82,7 +81,6 @@ def check_command(
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
 @screen_options
-@quiet_option
 def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 

@@ -242,31 +242,16 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
     ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
     """
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
-    sun = option(
-        "--sun",
-        type=Direction(),
-        metavar="ANGLE,ANGLE",
-        help="The Sun, as --target; rhumb-line keeps its phase.",
-    )
-    for add in (
-        *((debug_option,) if several else ()),
-        option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
-        *((sun,) if several else ()),
-        option(
-            "--spin",
-            type=UnitType("rate", keep="keep"),
-            metavar="RATE|keep",
-            help="Final spin rate, such as 30rpm; optimal can set it.",
-        ),
-        option(
-            "--target",
-            type=Direction(),
-            metavar="ANGLE,ANGLE",
-            help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
-        ),
-    ):
-        command = add(command)
-    return command
+    angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
+    command = debug_option(command) if several else command
+    disturbed = "Plan on the motion with the disturbances of the file."
+    command = option("--with-disturbances", is_flag=True, help=disturbed)(command)
+    if several:
+        command = angles("--sun", help="The Sun, as --target; rhumb-line keeps its phase.")(command)
+    rate, spin = UnitType("rate", keep="keep"), "Final spin rate, such as 30rpm; optimal can set it."
+    command = option("--spin", type=rate, metavar="RATE|keep", help=spin)(command)
+    end = "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg."
+    return angles("--target", help=end)(command)
 
 
 def scheme_options(command: Command) -> Command:
