@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -161,47 +161,36 @@ def _at_end(decision: Decision) -> str:
     return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
-class MarginRow(NamedTuple):
-    """A requirement, its limit, values with nominal values and in cases, margin, and whether it is ``met``, as text."""
-
-    name: str
-    limit: str
-    nominal: str
-    dispersed: str
-    margin: str
-    verdict: str
-    met: bool | None
-
-
 def decision_table(decision: Decision, values: str = Shared.NOMINAL) -> DataTable:
     """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads the residuals."""
     cases = decision.cases
     level = "" if cases is None else f"({exact_percent(cases.probability)})"
     columns = (
-        Column("", "requirement", "", attrgetter("name"), where="screen", kind=TEXT),
-        Column("", "limit", "", attrgetter("limit"), where="screen"),
-        Column("", values, "", attrgetter("nominal"), where="screen"),
-        Column("", "dispersed", level, attrgetter("dispersed"), where="screen" * bool(level)),
-        Column("", "margin", "", attrgetter("margin"), where="screen"),
-        Column("", Shared.VERDICT, "", attrgetter("verdict"), where="screen", kind=TEXT, met=attrgetter("met")),
+        Column("", "requirement", "", itemgetter(0), where="screen", kind=TEXT),
+        Column("", "limit", "", itemgetter(1), where="screen"),
+        Column("", values, "", itemgetter(2), where="screen"),
+        Column("", "dispersed", level, itemgetter(3), where="screen" * bool(level)),
+        Column("", "margin", "", itemgetter(4), where="screen"),
+        Column("", Shared.VERDICT, "", itemgetter(5), where="screen", kind=TEXT, met=itemgetter(6)),
     )
     return DataTable("Requirement", columns, list(_margins(decision)))
 
 
-def _margins(decision: Decision) -> Iterator[MarginRow]:
+def _margins(decision: Decision) -> Iterator[tuple[str, str, str, str, str, str, bool | None]]:
+    """Requirement, limit, value with nominal values and in cases, margin and verdict as text; whether it is met."""
     cases = decision.cases
     for line in decision.lines:
         nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
-        yield MarginRow(line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met)
+        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met
     for aspect in decision.aspects:
         for bound, angle, left in cone_margins(aspect):
             words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
             name = f"axis from {aspect.keep.name}"
-            yield MarginRow(name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK)
+            yield name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK
     if cases is not None and cases.complying is not None:
         least, share = exact_percent(cases.probability), percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        yield MarginRow(COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met)
+        yield COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met
 
 
 def coloured(text: str, met: bool | None) -> Text:
@@ -252,12 +241,6 @@ def decision_screen(compared: Comparison, decision: Decision) -> list[Renderable
         *map(screen_line, ordered([*warnings, *decision_notes(decision), *alternatives(compared)])),
         *figures(decision),
     ]
-
-
-def requirement(decision: Decision) -> Iterator[Text]:
-    """The verdict as a line of a screen, and its notes."""
-    yield statement(decision)
-    yield from map(screen_line, ordered(decision_notes(decision)))
 
 
 def figures(decision: Decision) -> list[RenderableType]:

@@ -19,21 +19,7 @@ from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
 from nutdamp.views import guide
-from nutdamp.views.guide import (
-    FILE,
-    MOTION,
-    PAGES,
-    SCHEMES,
-    SOURCES,
-    Block,
-    CommandHelp,
-    Formula,
-    Topic,
-    TopicPart,
-    TopicRows,
-    meant,
-    page,
-)
+from nutdamp.views.guide import Block, CommandHelp, Formula, Topic, TopicPart, TopicRows
 
 
 def _notes() -> Iterator[tuple[str, str]]:
@@ -44,10 +30,10 @@ def _notes() -> Iterator[tuple[str, str]]:
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
-    ("glossary", lambda: page("glossary").rows),
-    ("column of CSV", lambda: page("csv").rows),
-    ("name in JSON", lambda: page("json").rows),
-    ("symbol", lambda: page("symbols").rows),
+    ("glossary", lambda: guide.page("glossary").rows),
+    ("column of CSV", lambda: guide.page("csv").rows),
+    ("name in JSON", lambda: guide.page("json").rows),
+    ("symbol", lambda: guide.page("symbols").rows),
     ("note", _notes),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
@@ -67,7 +53,7 @@ def explained(requested: str) -> Topic:
     Raises BadRequest, which names a near one, where there is nothing.
     """
     name, _, below = requested.partition(".")
-    if name.casefold() == FILE:
+    if name.casefold() == guide.FILE:
         return file_topic(below)
     texts, topic, keys = list(_texts(requested)), _known(requested), _keys(requested)
     if topic is None and not texts:
@@ -83,7 +69,7 @@ def explained(requested: str) -> Topic:
     parts = [TopicPart("", (TopicRows(tuple(texts)),))] if texts else []
     parts += [] if topic is None else topic.parts
     if keys:
-        rows = tuple((f"{FILE}.{key.path}", key.field.description) for key in keys)
+        rows = tuple((f"{guide.FILE}.{key.path}", key.field.description) for key in keys)
         parts.append(TopicPart("In the spacecraft file", (TopicRows(rows),)))
     return Topic(requested if topic is None else topic.name, summary, tuple(parts))
 
@@ -157,7 +143,7 @@ def _sections(requested: str) -> Iterator[Topic]:
     wanted = _folded(requested)
     for begins in (False, True):
         for name in guide.NAMES:
-            for part in guide.found(name).parts if name not in (FILE, guide.OVERVIEW) else ():
+            for part in guide.found(name).parts if name not in (guide.FILE, guide.OVERVIEW) else ():
                 title = _folded(part.title)
                 if title == wanted or (begins and len(wanted) > 3 and title.startswith(wanted)):
                     yield Topic(part.title, f"in explain {name}", (TopicPart("", part.blocks),))
@@ -233,12 +219,12 @@ def file_topic(below: str = "") -> Topic:
         parts = [TopicPart("", (INTRODUCTION, TopicRows(tuple(key.row for key in roots))))]
         for key in roots:
             parts += _key_sections(key, every)
-        return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
+        return Topic(guide.FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
     requested = next((key for key in every if key.path == below), None)
     if requested is None:
         raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below)}")
     return Topic(
-        f"{FILE}.{below}",
+        f"{guide.FILE}.{below}",
         "a key of the spacecraft file",
         (TopicPart("", (TopicRows((requested.row,)),)), *_key_sections(requested, every), _SEE),
     )
@@ -272,9 +258,9 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
 
 def _near(below: str) -> str:
     """A key of the same name elsewhere, or one that is spelt alike."""
-    paths = tuple(f"{FILE}.{key.path}" for key in _plain_keys())
+    paths = tuple(f"{guide.FILE}.{key.path}" for key in _plain_keys())
     same = (path for path in paths if path.rpartition(".")[2] == below.rpartition(".")[2])
-    return meant(next(same, f"{FILE}.{below}"), paths, "nutdamp explain file")
+    return guide.meant(next(same, f"{guide.FILE}.{below}"), paths, "nutdamp explain file")
 
 
 def _what(field: fields.Key) -> str:
@@ -322,12 +308,12 @@ NARROW = 60
 def topics_screen() -> RenderableType:
     """All pages with a line about each, and what else can be asked for."""
     parts: list[RenderableType] = [Text("The guide: nutdamp explain TOPIC")]
-    for group, names in PAGES:
-        rows = tuple((name, page(name).summary) for name in names)
+    for group, names in guide.PAGES:
+        rows = tuple((name, guide.page(name).summary) for name in names)
         parts += [Text(group, style="bold"), Padding(_Pairs(rows), (0, 0, 0, 2))]
     others = (
-        ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
-        ("Motion", ", ".join(topic.name for topic in MOTION)),
+        ("Schemes", ", ".join(topic.name for topic in guide.SCHEMES)),
+        ("Motion", ", ".join(topic.name for topic in guide.MOTION)),
         ("Equations", "17, K7, 24.4"),
         ("Words", "any heading, column, name in JSON, symbol or key: explain tilt"),
     )
@@ -356,7 +342,7 @@ def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
     rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in guide.EQUATIONS]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
-    return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
+    return Constrain(Group(*(Text(source) for source in guide.SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 
 
 def _block(block: Block) -> RenderableType:
