@@ -245,7 +245,7 @@ class Job:
         picture cannot be made.
         """
         self.silent = expect_outputs(self.given.read, *self.read, **self.written, schedules=[*folder])
-        if plot := self.written.get("plot"):
+        if (plot := self.written.get("plot")) is not None:
             from nutdamp.figures import image
 
             image.ending(plot)
@@ -356,10 +356,10 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
     """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
-    from nutdamp.views.decisions import infeasible_json
+    from nutdamp.views.decisions import heading
 
     path, spacecraft = context.meta[UNDER_WAY]
-    deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
+    deliver([(path, lambda: {**heading(spacecraft), "feasible": False, "why": str(reason)})])
 
 
 def deliver(

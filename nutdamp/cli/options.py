@@ -336,16 +336,14 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     from nutdamp.physics.attitude import on_sphere
 
     if spacecraft.attitude is not None:
-        if abs(angles.second) > 0.5 * math.pi:
-            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
-        return on_sphere(angles.first, angles.second)
-    if not 0.0 <= angles.first < math.pi:
-        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
-    return spacecraft.direction_in_n(angles.first, angles.second)
-
-
-def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
-    return click.BadParameter("; ".join((f"expected {expected}", *angles.readings)), param_hint=option)
+        problem = "expected a declination of -90 deg to 90 deg"
+        if abs(angles.second) <= 0.5 * math.pi:
+            return on_sphere(angles.first, angles.second)
+    else:
+        problem = "expected a tilt of at least 0 and below 180 deg"
+        if 0.0 <= angles.first < math.pi:
+            return spacecraft.direction_in_n(angles.first, angles.second)
+    raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
 
 
 def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:

@@ -15,7 +15,7 @@ from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldN
 from nutdamp.views.decisions import VERDICT, heading
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.summary import opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, lasting, most, quantity
 
 SLOW = 0.1
@@ -32,35 +32,31 @@ def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float |
     return value
 
 
-def _digits(count: int) -> Callable[[float], str]:
-    return lambda value: f"{value:.{count}g}"
-
-
 FILES, EVERYWHERE = "csv json", "screen csv json"
 
 
 HELD = (
-    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), _digits(4), EVERYWHERE),
-    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), _digits(4), EVERYWHERE),
+    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
+    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
     Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
-    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), _digits(4), f"{EVERYWHERE} other"),
+    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
     Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
     Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
-    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle("propellant", YEAR), _digits(4),
+    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle("propellant", YEAR), to_figures(4),
            f"{EVERYWHERE} other"),
     Column("sigma", "", "", _of_cycle("doubt"), where=FILES),
     Column("", "cycle", "", _of_cycle("cycles"),
            lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause", "screen"),
     Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
-    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), _digits(3), EVERYWHERE),
-    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), _digits(3), EVERYWHERE),
-    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), _digits(3), EVERYWHERE),
+    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE),
+    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), to_figures(3), EVERYWHERE),
+    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
     Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
-           _digits(2), "screen"),
+           to_figures(2), "screen"),
     Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
     Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
-           _digits(4), "screen", lambda budget: budget.spacecraft.tank is not None),
+           to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
     Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", kind=TEXT,
            when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -18,7 +18,7 @@ from nutdamp.control_loop.stability import margins
 from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
 from nutdamp.files.reader import Source
 from nutdamp.flight.end_state import at_start
-from nutdamp.montecarlo.inputs import DispersedInput, reachable
+from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, Consequence
@@ -27,15 +27,11 @@ from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_jso
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
 EVERYWHERE = "screen json"
-
-
-def _four(value: float) -> str:
-    return f"{value:.4g}"
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
@@ -65,7 +61,7 @@ VALVES = (
            kind=TEXT),
     Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, EVERYWHERE),
     Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda alike: alike[0].effective, duration, EVERYWHERE),
-    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, _four, EVERYWHERE),
+    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), EVERYWHERE),
     Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, EVERYWHERE),
 )  # fmt: skip
 """Columns of pulses of valves that are alike."""
@@ -95,12 +91,12 @@ def turn_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TANK = (
-    Column("used_kg", "used", "kg", lambda row: row[1], _four, EVERYWHERE),
+    Column("used_kg", "used", "kg", lambda row: row[1], to_figures(4), EVERYWHERE),
     Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]),
            lambda pressure: quantity(1e-5 * pressure, "bar"), EVERYWHERE),
     Column("thrust_factor", "thrust", "%", lambda row: row[0].thrust_factor(row[1]),
-           lambda factor: _four(100.0 * factor), EVERYWHERE),
-    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), _four, EVERYWHERE),
+           to_figures(4, 100.0), EVERYWHERE),
+    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), to_figures(4), EVERYWHERE),
 )  # fmt: skip
 
 
@@ -143,32 +139,25 @@ def _effects(row: Consequence) -> Iterator[str]:
         yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
 
 
-class ToleranceRow(NamedTuple):
-    """Inputs of one tolerance of one size, and the thrusters that it is given for."""
-
-    entry: DispersedInput
-    thrusters: tuple[str, ...]
-
-
 TOLERANCES = (
-    Column("", "dispersion", "", lambda row: in_words(row.entry.tolerance), where="screen", kind=TEXT),
-    Column("", "distribution", "", lambda row: row.entry.kind, where="screen", kind=TEXT),
-    Column("", "one sigma or bias", "", lambda row: size_text(row.entry), where="screen"),
-    Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row.thrusters), where="screen", kind=TEXT),
+    Column("", "dispersion", "", lambda row: in_words(row[0][0]), where="screen", kind=TEXT),
+    Column("", "distribution", "", lambda row: row[0][1], where="screen", kind=TEXT),
+    Column("", "one sigma or bias", "", lambda row: row[0][2], where="screen"),
+    Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row[1]), where="screen", kind=TEXT),
 )
+"""Columns of tolerances by their name, distribution and size, and the thrusters that they are given for."""
 
 
 def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     """Differences allowed between true values and the file's; those of one size share a row."""
-    alike: dict[tuple[str, str, str], ToleranceRow] = {}
+    alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
-        key, given = (entry.tolerance, entry.kind, size_text(entry)), getattr(spacecraft.dispersions, entry.tolerance)
-        row = alike.setdefault(key, ToleranceRow(entry, ()))
+        thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
+        given = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
         names = given if isinstance(given, Mapping) else ()
-        more = tuple(name for name in names if name in (rest, rest[:-2]) and name not in row.thrusters)
-        alike[key] = row._replace(thrusters=row.thrusters + more)
-    return DataTable("Dispersions", TOLERANCES, list(alike.values()))
+        thrusters += [name for name in names if name in (rest, rest[:-2]) and name not in thrusters]
+    return DataTable("Dispersions", TOLERANCES, list(alike.items()))
 
 
 def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableType:

@@ -39,9 +39,7 @@ from nutdamp.views.text import (
     moment,
     most,
     note_json,
-    ordered,
     quantity,
-    screen_line,
 )
 
 if TYPE_CHECKING:
@@ -232,17 +230,6 @@ def end_facts(decision: Decision) -> Table:
     return facts([*end_rows(decision.flight, decision.aspects), *cost(decision)])
 
 
-def decision_screen(compared: Comparison, decision: Decision) -> list[RenderableType]:
-    """The decision as the top of a screen: plan and reason, verdict, margins, and final motion."""
-    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
-    return [
-        Text.assemble("Recommended: ", (decision.plan.scheme, "bold"), f" – {why}."),
-        statement(decision),
-        *map(screen_line, ordered([*warnings, *decision_notes(decision), *alternatives(compared)])),
-        *figures(decision),
-    ]
-
-
 def figures(decision: Decision) -> list[RenderableType]:
     """The numbers of a decision on a screen: margins, then the final motion."""
     return [Text(), decision_table(decision).screen("screen"), Text(), end_facts(decision)]
@@ -290,11 +277,6 @@ RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
     """Head of the JSON of every command: the version, and the spacecraft."""
     return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
-
-
-def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
-    """The JSON of any command where nothing requested is feasible."""
-    return {**heading(spacecraft), "feasible": False, "why": why}
 
 
 def comparison_json(compared: Comparison) -> dict[str, Any]:

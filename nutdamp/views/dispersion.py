@@ -25,7 +25,7 @@ from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
 from nutdamp.views.spacecraft import bounds_text, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures
 from nutdamp.views.text import degrees, digits
 
 if TYPE_CHECKING:
@@ -348,11 +348,11 @@ def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[C
     for output in FLOWN_OUTPUTS:
         yield case_column(output, partial(_known, output.key), rows)
         if output.unit == "deg":
-            yield Column("", output.heading, "deg", itemgetter(output.key), _four, "full")
+            yield Column("", output.heading, "deg", itemgetter(output.key), to_figures(4), "full")
     for at, cone in enumerate(study.model.spacecraft.keep):
         for which in ("least", "largest"):
             where = "full case" if which in bounded(cone) else "case"
-            yield Column("", f"{which} from {cone.name}", "deg", partial(_angle, at, which), _four, where)
+            yield Column("", f"{which} from {cone.name}", "deg", partial(_angle, at, which), to_figures(4), where)
     contributors = partial(_contributors, study)
     yield Column("", "largest contributors, in sigmas", "", contributors, where="full", kind=TEXT)
 
@@ -374,10 +374,6 @@ def _known(key: str, row: Mapping[str, Any]) -> float | None:
 
 def _angle(cone: int, which: str, row: Mapping[str, Any]) -> float:
     return float(row["aspects"][cone][f"{which}_deg"])
-
-
-def _four(value: float) -> str:
-    return f"{value:.4g}"
 
 
 def _contributors(study: Study, row: Mapping[str, Any]) -> str:

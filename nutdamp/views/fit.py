@@ -17,7 +17,7 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
 from nutdamp.views.summary import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 
 BOTH = "screen json"
@@ -79,7 +79,7 @@ ESTIMATES = (
     Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
     Column("value", "", "", lambda row: row.value * row.factor, where="json"),
     Column("", "value", "", _value, where="screen"),
-    Column("", "sigma", "", lambda row: _scaled("sigma", row), lambda sigma: f"{sigma:.2g}", "screen"),
+    Column("", "sigma", "", lambda row: _scaled("sigma", row), to_figures(2), "screen"),
     Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
     Column("file", "", "", lambda row: _scaled("file", row), where="json"),
@@ -137,15 +137,15 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
         Column("", "probe pulse", "", probe, where="screen"),
         Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
-        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, lambda ratio: f"{ratio:.2g}", BOTH),
+        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), BOTH),
         Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
         Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
-               lambda thrust: f"{thrust:.2g}", "screen"),
+               to_figures(2), "screen"),
         Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
-               lambda angle: f"{angle:.3g}", BOTH),
-        Column("met_fraction", "comply", "%", lambda row: row.met, lambda share: f"{100.0 * share:.4g}", BOTH),
-        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, lambda kg: f"{1e3 * kg:.3g}", BOTH),
-        Column("gain_deg_kg", "gain", "deg/g", gain, lambda rate: f"{1e-3 * rate:.2g}", BOTH),
+               to_figures(3), BOTH),
+        Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), BOTH),
+        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), BOTH),
+        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), BOTH),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 

@@ -27,7 +27,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
-from nutdamp.views.decisions import COUNT, coloured, decision_screen, lasting, limit, size, verdict
+from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, derived_table, title, turn_floor, turning
 from nutdamp.views.summary import blocks_screen
@@ -42,6 +42,7 @@ from nutdamp.views.tables import (
     angle_of,
     facts,
     lines_of,
+    to_figures,
 )
 from nutdamp.views.text import (
     RPM,
@@ -80,15 +81,13 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     """
     rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
-    title = f"Cost and residuals of each scheme with nominal values, by {flown_by(compared)}"
+    how, ideal = (
+        model_name(plan.pulses for plan in compared.plans),
+        [plan.scheme for plan in compared.plans if plan.pulses.idealised],
+    )
+    alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
+    title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
     return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
-
-
-def flown_by(compared: Comparison) -> str:
-    """Model by which schemes are flown beside each other, with those that alone fire ideal impulses."""
-    how = model_name(plan.pulses for plan in compared.plans)
-    ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
-    return how if how != REAL_WIDTHS or not ideal else f"{how} (ideal impulses: {listed(ideal)})"
 
 
 def limits(body: Spacecraft) -> tuple[float, float]:
@@ -142,7 +141,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
     end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
-    yield Column("", "end", "s", end, lambda value: f"{value:.4g}", "screen")
+    yield Column("", "end", "s", end, to_figures(4), "screen")
     yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
     where = "full page csv" + " screen" * (not fuelled)
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
@@ -153,7 +152,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     if fuelled:
         spent = _feasible(lambda plan: None if plan.pulses.propellant is None else 1e3 * plan.pulses.propellant)
         yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, lambda value: f"{value:.4g}", "screen")
+        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4), "screen")
     for name in ("nutation", "momentum_shift"):
         heading = f"{name.replace('_', ' ')}, impulses (17)"
         yield Column("", heading, "deg", angle_of(f"plan.residual.{name}"), small_angle, "full")
@@ -168,7 +167,7 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     yield from _directions(body)
     yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
     if body.goal.spin is not None:
-        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), lambda spin: f"{spin:.6g}", "full")
+        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
     where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
     yield Column("spin_change_rad_s", "spin change", "rad/s", lambda row: row.plan.spin_change, _four, where)
     where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
@@ -256,8 +255,6 @@ TIGHTEST = 2
 NOTES = 3
 """Notes that are shown, at most."""
 
-NEXT = "--plot plan.png · nutdamp report"
-"""Next steps at the end of the last line."""
 
 DIGITS = 8
 """Figures of a value beside its limit, at most."""
@@ -285,7 +282,12 @@ def glance(
     head += [screen_line(note) for note in remarks if severity(note) == WARNING]
 
     def screen(first: int) -> RenderableType:
-        fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
+        fired: list[RenderableType] = []
+        if plan.pulses.blocks:
+            fired = [Text(), block_table(plan.flight).screen("screen", first=first)]
+        elif len(plan.pulses):
+            shown = pulse_table(plan.flight, least=limits(body)[0])
+            fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
         blocks = bool(plan.pulses.blocks)
         return _fitted(head, required, middle, more, table, blocks=blocks)
@@ -402,15 +404,6 @@ def ends(decision: Decision) -> Table:
     return facts(rows)
 
 
-def _fired(plan: Plan, first: int) -> RenderableType:
-    """The blocks or pulses to fire, of many the ``first`` ones and the last."""
-    if plan.pulses.blocks:
-        return block_table(plan.flight).screen("screen", first=first)
-    least, _ = limits(plan.spacecraft)
-    shown = pulse_table(plan.flight, least=least)
-    return shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)
-
-
 def _fitted(
     head: Sequence[Text],
     required: Sequence[RequirementRow],
@@ -437,7 +430,8 @@ def _fitted(
         shown_notes.append(note)
     hidden = len(more) - len(shown_notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
+    written = "--blocks blocks.csv" if blocks else "--csv pulses.csv"
+    steps = Text(f"{further} · {written} · --plot plan.png · nutdamp report", style="dim")
     return Group(*head, *[facts(row[:5] for row in shown)] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
 
 
@@ -462,4 +456,12 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
         results += [Text(), pulse_table(decided.plan.flight).screen("full")]
-    return Group(*parts, *decision_screen(compared, decided), *results)
+    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
+    return Group(
+        *parts,
+        Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),
+        decisions.statement(decided),
+        *map(screen_line, ordered([*warnings, *decision_notes(decided), *alternatives(compared)])),
+        *decisions.figures(decided),
+        *results,
+    )

@@ -22,7 +22,7 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions
 from nutdamp.views.pulses import pulse_table, seconds
 from nutdamp.views.summary import Remark, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
 SHOWN = 40
@@ -84,7 +84,7 @@ def _finite(value: float) -> float | None:
 
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where=SEEN, kind=TEXT),
-    Column("late_deg", "late", "deg", angle_of("late"), lambda late: f"{late:.4g}", SEEN),
+    Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), SEEN),
     Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
     Column("gain", "remaining", "%", lambda row: row.gain,
            lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", SEEN),

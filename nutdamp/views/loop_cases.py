@@ -23,7 +23,7 @@ from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.views import decisions, dispersion
 from nutdamp.views.dispersion import StudyOutput
 from nutdamp.views.loop import described
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
 
@@ -77,10 +77,6 @@ def _angle(at: int, row: LoopCaseRow) -> float:
     return math.degrees(row.angles.flat[at])
 
 
-def _figures(scale: float, value: float) -> str:
-    return f"{scale * value:.4g}"
-
-
 def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
     """Columns of a case: its number (from 1), true inputs, outputs, angles to cones."""
     yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
@@ -89,14 +85,14 @@ def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
     for entry in study.model.inputs.drawn:
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for output in SHOWN_OUTPUTS:
-        where, text = "csv json" + " screen" * (output in RANKED), partial(_figures, output.scale)
+        where, text = "csv json" + " screen" * (output in RANKED), to_figures(4, output.scale)
         yield Column(output.key, output.heading, output.unit, partial(_value, output), text, where, kind=WHOLE)
         yield dispersion.case_column(output, partial(_value, output), rows)
     yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
     angles = [(which, cone) for cone in study.spacecraft.keep for which in ("least", "largest")]
     for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.spacecraft), angles, strict=True)):
         where, name = "csv case" + " screen" * (which in dispersion.bounded(cone)), f"{which} from {cone.name}"
-        yield Column(key, name, "deg", partial(_angle, at), partial(_figures, 1.0), where)
+        yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
     yield Column("", "largest inputs, in sigmas", "", partial(_largest, study), where="screen", kind=TEXT)
 
 

@@ -15,7 +15,7 @@ from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
 
 MILLISECONDS = 3
@@ -159,10 +159,6 @@ def _nine(value: float) -> float:
     return float(f"{value:.9g}")
 
 
-def _six(value: float) -> str:
-    return f"{value:.6g}"
-
-
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
@@ -170,16 +166,16 @@ BLOCKS = (
     Column("first_sun_pulse", Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
     Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
            kind=TEXT),
-    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, _six, EVERYWHERE),
+    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
     Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
     Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
            lambda angle: f"{angle:.2f}", EVERYWHERE),
-    Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
+    Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
     Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",
-           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
+           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), to_figures(6), "csv page"),
     Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle, "csv page"),
 )  # fmt: skip
 

@@ -22,7 +22,7 @@ from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
 from nutdamp.views.tolerances import in_words, stated_text
 
@@ -149,10 +149,11 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json", kind=WHOLE)
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", attrgetter("plan.pulses.total_impulse"), _four,
-                 "json" if fuelled else "full json")  # fmt: skip
-    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
-    yield Column("", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
+    impulse, where = attrgetter("plan.pulses.total_impulse"), "json" if fuelled else "full json"
+    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
+    yield Column(
+        "", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, to_figures(4), "full" * fuelled
+    )
     yield Column("nominal_nutation_deg", "", "", angle_of("plan.flown.nutation"), where="json")
     yield Column("nutation_deg", "", "", angle_of("nutation"), where="json")
     yield Column(f"{requirements.aim(body).value}_deg", "", "", angle_of("off"), where="json")
@@ -164,10 +165,6 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
                  "full" * requirements.judged(body))  # fmt: skip
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
-
-
-def _four(value: float) -> str:
-    return f"{value:.4g}"
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:

@@ -36,7 +36,7 @@ from nutdamp.views import decisions
 from nutdamp.views.pulses import pulse_table, shown_rows
 from nutdamp.views.spacecraft import FRAME_N, angle_names, angle_texts, aspect_facts, derived_table, requested
 from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
 MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}
@@ -57,7 +57,7 @@ def _columns(simulation: Simulation) -> Iterator[Column]:
     for heading, name in (("spin axis", "axis"), ("H", "momentum")):
         for at, angle in enumerate(angle_names(body)):
             yield Column("", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen")
-    yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), lambda spin: f"{spin:.6g}", "screen")
+    yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
 
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:

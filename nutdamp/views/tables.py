@@ -155,6 +155,11 @@ def angle_of(path: str) -> Callable[[Any], float | None]:
     return value
 
 
+def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
+    """Text of a column: ``scale`` times a number, to ``count`` figures."""
+    return lambda value: f"{scale * value:.{count}g}"
+
+
 class Column(NamedTuple):
     """One column.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -160,38 +160,28 @@ def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
     return (first.value, first.label), (second.value, second.label)
 
 
-class DrawnInput(NamedTuple):
-    """An input of one case, and its deviation from the nominal value."""
-
-    entry: DispersedInput
-    draw: float
-
-    def scaled(self, value: float, form: str = ".6g") -> str:
-        """A value in the unit for people."""
-        return f"{unit_of_people(self.entry)[1] * value:{form}}"
-
-    @property
-    def off(self) -> str:
-        """The deviation with its unit."""
-        if self.entry.unit == "":
-            return of_nominal(self.entry, self.draw, "+.4g")
-        return f"{self.scaled(self.draw, '+.4g')} {unit_of_people(self.entry)[0]}"
-
-
-INPUTS = (
-    Column("", Shared.INPUT, "", lambda row: in_words(row.entry.name), where="screen", kind=TEXT),
-    Column("", Shared.NOMINAL, "", lambda row: row.scaled(row.entry.nominal), where="screen"),
-    Column("", Shared.THIS_CASE, "", lambda row: row.scaled(row.entry.nominal + row.draw), where="screen"),
-    Column("", "off by", "", lambda row: row.off, where="screen"),
-    Column("", "in sigmas", "", lambda row: f"{row.draw / row.entry.sigma:+.2f}" if row.entry.sigma else "bias",
-           where="screen"),
-)  # fmt: skip
-
-
-def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
+def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
     """Every input of one case: nominal, drawn, and the deviation."""
-    rows = [DrawnInput(entry, draws[entry.name]) for entry in drawn]
-    return DataTable("Inputs", INPUTS, rows).screen("screen")
+
+    def scaled(entry: DispersedInput, value: float, form: str = ".6g") -> str:
+        return f"{unit_of_people(entry)[1] * value:{form}}"
+
+    def off(entry: DispersedInput) -> str:
+        if entry.unit == "":
+            return of_nominal(entry, draws[entry.name], "+.4g")
+        return f"{scaled(entry, draws[entry.name], '+.4g')} {unit_of_people(entry)[0]}"
+
+    def sigmas(entry: DispersedInput) -> str:
+        return f"{draws[entry.name] / entry.sigma:+.2f}" if entry.sigma else "bias"
+
+    columns = (
+        Column("", Shared.INPUT, "", lambda row: in_words(row.name), where="screen", kind=TEXT),
+        Column("", Shared.NOMINAL, "", lambda row: scaled(row, row.nominal), where="screen"),
+        Column("", Shared.THIS_CASE, "", lambda row: scaled(row, row.nominal + draws[row.name]), where="screen"),
+        Column("", "off by", "", off, where="screen"),
+        Column("", "in sigmas", "", sigmas, where="screen"),
+    )
+    return DataTable("Inputs", columns, drawn).screen("screen")
 
 
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
