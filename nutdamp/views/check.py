@@ -31,8 +31,6 @@ from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
-EVERYWHERE = "screen json"
-
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
     """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
@@ -42,9 +40,9 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
         return f"{duration(row.channel.min_on_time)} to {'any' if math.isinf(most) else duration(most)}"
 
     columns = (
-        Column("name", Shared.CHANNEL, "", lambda row: row.channel.name, where=EVERYWHERE, kind=TEXT),
+        Column("name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT),
         Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
-               vector, EVERYWHERE, kind=TEXT),
+               vector, "screen json", kind=TEXT),
         Column("", Shared.ON_TIME, "", on_times, where="screen"),
         Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
         Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
@@ -59,10 +57,10 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
 VALVES = (
     Column("", Shared.CHANNEL, "", lambda alike: ", ".join(pulse.channel.name for pulse in alike), where="screen",
            kind=TEXT),
-    Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, EVERYWHERE),
-    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda alike: alike[0].effective, duration, EVERYWHERE),
-    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), EVERYWHERE),
-    Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, EVERYWHERE),
+    Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, "screen json"),
+    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda alike: alike[0].effective, duration, "screen json"),
+    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), "screen json"),
+    Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, "screen json"),
 )  # fmt: skip
 """Columns of pulses of valves that are alike."""
 
@@ -91,12 +89,12 @@ def turn_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TANK = (
-    Column("used_kg", "used", "kg", lambda row: row[1], to_figures(4), EVERYWHERE),
+    Column("used_kg", "used", "kg", lambda row: row[1], to_figures(4), "screen json"),
     Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]),
-           lambda pressure: quantity(1e-5 * pressure, "bar"), EVERYWHERE),
+           lambda pressure: quantity(1e-5 * pressure, "bar"), "screen json"),
     Column("thrust_factor", "thrust", "%", lambda row: row[0].thrust_factor(row[1]),
-           to_figures(4, 100.0), EVERYWHERE),
-    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), to_figures(4), EVERYWHERE),
+           to_figures(4, 100.0), "screen json"),
+    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), to_figures(4), "screen json"),
 )  # fmt: skip
 
 

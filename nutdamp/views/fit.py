@@ -20,9 +20,6 @@ from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 
-BOTH = "screen json"
-"""Places of most columns."""
-
 FAR = 4.0
 """Sigmas of the file from which on a change is remarked upon."""
 
@@ -108,9 +105,16 @@ def signal_table(fit: Fit) -> DataTable:
         return f"{float(fit.noise[at]) * in_shown(fit.model.signals[at])[1]:.3g}"
 
     columns = (
-        Column("signal", "signal", "", lambda at: fit.model.signals[at], where=BOTH, kind=TEXT),
-        Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where=BOTH, kind=WHOLE),
-        Column("outliers", "outliers", "", lambda at: int((of_signal[at] & ~fit.used).sum()), where=BOTH, kind=WHOLE),
+        Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
+        Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
+        Column(
+            "outliers",
+            "outliers",
+            "",
+            lambda at: int((of_signal[at] & ~fit.used).sum()),
+            where="screen json",
+            kind=WHOLE,
+        ),
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
         Column("", "noise", "", noise, where="screen"),
         Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
@@ -137,15 +141,15 @@ def prospect_table(ahead: Outlook) -> DataTable:
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
         Column("", "probe pulse", "", probe, where="screen"),
         Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
-        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), BOTH),
+        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
         Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
         Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
                to_figures(2), "screen"),
         Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
-               to_figures(3), BOTH),
-        Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), BOTH),
-        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), BOTH),
-        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), BOTH),
+               to_figures(3), "screen json"),
+        Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
+        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
+        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), "screen json"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
