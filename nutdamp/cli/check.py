@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 @set_option
 @click.option("--json", type=OUTPUT, help="Write derived quantities and faults.")
 @screen_options
-@quiet_option
 def check_command(
     files: tuple[str, ...], settings: tuple[Setting, ...], json: str | None, verbose: bool, quiet: bool
 ) -> None:
@@ -82,7 +81,6 @@ def check_command(
 @click.option("--loop", "looped", is_flag=True, help="Verify the closed loop of the file: each firing, by DOP853.")
 @click.option("--json", type=OUTPUT, help="Write methods, differences and error budget.")
 @screen_options
-@quiet_option
 def verify_command(job: Job, looped: bool, verbose: bool) -> None:
     """Fly a schedule by impulse sum, Taylor series, DOP853 and Basilisk (where installed), side by side.
 
@@ -150,42 +148,24 @@ def init_command(file: str, name: str | None, listed: bool, force: bool, quiet: 
     nutdamp, each with the sources of its figures.
     """
     from nutdamp.errors import CannotWrite
-    from nutdamp.files.reader import BUILT_IN, example_text
+    from nutdamp.files.reader import BUILT_IN, example_names, example_subject, example_text
     from nutdamp.files.tabular import STDOUT, check_place, write_whole
 
     if listed:
-        _list()
+        from nutdamp.views.explain import examples_screen
+
+        show(examples_screen(tuple((name, example_subject(name)) for name in example_names())))
         return
-    text = example_text(_known(name) if name else BUILT_IN)
+    if name and name not in example_names():
+        close = nearest(name, example_names())
+        cure = f"did you mean {close!r}?" if close else "`nutdamp init --list` lists those that there are"
+        raise click.BadParameter(f"there is no example {name!r}; {cure}", param_hint="'--from'")
+    text = example_text(name or BUILT_IN)
     if file != STDOUT and check_place(file).exists() and not force:
         raise CannotWrite(file, "already exists; use --force")
     write_whole(file, text)
     if file != STDOUT and not quiet:
         say(f"wrote {printable(file)}; plan it with: nutdamp plan {printable(file)}")
-
-
-def _list() -> None:
-    """Print the examples."""
-    from nutdamp.files.reader import example_names, example_subject
-    from nutdamp.views.explain import examples_screen
-
-    rows = tuple((name, example_subject(name)) for name in example_names())
-    show(examples_screen(rows))
-
-
-def _known(name: str) -> str:
-    """The ``name`` if there is such an example; a usage error suggests the nearest one to a misspelt name."""
-    from nutdamp.files.reader import example_names
-
-    names = example_names()
-    if name in names:
-        return name
-    close = nearest(name, names)
-    raise click.BadParameter(
-        f"there is no example {name!r}; "
-        + (f"did you mean {close!r}?" if close else "`nutdamp init --list` lists those that there are"),
-        param_hint="'--from'",
-    )
 
 
 @click.command("schema")

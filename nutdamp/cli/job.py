@@ -59,14 +59,15 @@ def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
     ctx.meta[UNITS] = value
 
 
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
+
+
 def screen_options(command: Command) -> Command:
-    """``--units`` and ``--verbose``."""
+    """``--units``, ``--verbose`` and ``--quiet``."""
     units = click.option("--units", type=NameType((SI, US)), default=SI, expose_value=False, callback=_units,
                          help="Units of the screen, default si; files are SI.")  # fmt: skip
-    return units(click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")(command))
-
-
-quiet_option = click.option("-q", "--quiet", is_flag=True, help="Hide progress and notes.")
+    verbose = click.option("-v", "--verbose", is_flag=True, help="Show all values and notes.")
+    return units(verbose(quiet_option(command)))
 
 
 class FileInput(NamedTuple):
@@ -240,10 +241,16 @@ class Job:
     def begin(self, folder: Iterable[str] = ()) -> Spacecraft:
         """Check the files of the command line and load its spacecraft, before any work.
 
-        ``folder``: files that ``--schedules`` may write. Raises as `expect_outputs` and `Source.read` do.
+        ``folder``: files that ``--schedules`` may write. Raises as `expect_outputs` and `Source.read` do, and where the
+        picture cannot be made.
         """
         self.silent = expect_outputs(self.given.read, *self.read, **self.written, schedules=[*folder])
-        self._expect_picture()
+        if (plot := self.written.get("plot")) is not None:
+            from nutdamp.figures import image
+
+            image.ending(plot)
+        elif self.figure != self.usual:
+            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
         self.source = self.given.source(self.remark)
         body = self.source.read(lambda doubt: say(doubt.as_warning))
         self.spacecraft = self.aim.applied(body, self.remark) if any(given is not None for given in self.aim) else body
@@ -255,16 +262,6 @@ class Job:
         if context is not None and self.written.get("json") is not None:
             context.meta[UNDER_WAY] = self.written["json"], self.spacecraft
         return self.spacecraft
-
-    def _expect_picture(self) -> None:
-        """Refuse a picture that cannot be made before the work; a usage error for a figure without file."""
-        path = self.written.get("plot")
-        if path is not None:
-            from nutdamp.figures import image
-
-            image.ending(path)
-        elif self.figure != self.usual:
-            raise click.UsageError("--figure says what --plot draws: name a file with --plot")
 
     def remark(self, text: str) -> None:
         """Print a remark on standard error, unless quiet."""
@@ -278,11 +275,11 @@ class Job:
 
     def note(self, notes: Iterable[Note]) -> None:
         """Print notes on results on standard error, unless quiet."""
-        from nutdamp.views.text import message
+        from nutdamp.views.text import screen_line
 
         with units_of_screen():
             for entry in notes:
-                self.remark(message(entry))
+                self.remark(screen_line(entry).plain)
 
     def doubt(self, *warnings: str) -> None:
         """Print warnings about the data on standard error, quiet or not."""
@@ -359,10 +356,10 @@ def write_infeasible(context: click.Context, reason: Exception) -> None:
     """Write the JSON file of the job that has begun, if any: nothing is feasible, and the reason."""
     if UNDER_WAY not in context.meta:
         return
-    from nutdamp.views.decisions import infeasible_json
+    from nutdamp.views.decisions import heading
 
     path, spacecraft = context.meta[UNDER_WAY]
-    deliver([(path, lambda: infeasible_json(spacecraft, str(reason)))])
+    deliver([(path, lambda: {**heading(spacecraft), "feasible": False, "why": str(reason)})])
 
 
 def deliver(

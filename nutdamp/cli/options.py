@@ -242,31 +242,16 @@ def goal_options(command: Command, *, several: bool = True) -> Command:
     ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
     """
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
-    sun = option(
-        "--sun",
-        type=Direction(),
-        metavar="ANGLE,ANGLE",
-        help="The Sun, as --target; rhumb-line keeps its phase.",
-    )
-    for add in (
-        *((debug_option,) if several else ()),
-        option("--with-disturbances", is_flag=True, help="Plan on the motion with the disturbances of the file."),
-        *((sun,) if several else ()),
-        option(
-            "--spin",
-            type=UnitType("rate", keep="keep"),
-            metavar="RATE|keep",
-            help="Final spin rate, such as 30rpm; optimal can set it.",
-        ),
-        option(
-            "--target",
-            type=Direction(),
-            metavar="ANGLE,ANGLE",
-            help="End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg.",
-        ),
-    ):
-        command = add(command)
-    return command
+    angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
+    command = debug_option(command) if several else command
+    disturbed = "Plan on the motion with the disturbances of the file."
+    command = option("--with-disturbances", is_flag=True, help=disturbed)(command)
+    if several:
+        command = angles("--sun", help="The Sun, as --target; rhumb-line keeps its phase.")(command)
+    rate, spin = UnitType("rate", keep="keep"), "Final spin rate, such as 30rpm; optimal can set it."
+    command = option("--spin", type=rate, metavar="RATE|keep", help=spin)(command)
+    end = "End of the spin axis: RA,DEC where the file has an attitude, else tilt from H,azimuth: 10deg,45deg."
+    return angles("--target", help=end)(command)
 
 
 def scheme_options(command: Command) -> Command:
@@ -351,16 +336,14 @@ def _direction(spacecraft: Spacecraft, angles: Angles, option: str) -> Vector:
     from nutdamp.physics.attitude import on_sphere
 
     if spacecraft.attitude is not None:
-        if abs(angles.second) > 0.5 * math.pi:
-            raise _no_direction("a declination of -90 deg to 90 deg", angles, option)
-        return on_sphere(angles.first, angles.second)
-    if not 0.0 <= angles.first < math.pi:
-        raise _no_direction("a tilt of at least 0 and below 180 deg", angles, option)
-    return spacecraft.direction_in_n(angles.first, angles.second)
-
-
-def _no_direction(expected: str, angles: Angles, option: str) -> click.BadParameter:
-    return click.BadParameter("; ".join((f"expected {expected}", *angles.readings)), param_hint=option)
+        problem = "expected a declination of -90 deg to 90 deg"
+        if abs(angles.second) <= 0.5 * math.pi:
+            return on_sphere(angles.first, angles.second)
+    else:
+        problem = "expected a tilt of at least 0 and below 180 deg"
+        if 0.0 <= angles.first < math.pi:
+            return spacecraft.direction_in_n(angles.first, angles.second)
+    raise click.BadParameter("; ".join((problem, *angles.readings)), param_hint=option)
 
 
 def expect_read(names: Sequence[str], options: Options, body: Spacecraft, remark: Callable[[str], None]) -> None:

@@ -23,7 +23,7 @@ from nutdamp.cli.job import (
 from nutdamp.cli.main import leave
 from nutdamp.cli.options import END, FILE, OUTPUT, Command, SchemeName, expect_read, goal_options, scheme_options
 from nutdamp.cli.screen import say, show_failures
-from nutdamp.errors import BadRequest, listed, printable
+from nutdamp.errors import BadRequest, Infeasible, listed, printable
 from nutdamp.schemes.catalogue import NAMES, PLANNED, SchemeOptions
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.decision import Comparison, Decision
     from nutdamp.planning.plan import Plan
     from nutdamp.planning.robust import RobustComparison
-    from nutdamp.planning.tradeoff import Certificate, Trade
+    from nutdamp.planning.tradeoff import Trade
     from nutdamp.spacecraft.model import Spacecraft
 
 
@@ -99,44 +99,34 @@ def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Pla
     ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
     ``judged``: a verdict on the screen names the cones that are broken.
     """
-    from nutdamp.errors import Infeasible
+    from nutdamp import api
     from nutdamp.planning.decision import infeasibility
     from nutdamp.planning.notes import plan_notes
 
     scheme, schedule, blocks = job.flown
     if schedule is not None:
-        return _read(job, schedule)
+        from nutdamp.files.schedules import read_plan
+
+        expect_read((), job.options, job.spacecraft, job.remark)
+        plan, warnings = read_plan(schedule, job.spacecraft, job.options.of(SchemeOptions))
+        job.doubt(*warnings)
+        return plan
     if blocks is not None:
         return _fired(job, blocks, jitter=jitter)
-    plan = _recommended(job, judged=judged) if scheme is None else _planned(job, scheme)
+    if scheme is None:
+        plan = _recommended(job, judged=judged)
+    else:
+        expect_read((scheme,), job.options, job.spacecraft, job.remark)
+        with job.working("planning"):
+            plan = api.plan(job.spacecraft, scheme, job.options)
     if not plan.feasible:
         raise Infeasible(f"{plan.scheme} is infeasible: {infeasibility(plan)}")
     job.note(plan_notes(plan, cones=scheme is not None and not judged))
     return plan
 
 
-def _read(job: Job, schedule: str) -> Plan:
-    """The pulses of a file."""
-    from nutdamp.files.schedules import read_plan
-
-    expect_read((), job.options, job.spacecraft, job.remark)
-    plan, warnings = read_plan(schedule, job.spacecraft, job.options.of(SchemeOptions))
-    job.doubt(*warnings)
-    return plan
-
-
-def _planned(job: Job, scheme: str) -> Plan:
-    """The plan of a scheme."""
-    from nutdamp.api import plan
-
-    expect_read((scheme,), job.options, job.spacecraft, job.remark)
-    with job.working("planning"):
-        return plan(job.spacecraft, scheme, job.options)
-
-
 def _recommended(job: Job, *, judged: bool) -> Plan:
     """The plan that is recommended, its warnings beside a verdict or not; raises Infeasible where there is none."""
-    from nutdamp.errors import Infeasible
     from nutdamp.planning.notes import comparison_warnings, reasons
     from nutdamp.views.text import joined
 
@@ -153,7 +143,6 @@ def _recommended(job: Job, *, judged: bool) -> Plan:
 
 def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
     """The pulses that the command blocks of a file fire, as a plan; raises Infeasible where there is no Sun pulse."""
-    from nutdamp.errors import printable
     from nutdamp.files.schedules import read_blocks
     from nutdamp.planning.decision import broken_limits
     from nutdamp.planning.plan import Plan
@@ -194,7 +183,6 @@ PRIMER = "primer"
 @carry_options("end of the last pulse")
 @plot_options((*FIGURES, PRIMER))
 @screen_options
-@quiet_option
 def plan_command(
     job: Job, names: tuple[str, ...], robust: bool, nominal: bool, timed: bool, at: float | None, verbose: bool
 ) -> None:
@@ -205,7 +193,10 @@ def plan_command(
     """
     figure, plot = job.figure or FIGURES[0], job.written["plot"]
     csv, blocks, certificate = (job.written[name] for name in ("csv", "blocks", "certificate"))
-    _expect_one_scheme(names, csv=csv, plot=plot if figure in FIGURES else None)
+    for option, path in (("csv", csv), ("plot", plot if figure in FIGURES else None)):
+        if path is not None and len(set(names)) > 1:
+            message = f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
+            raise click.UsageError(message)
     body = job.begin()
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
@@ -214,6 +205,7 @@ def plan_command(
     from nutdamp.planning.notes import comparison_warnings
     from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.glance import scheme_table
+    from nutdamp.views.pulses import pulse_table
 
     if robust:
         expect_dispersions(body.dispersions)
@@ -226,12 +218,12 @@ def plan_command(
     chosen = None if decided is None else decided.plan
     for path in filter(None, () if chosen else (csv, blocks, plot if figure in FIGURES else None)):
         say(f"{printable(path)} was not written: no plan is feasible")
-    proof, unproved = _certified(compared, proofs)
-    if proof is not None and proof.plan is not chosen:
-        job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
-    result = dispersed or compared
-    more: Files = {"json": result.to_dict, "table": lambda: scheme_table(compared, chosen).csv()}
-    more |= _schedule_files(chosen, figure) | _proof_files(proof, figure)
+    files, unproved = _certified(job, compared, chosen, proofs)
+    more: Files = {"json": (dispersed or compared).to_dict, **files}
+    more["table"] = lambda: scheme_table(compared, chosen).csv()
+    if chosen is not None:
+        more["csv"] = lambda: pulse_table(chosen.flight).csv()
+        more |= {"plot": partial(chosen.figure, figure)} if figure in FIGURES else {}
     more |= job.carried(chosen, at)
     more |= {} if blocks is None else _blocks_file(job, compared, chosen)
     if job.silent:
@@ -239,25 +231,6 @@ def plan_command(
     job.deliver(None, partial(_screen, compared, decided, dispersed, verbose), more=more, unsaved=unproved)
     missed = decided is not None and decided.met is False
     leave(failed=show_failures(compared), infeasible=decided is None, missed=missed)
-
-
-def _expect_one_scheme(names: Sequence[str], **written: str | None) -> None:
-    """A usage error where the pulses of one plan are to be written, and several schemes are named."""
-    for option, path in written.items():
-        if path is not None and len(set(names)) > 1:
-            raise click.UsageError(
-                f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
-            )
-
-
-def _schedule_files(chosen: Plan | None, figure: str) -> Files:
-    """The files of the plan to fly, if there is one."""
-    if chosen is None:
-        return {}
-    from nutdamp.views.pulses import pulse_table
-
-    drawn: Files = {"plot": partial(chosen.figure, figure)} if figure in FIGURES else {}
-    return {"csv": lambda: pulse_table(chosen.flight).csv(), **drawn}
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
@@ -292,52 +265,40 @@ def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
         raise BadRequest(f"a certificate is of {OPTIMAL.name}, which fires channels, and the spacecraft has none")
 
 
-def _certified(compared: Comparison, paths: Sequence[str]) -> tuple[Certificate | None, list[CannotWrite]]:
-    """The certificate of the plan of optimal; where it has none, the errors of the ``paths`` that are not written.
-
-    None where no path is named.
-    """
+def _certified(
+    job: Job, compared: Comparison, chosen: Plan | None, paths: Sequence[str]
+) -> tuple[Files, list[CannotWrite]]:
+    """The files of the certificate of the plan of optimal; where it has none, errors of the ``paths`` not written."""
     if not paths:
-        return None, []
+        return {}, []
     from nutdamp.errors import CannotWrite
+    from nutdamp.figures.studies import certificate_figure
     from nutdamp.planning.tradeoff import certificate
     from nutdamp.schemes.catalogue import OPTIMAL
-
-    try:
-        return certificate(next(plan for plan in compared if plan.scheme == OPTIMAL.name)), []
-    except BadRequest as reason:
-        return None, [CannotWrite(path, f"there is no certificate: {reason}") for path in paths]
-
-
-def _proof_files(proof: Certificate | None, figure: str) -> Files:
-    """The files of a certificate, if there is one."""
-    if proof is None:
-        return {}
-    from nutdamp.figures.studies import certificate_figure
     from nutdamp.views.decisions import certificate_json
 
-    drawn: Files = {"plot": partial(certificate_figure, proof)} if figure == PRIMER else {}
-    return {"certificate": partial(certificate_json, proof), **drawn}
+    try:
+        proof = certificate(next(plan for plan in compared if plan.scheme == OPTIMAL.name))
+    except BadRequest as reason:
+        return {}, [CannotWrite(path, f"there is no certificate: {reason}") for path in paths]
+    if proof.plan is not chosen:
+        job.remark(f"the certificate is of {proof.plan.scheme} for nominal values, which is not the recommended plan")
+    drawn: Files = {"plot": partial(certificate_figure, proof)} if job.figure == PRIMER else {}
+    return {"certificate": partial(certificate_json, proof), **drawn}, []
 
 
 def _screen(
     compared: Comparison, decided: Decision | None, dispersed: RobustComparison | None, verbose: bool
 ) -> RenderableType:
-    from nutdamp.views.glance import glance
+    from nutdamp.views.glance import comparison_screen, glance
 
-    if dispersed is not None:
-        from nutdamp.views.robust import robust_notes, robust_screen
+    if dispersed is None:
+        return comparison_screen(compared) if verbose else glance(compared, decided)
+    from nutdamp.views.robust import robust_notes, robust_screen
 
-        return (
-            robust_screen(dispersed)
-            if verbose
-            else glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
-        )
     if verbose:
-        from nutdamp.views.glance import comparison_screen
-
-        return comparison_screen(compared)
-    return glance(compared, decided)
+        return robust_screen(dispersed)
+    return glance(dispersed.joined, decided, dispersed.name, robust_notes(dispersed))
 
 
 @click.command("animate", cls=SessionCommand)
@@ -402,7 +363,6 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @carry_options("the end")
 @plot_options(FIGURES)
 @screen_options
-@quiet_option
 def simulate_command(job: Job, real: bool, until: float | None, samples: int, at: float | None, verbose: bool) -> None:
     """Propagate a schedule; show cone angles around each pulse, how it ends by both models, and the axis track.
 

@@ -17,7 +17,6 @@ from nutdamp.cli.job import (
     SessionCommand,
     carry_options,
     plot_options,
-    quiet_option,
     screen_options,
     spacecraft_argument,
 )
@@ -75,7 +74,6 @@ if TYPE_CHECKING:
 @click.option("--plot", type=OUTPUT, help="Draw the fronts (.png, .svg, .pdf; needs the extra plot).")
 @click.option("--schedules", type=FOLDER, help="Write each schedule as FOLDER/point-N.csv, as `plan --csv` does.")
 @screen_options
-@quiet_option
 def trade_command(
     job: Job, allow: tuple[float, ...], points: int, least: str, schedules: str | None, verbose: bool
 ) -> None:
@@ -133,7 +131,6 @@ def _schedules(fronts: Sequence[Front], folder: str) -> tuple[list[Output], list
 @carry_options("end of the run")
 @click.option("--plot", type=OUTPUT, help="Draw signal, nutation and firings (.png, .svg, .pdf; needs extra plot).")
 @screen_options
-@quiet_option
 def loop_command(
     job: Job, until: float | None, seed: int, case: int | None, samples: int, at: float | None, verbose: bool
 ) -> None:
@@ -181,7 +178,6 @@ def loop_command(
 @click.option("--json", type=OUTPUT, help="Write the same, and how the nutation grows.")
 @click.option("--plot", type=OUTPUT, help="Draw it (.png, .svg, .pdf; needs extra plot).")
 @screen_options
-@quiet_option
 def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, seed: int, verbose: bool) -> None:
     """Budget a mission: pulses a day and propellant a year that hold the nutation against energy dissipation.
 
@@ -212,7 +208,6 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
 @click.option("--plot", type=OUTPUT, help="Draw data, fit and residuals (.png, .svg, .pdf; needs extra plot).")
 @click.option("--next", "ahead", is_flag=True, help="Say whether a longer coast or a probe pulse would pay.")
 @screen_options
-@quiet_option
 def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahead: bool, verbose: bool) -> None:
     """Estimate motion, C/A, dissipation and sensor errors from telemetry, and thrust factors from pulses fired in it.
 
@@ -274,7 +269,6 @@ FIGURES = ("overview", "cases", "momentum")
 @click.option("--json", type=OUTPUT, help="Write percentiles, requirement, tolerance budget, worst cases.")
 @plot_options(FIGURES)
 @screen_options
-@quiet_option
 def disperse_command(
     job: Job,
     samples: int | None,

@@ -11,60 +11,52 @@ from typing import Any
 from rich.console import RenderableType
 from rich.text import Text
 
-from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, Cycle, HeldNutation
-from nutdamp.views.decisions import (
-    VERDICT,
-    heading,
-)
+from nutdamp.control_loop.budget import DAY, NOISY, WIDENED, YEAR, Budget, HeldNutation
+from nutdamp.views.decisions import VERDICT, heading
 from nutdamp.views.loop import described, warnings
 from nutdamp.views.summary import opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, lasting, most, quantity
 
 SLOW = 0.1
 """Share of its spin by which a year may change it before figures of the present spin mislead."""
 
 
-def _of_cycle(get: Callable[[Cycle], float | None], scale: float = 1.0) -> Callable[[HeldNutation], float | None]:
+def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float | None]:
     """A figure of the limit cycle times ``scale``; None without one."""
 
     def value(held: HeldNutation) -> float | None:
-        figure = None if held.cycle is None else get(held.cycle)
+        figure = None if held.cycle is None else getattr(held.cycle, name)
         return None if figure is None else scale * figure
 
     return value
-
-
-def _digits(count: int) -> Callable[[float], str]:
-    return lambda value: f"{value:.{count}g}"
 
 
 FILES, EVERYWHERE = "csv json", "screen csv json"
 
 
 HELD = (
-    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), _digits(4), EVERYWHERE),
-    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), _digits(4), EVERYWHERE),
+    Column("start_deg", Shared.START, "deg", angle_of("thresholds.start"), to_figures(4), EVERYWHERE),
+    Column("stop_deg", "stop", "deg", angle_of("thresholds.stop"), to_figures(4), EVERYWHERE),
     Column("first_firing_s", "", "", lambda held: held.begins, where=FILES),
-    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle(lambda cycle: cycle.pulses, DAY), _digits(4),
+    Column("pulses_per_day", Shared.PULSES, "1/day", _of_cycle("pulses", DAY), to_figures(4), f"{EVERYWHERE} other"),
+    Column("cycles_per_day", "", "", _of_cycle("cycles", DAY), where=f"{FILES} other"),
+    Column("impulse_Nms_per_year", "", "", _of_cycle("impulse", YEAR), where=FILES),
+    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle("propellant", YEAR), to_figures(4),
            f"{EVERYWHERE} other"),
-    Column("cycles_per_day", "", "", _of_cycle(lambda cycle: cycle.cycles, DAY), where=f"{FILES} other"),
-    Column("impulse_Nms_per_year", "", "", _of_cycle(lambda cycle: cycle.impulse, YEAR), where=FILES),
-    Column("propellant_kg_per_year", Shared.PROPELLANT, "kg/year", _of_cycle(lambda cycle: cycle.propellant, YEAR),
-           _digits(4), f"{EVERYWHERE} other"),
-    Column("sigma", "", "", _of_cycle(lambda cycle: cycle.doubt), where=FILES),
-    Column("", "cycle", "", _of_cycle(lambda cycle: cycle.cycles),
+    Column("sigma", "", "", _of_cycle("doubt"), where=FILES),
+    Column("", "cycle", "", _of_cycle("cycles"),
            lambda cycles: lasting(1.0 / cycles) if cycles > 0.0 else "no pause", "screen"),
-    Column("spin_change_rad_s_per_day", "", "", _of_cycle(lambda cycle: cycle.spin_rate, DAY), where=FILES),
-    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), _digits(3), EVERYWHERE),
-    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), _digits(3), EVERYWHERE),
-    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), _digits(3), EVERYWHERE),
+    Column("spin_change_rad_s_per_day", "", "", _of_cycle("spin_rate", DAY), where=FILES),
+    Column("nutation_low_deg", "after firing", "deg", angle_of("cycle.low"), to_figures(3), EVERYWHERE),
+    Column("nutation_high_deg", "before firing", "deg", angle_of("cycle.high"), to_figures(3), EVERYWHERE),
+    Column("nutation_largest_deg", Shared.MOST, "deg", angle_of("cycle.largest"), to_figures(3), EVERYWHERE),
     Column("", Shared.SPIN, "%/day", lambda held: None if held.slows is None else 100.0 * held.slows * DAY / YEAR,
-           _digits(2), "screen"),
+           to_figures(2), "screen"),
     Column("noise_deg", "", "", angle_of("band.noise"), where=FILES),
     Column("smallest_pulse_deg", "", "", angle_of("band.step"), where=FILES),
     Column("tank_lasts_days", "tank", "days", lambda held: None if held.lasts is None else held.lasts / DAY,
-           _digits(4), "screen", lambda budget: budget.spacecraft.tank is not None),
+           to_figures(4), "screen", lambda budget: budget.spacecraft.tank is not None),
     Column("tank_lasts_days", "", "", lambda held: None if held.lasts is None else held.lasts / DAY, where=FILES),
     Column("", Shared.VERDICT, "", lambda held: VERDICT[bool(held.meets_requirement)], where="screen", kind=TEXT,
            when=lambda budget: budget.meets_requirement is not None, met=lambda held: held.meets_requirement),
@@ -95,9 +87,10 @@ def _outlook(budget: Budget) -> Iterator[str]:
     if body.growth == 0.0:
         yield f"The nutation stays at {now}: a sphere has no energy to lose. No damping is needed to hold it."
     elif body.growth < 0.0:
-        then = "" if limit is None else _falls(budget, limit)
-        decays = f"the nutation decays, e-fold in {lasting(-1.0 / body.growth)}"
-        yield f"No damping is needed: {decays}{then}."
+        already, then = budget.until_largest == 0.0, ""
+        if limit is not None:
+            then = f"; it is below {most(limit)} " + ("already" if already else f"in {lasting(budget.until_largest)}")
+        yield f"No damping is needed: the nutation decays, e-fold in {lasting(-1.0 / body.growth)}{then}."
     elif body.nutation == 0.0:
         yield "There is no nutation yet that could grow."
     elif limit is None:
@@ -105,17 +98,10 @@ def _outlook(budget: Budget) -> Iterator[str]:
     elif budget.until_largest == 0.0:
         yield f"Damping must begin now: the nutation of {now} is not below {most(limit)}."
     else:
-        yield (
-            f"Damping must begin within {lasting(budget.until_largest)}: "
-            f"from {now} now the nutation grows to {most(limit)}."
-        )
+        within = lasting(budget.until_largest)
+        yield f"Damping must begin within {within}: from {now} now the nutation grows to {most(limit)}."
     if body.growth > 0.0 and body.loop is None:
         yield "Pulses a day and propellant a year need a closed loop: the key loop of the file (nutdamp explain loop)."
-
-
-def _falls(budget: Budget, limit: float) -> str:
-    time = budget.until_largest
-    return f"; it is below {most(limit)}" + (" already" if time == 0.0 else f" in {lasting(time)}")
 
 
 def _warnings(budget: Budget) -> Iterator[str]:
@@ -153,17 +139,11 @@ def _warnings_of_row(row: HeldNutation, budget: Budget) -> Iterator[str]:
             f"the figures say, which are known to {100.0 * WIDENED:g} % only"
         )
     if row.other is not None and row.cycle is not None:
-        yield _second(row.cycle, row.other)
-
-
-def _second(cycle: Cycle, other: Cycle) -> str:
-    """Note on another limit cycle and its cost."""
-    kept, takes = (
-        "falls quiet between firings" if each.cycles > 0.0 else "never falls quiet" for each in (cycle, other)
-    )
-    takes += f", with {other.pulses * DAY:.4g} pulses a day"
-    takes += "" if other.propellant is None else f" and {quantity(other.propellant * YEAR, 'kg')} a year"
-    return f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
+        words = ("never falls quiet", "falls quiet between firings")
+        kept, takes = (words[cycle.cycles > 0.0] for cycle in (row.cycle, row.other))
+        takes += f", with {row.other.pulses * DAY:.4g} pulses a day"
+        takes += "" if row.other.propellant is None else f" and {quantity(row.other.propellant * YEAR, 'kg')} a year"
+        yield f"the loop has two limit cycles: the figures are those in which it {kept}; in the other one it {takes}"
 
 
 def _notes(budget: Budget) -> Iterator[str]:
@@ -197,6 +177,7 @@ def budget_csv(budget: Budget) -> str:
 def budget_json(budget: Budget) -> dict[str, Any]:
     """Growth of the nutation, and every row."""
     body, table = budget.spacecraft, budget_table(budget)
+    others = replace(table, rows=[replace(held, cycle=held.other) for held in budget.held])
     return {
         **heading(body),
         "growth_1_s": body.growth,
@@ -205,13 +186,7 @@ def budget_json(budget: Budget) -> dict[str, Any]:
         "law": None if body.loop is None else body.loop.law,
         "meets_requirement": budget.meets_requirement,
         "thresholds": [
-            row | {"other": None if held.other is None else _second_json(table, held)}
-            for held, row in zip(budget.held, table.json(), strict=True)
+            row | {"other": None if held.other is None else rates}
+            for held, row, rates in zip(budget.held, table.json(), others.json("other"), strict=True)
         ],
     }
-
-
-def _second_json(table: DataTable, held: HeldNutation) -> dict[str, Any]:
-    """Rates of the second limit cycle."""
-    (rates,) = replace(table, rows=[replace(held, cycle=held.other)]).json("other")
-    return rates

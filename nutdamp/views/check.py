@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -18,29 +18,32 @@ from nutdamp.control_loop.stability import margins
 from nutdamp.errors import CannotRead, Fault, FaultyFile, NutdampError, listed
 from nutdamp.files.reader import Source
 from nutdamp.flight.end_state import at_start
-from nutdamp.montecarlo.inputs import DispersedInput, reachable
+from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Tank
 from nutdamp.planning import capability
 from nutdamp.planning.capability import Acting, Consequence
-from nutdamp.spacecraft.equipment import SunSensor
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
 from nutdamp.views.spacecraft import derived_table
 from nutdamp.views.summary import summary, warnings_of
-from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
-from nutdamp.views.tolerances import correlation_json, in_words, size_text
+from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect
 
 
 def channel_table(spacecraft: Spacecraft) -> DataTable:
     """Torque and on-times of each channel, and the nutation that its shortest and longest pulse take."""
+
+    def on_times(row: Any) -> str:
+        most = row.channel.max_on_time
+        return f"{duration(row.channel.min_on_time)} to {'any' if math.isinf(most) else duration(most)}"
+
     columns = (
         Column("name", Shared.CHANNEL, "", lambda row: row.channel.name, where="screen json", kind=TEXT),
         Column("torque#_Nm", "torque, file axes", "N m", lambda row: spacecraft.inertia.in_file(row.channel.torque),
                vector, "screen json", kind=TEXT),
-        Column("", Shared.ON_TIME, "", lambda row: (row.channel.min_on_time, row.channel.max_on_time), _range,
-               "screen"),
+        Column("", Shared.ON_TIME, "", on_times, where="screen"),
         Column("min_on_time_s", "", "", lambda row: row.channel.min_on_time, where="json"),
         Column("max_on_time_s", "", "", lambda row: row.channel.max_on_time, where="json"),
         Column("smallest_step_deg", "smallest step", "deg", angle_of("smallest"),
@@ -51,26 +54,15 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
 
 
-def _range(on_times: tuple[float, float]) -> str:
-    least, most = on_times
-    return f"{duration(least)} to {'any' if math.isinf(most) else duration(most)}"
-
-
-class ValveRow(NamedTuple):
-    """A pulse of a valve, and the channels that have it."""
-
-    channels: str
-    pulse: Acting
-
-
 VALVES = (
-    Column("", Shared.CHANNEL, "", lambda row: row.channels, where="screen", kind=TEXT),
-    Column("on_time_s", "on-time commanded", "", lambda row: row.pulse.on_time, duration, "screen json"),
-    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda row: row.pulse.effective, duration, "screen json"),
-    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda row: row.pulse.impulse, lambda size: f"{size:.4g}",
-           "screen json"),
-    Column("centroid_s", "centroid after the start", "", lambda row: row.pulse.centroid, duration, "screen json"),
+    Column("", Shared.CHANNEL, "", lambda alike: ", ".join(pulse.channel.name for pulse in alike), where="screen",
+           kind=TEXT),
+    Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, "screen json"),
+    Column("effective_on_time_s", Shared.EFFECTIVE, "", lambda alike: alike[0].effective, duration, "screen json"),
+    Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), "screen json"),
+    Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, "screen json"),
 )  # fmt: skip
+"""Columns of pulses of valves that are alike."""
 
 
 def valve_table(spacecraft: Spacecraft) -> DataTable:
@@ -79,8 +71,7 @@ def valve_table(spacecraft: Spacecraft) -> DataTable:
     for pulse in capability.acting(spacecraft):
         figures = (float(f"{figure:.4g}") for figure in pulse[1:])
         alike.setdefault(tuple(figures), []).append(pulse)
-    rows = [ValveRow(", ".join(pulse.channel.name for pulse in pulses), pulses[0]) for pulses in alike.values()]
-    return DataTable("Valves", VALVES, rows)
+    return DataTable("Valves", VALVES, list(alike.values()))
 
 
 TURNS = (
@@ -89,7 +80,7 @@ TURNS = (
     Column("smallest_turn_width_s", "by a pulse of", "", lambda row: row.smallest_width, duration, "screen json"),
     Column("largest_turn_deg", "largest turn", "deg", angle_of("largest"), small_angle, "screen json"),
     Column("largest_turn_width_s", "by a pulse of", "", lambda row: row.largest_width, duration, "screen json"),
-)  # fmt: skip
+)
 
 
 def turn_table(spacecraft: Spacecraft) -> DataTable:
@@ -98,13 +89,12 @@ def turn_table(spacecraft: Spacecraft) -> DataTable:
 
 
 TANK = (
-    Column("used_kg", "used", "kg", lambda row: row[1], lambda used: f"{used:.4g}", "screen json"),
+    Column("used_kg", "used", "kg", lambda row: row[1], to_figures(4), "screen json"),
     Column("pressure_Pa", "pressure", "", lambda row: row[0].pressure_after(row[1]),
            lambda pressure: quantity(1e-5 * pressure, "bar"), "screen json"),
-    Column("thrust_factor", "", "", lambda row: row[0].thrust_factor(row[1]), where="json"),
-    Column("", "thrust", "%", lambda row: 100.0 * row[0].thrust_factor(row[1]), lambda share: f"{share:.4g}",
-           "screen"),
-    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), lambda isp: f"{isp:.4g}", "screen json"),
+    Column("thrust_factor", "thrust", "%", lambda row: row[0].thrust_factor(row[1]),
+           to_figures(4, 100.0), "screen json"),
+    Column("isp_s", "isp", "s", lambda row: row[0].isp_after(row[1]), to_figures(4), "screen json"),
 )  # fmt: skip
 
 
@@ -113,47 +103,27 @@ def tank_table(tank: Tank) -> DataTable:
     return DataTable("Tank", TANK, [(tank, share * tank.propellant) for share in (0.0, 0.5, 1.0)])
 
 
-def cold_text(spacecraft: Spacecraft) -> str:
-    """Effect of cold nozzles on the thrust; empty without."""
-    if spacecraft.cold is None:
-        return ""
-    levels = ", ".join(f"{100.0 * spacecraft.cold.factor(before):.4g}" for before in range(3))
-    return f"cold nozzles: the first pulses of a channel have {levels} % … of the thrust"
-
-
-class DisturbanceRow(NamedTuple):
-    """A disturbance, counted from 1, and its consequence."""
-
-    number: int
-    result: Consequence
-
-    @property
-    def name(self) -> str:
-        """Name in the file, or its number there."""
-        return self.result.disturbance.name or f"number {self.number}"
-
-
-def _reached(row: DisturbanceRow) -> list[dict[str, float]]:
-    return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.result.resonant]
-
-
-DISTURBANCES = (
-    Column("", "disturbance", "", lambda row: row.name, where="screen", kind=TEXT),
-    Column("name", "", "", lambda row: row.result.disturbance.name or None, where="json", kind=TEXT),
-    Column("", "effect", "", lambda row: "; ".join(_effects(row.result)), where="screen", kind=TEXT),
-    Column("precession_rad_s", "", "", lambda row: row.result.precession, where="json"),
-    Column("forced_tilt_deg", "", "", angle_of("result.tilt"), where="json"),
-    Column("beat_deg", "", "", angle_of("result.beat"), where="json"),
-    Column("beat_period_s", "", "", lambda row: row.result.beat_period, where="json"),
-    Column("reaches", "", "", _reached, where="json"),
-    Column("spin_rate_rad_s2", "", "", lambda row: row.result.spin_rate, where="json"),
-)
+def _reached(row: Consequence) -> list[dict[str, float]]:
+    return [{"nutation_deg": math.degrees(mark), "t_s": time} for mark, time in row.resonant]
 
 
 def disturbance_table(spacecraft: Spacecraft) -> DataTable:
     """The forced tilt, the beat, or the times to reach a cone at resonance."""
-    rows = enumerate(capability.consequences(spacecraft), start=1)
-    return DataTable("Disturbances", DISTURBANCES, [DisturbanceRow(*row) for row in rows])
+    rows = list(capability.consequences(spacecraft))
+    numbers = {id(row): number for number, row in enumerate(rows, start=1)}
+    columns = (
+        Column("", "disturbance", "", lambda row: row.disturbance.name or f"number {numbers[id(row)]}", where="screen",
+               kind=TEXT),
+        Column("name", "", "", lambda row: row.disturbance.name or None, where="json", kind=TEXT),
+        Column("", "effect", "", lambda row: "; ".join(_effects(row)), where="screen", kind=TEXT),
+        Column("precession_rad_s", "", "", lambda row: row.precession, where="json"),
+        Column("forced_tilt_deg", "", "", angle_of("tilt"), where="json"),
+        Column("beat_deg", "", "", angle_of("beat"), where="json"),
+        Column("beat_period_s", "", "", lambda row: row.beat_period, where="json"),
+        Column("reaches", "", "", _reached, where="json"),
+        Column("spin_rate_rad_s2", "", "", lambda row: row.spin_rate, where="json"),
+    )  # fmt: skip
+    return DataTable("Disturbances", columns, rows)
 
 
 def _effects(row: Consequence) -> Iterator[str]:
@@ -167,32 +137,25 @@ def _effects(row: Consequence) -> Iterator[str]:
         yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
 
 
-class ToleranceRow(NamedTuple):
-    """Inputs of one tolerance of one size, and the thrusters that it is given for."""
-
-    entry: DispersedInput
-    thrusters: tuple[str, ...]
-
-
 TOLERANCES = (
-    Column("", "dispersion", "", lambda row: in_words(row.entry.tolerance), where="screen", kind=TEXT),
-    Column("", "distribution", "", lambda row: row.entry.kind, where="screen", kind=TEXT),
-    Column("", "one sigma or bias", "", lambda row: size_text(row.entry), where="screen"),
-    Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row.thrusters), where="screen", kind=TEXT),
+    Column("", "dispersion", "", lambda row: in_words(row[0][0]), where="screen", kind=TEXT),
+    Column("", "distribution", "", lambda row: row[0][1], where="screen", kind=TEXT),
+    Column("", "one sigma or bias", "", lambda row: row[0][2], where="screen"),
+    Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row[1]), where="screen", kind=TEXT),
 )
+"""Columns of tolerances by their name, distribution and size, and the thrusters that they are given for."""
 
 
 def tolerance_table(spacecraft: Spacecraft) -> DataTable:
     """Differences allowed between true values and the file's; those of one size share a row."""
-    alike: dict[tuple[str, str, str], ToleranceRow] = {}
+    alike: dict[tuple[str, str, str], list[str]] = {}
     for entry in () if spacecraft.dispersions is None else reachable(spacecraft)[0]:
-        key, given = (entry.tolerance, entry.kind, size_text(entry)), getattr(spacecraft.dispersions, entry.tolerance)
-        row = alike.setdefault(key, ToleranceRow(entry, ()))
+        thrusters = alike.setdefault((entry.tolerance, entry.kind, size_text(entry)), [])
+        given = getattr(spacecraft.dispersions, entry.tolerance)
         rest = entry.name.partition(" ")[2]  # the thruster, and behind a blank the axis
         names = given if isinstance(given, Mapping) else ()
-        more = tuple(name for name in names if name in (rest, rest[:-2]) and name not in row.thrusters)
-        alike[key] = row._replace(thrusters=row.thrusters + more)
-    return DataTable("Dispersions", TOLERANCES, list(alike.values()))
+        thrusters += [name for name in names if name in (rest, rest[:-2]) and name not in thrusters]
+    return DataTable("Dispersions", TOLERANCES, list(alike.items()))
 
 
 def check_screen(spacecraft: Spacecraft, *, verbose: bool = True) -> RenderableType:
@@ -219,10 +182,8 @@ def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
     clock, dispersions = capability.sun_clock(spacecraft), spacecraft.dispersions
     if clock is not None and clock.refusal:
         yield clock.refusal
-    alike: dict[str, list[str]] = {}
-    for name, reason in () if dispersions is None else reachable(spacecraft)[1]:
-        alike.setdefault(reason, []).append(in_words(name))
-    yield from (f"dispersions without effect: {', '.join(names)}: {reason}" for reason, names in alike.items())
+    for names, reason in without_effect(() if dispersions is None else reachable(spacecraft)[1]):
+        yield f"dispersions without effect: {names}: {reason}"
     idle = [channel.name for channel in spacecraft.channels if not channel.damps]
     if idle:
         yield f"never fired for damping, more axial than transverse: {', '.join(idle)}"
@@ -235,7 +196,9 @@ def _remarks(spacecraft: Spacecraft, verbose: bool) -> Iterator[str]:
     else:
         miss = f"{abs(math.degrees(pair.miss)):.2f} deg off half a nutation turn"
         yield f"{spacing}; nearest channels: {pair.first.name} then {pair.second.name}, {miss}"
-    yield cold_text(spacecraft)
+    if spacecraft.cold is not None:
+        levels = ", ".join(f"{100.0 * spacecraft.cold.factor(before):.4g}" for before in range(3))
+        yield f"cold nozzles: the first pulses of a channel have {levels} % … of the thrust"
     if spacecraft.loop is not None:
         yield described(spacecraft.loop)
     pairs = () if dispersions is None else dispersions.correlation
@@ -261,28 +224,20 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     clock, sensor, commands = capability.sun_clock(spacecraft), spacecraft.sun_sensor, spacecraft.commands
     if clock is None or sensor is None:
         return
-    yield "Sun sensor", f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {_view(sensor)}"
+    low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
+    view = f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
+    yield "Sun sensor", f"at azimuth {degrees(sensor.azimuth)}, jitter {duration(sensor.jitter)}; {view}"
     first = clock.refusal if clock.first is None else f"the first at {moment(clock.first)}"
     yield "Sun pulses", f"one every {duration(clock.turn)} on average; {first}"
     if commands is not None:
-        spin = abs(spacecraft.spin)
-        step, longest = (
-            f"{duration(time)} = {degrees(spin * time)}" for time in (commands.delay_step, commands.delay_max)
-        )
+        delays, spin = (commands.delay_step, commands.delay_max), abs(spacecraft.spin)
+        step, longest = (f"{duration(time)} = {degrees(spin * time)}" for time in delays)
         yield "delay", f"in steps of {step} of spin, up to {longest}"
-        widths, step_of_widths = [duration(width) for width in commands.widths.tolist()], commands.width_step
-        steps = (
-            None if step_of_widths is None else f"in steps of {duration(step_of_widths)}, {widths[0]} to {widths[-1]}"
-        )
+        widths, stepped = [duration(width) for width in commands.widths.tolist()], commands.width_step
+        steps = "" if stepped is None else f"in steps of {duration(stepped)}, {widths[0]} to {widths[-1]}"
         yield "width", steps or listed(widths, "or")
         every = listed([str(count) for count in commands.every], "or")
         yield "block", f"at most {commands.max_count} pulses; every: {every} of the spins"
-
-
-def _view(sensor: SunSensor) -> str:
-    """Range of angles from the spin axis in which the sensor sees the Sun."""
-    low, high = (0.5 * math.pi - sensor.elevation + side * sensor.half_width for side in (-1.0, 1.0))
-    return f"sees the Sun from {degrees(max(low, 0.0))} to {degrees(min(high, math.pi))} off the spin axis"
 
 
 def _margins(spacecraft: Spacecraft) -> DataTable:
@@ -376,7 +331,7 @@ def _channels_json(spacecraft: Spacecraft) -> list[dict[str, Any]]:
     rows, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
     for row, channel in zip(rows, spacecraft.channels, strict=True):
         if channel.valve is not None:
-            own = [ValveRow(channel.name, pulse) for pulse in pulses if pulse.channel is channel]
+            own = [[pulse] for pulse in pulses if pulse.channel is channel]
             row["commands"] = DataTable("", VALVES, own).json()
     return rows
 

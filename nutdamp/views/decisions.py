@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -38,9 +38,7 @@ from nutdamp.views.text import (
     moment,
     most,
     note_json,
-    ordered,
     quantity,
-    screen_line,
 )
 
 if TYPE_CHECKING:
@@ -160,47 +158,36 @@ def _at_end(decision: Decision) -> str:
     return f"{'met' if nominal else 'NOT met'} with nominal values"
 
 
-class MarginRow(NamedTuple):
-    """A requirement, its limit, values with nominal values and in cases, margin, and whether it is ``met``, as text."""
-
-    name: str
-    limit: str
-    nominal: str
-    dispersed: str
-    margin: str
-    verdict: str
-    met: bool | None
-
-
 def decision_table(decision: Decision, values: str = Shared.NOMINAL) -> DataTable:
     """One row a part of the requirement, and one for the share of cases that comply; ``values`` heads the residuals."""
     cases = decision.cases
     level = "" if cases is None else f"({exact_percent(cases.probability)})"
     columns = (
-        Column("", "requirement", "", attrgetter("name"), where="screen", kind=TEXT),
-        Column("", "limit", "", attrgetter("limit"), where="screen"),
-        Column("", values, "", attrgetter("nominal"), where="screen"),
-        Column("", "dispersed", level, attrgetter("dispersed"), where="screen" * bool(level)),
-        Column("", "margin", "", attrgetter("margin"), where="screen"),
-        Column("", Shared.VERDICT, "", attrgetter("verdict"), where="screen", kind=TEXT, met=attrgetter("met")),
+        Column("", "requirement", "", itemgetter(0), where="screen", kind=TEXT),
+        Column("", "limit", "", itemgetter(1), where="screen"),
+        Column("", values, "", itemgetter(2), where="screen"),
+        Column("", "dispersed", level, itemgetter(3), where="screen" * bool(level)),
+        Column("", "margin", "", itemgetter(4), where="screen"),
+        Column("", Shared.VERDICT, "", itemgetter(5), where="screen", kind=TEXT, met=itemgetter(6)),
     )
     return DataTable("Requirement", columns, list(_margins(decision)))
 
 
-def _margins(decision: Decision) -> Iterator[MarginRow]:
+def _margins(decision: Decision) -> Iterator[tuple[str, str, str, str, str, str, bool | None]]:
+    """Requirement, limit, value with nominal values and in cases, margin and verdict as text; whether it is met."""
     cases = decision.cases
     for line in decision.lines:
         nominal, dispersed, margin = (size(line.bound, each) for each in (line.nominal, line.dispersed, line.margin))
-        yield MarginRow(line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met)
+        yield line.bound.part.label, limit(line.bound), nominal, dispersed, margin, _met(line), line.met
     for aspect in decision.aspects:
         for bound, angle, left in cone_margins(aspect):
             words = KEPT[left >= -SLACK] + " (nominal)" * (cases is not None)
             name = f"axis from {aspect.keep.name}"
-            yield MarginRow(name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK)
+            yield name, bound, degrees(angle), "", degrees(left), words, left >= -SLACK
     if cases is not None and cases.complying is not None:
         least, share = exact_percent(cases.probability), percent(cases.complying, cases.probability)
         margin = f"{100.0 * (cases.complying - cases.probability):.3g} points"
-        yield MarginRow(COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met)
+        yield COUNT, f"≥ {least}", "", share, margin, VERDICT[cases.met], cases.met
 
 
 def coloured(text: str, met: bool | None) -> Text:
@@ -240,23 +227,6 @@ def cost(decision: Decision) -> Iterator[tuple[str, str]]:
 def end_facts(decision: Decision) -> Table:
     """Final spin axis, H and spin, cost, and end time."""
     return facts([*end_rows(decision.flight, decision.aspects), *cost(decision)])
-
-
-def decision_screen(compared: Comparison, decision: Decision) -> list[RenderableType]:
-    """The decision as the top of a screen: plan and reason, verdict, margins, and final motion."""
-    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
-    return [
-        Text.assemble("Recommended: ", (decision.plan.scheme, "bold"), f" – {why}."),
-        statement(decision),
-        *map(screen_line, ordered([*warnings, *decision_notes(decision), *alternatives(compared)])),
-        *figures(decision),
-    ]
-
-
-def requirement(decision: Decision) -> Iterator[Text]:
-    """The verdict as a line of a screen, and its notes."""
-    yield statement(decision)
-    yield from map(screen_line, ordered(decision_notes(decision)))
 
 
 def figures(decision: Decision) -> list[RenderableType]:
@@ -306,11 +276,6 @@ RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
     """Head of the JSON of every command: the version, and the spacecraft."""
     return {"nutdamp": __version__, "spacecraft": spacecraft_json(spacecraft)}
-
-
-def infeasible_json(spacecraft: Spacecraft, why: str) -> dict[str, Any]:
-    """The JSON of any command where nothing requested is feasible."""
-    return {**heading(spacecraft), "feasible": False, "why": why}
 
 
 def comparison_json(compared: Comparison) -> dict[str, Any]:

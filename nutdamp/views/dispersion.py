@@ -9,13 +9,12 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.files.export import OUTPUT_COLUMNS
 from nutdamp.flight.end_state import aspects
 from nutdamp.flight.propagation import IDEAL_IMPULSES, Flight, model_name
 from nutdamp.montecarlo.statistics import OUTPUTS, Array, Distribution, cases_to_show
@@ -23,21 +22,11 @@ from nutdamp.montecarlo.study import CONFIDENCE, Results, Study
 from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
-from nutdamp.views import decisions
-from nutdamp.views.decisions import end_rows, final_json, heading, target_json
+from nutdamp.views import decisions, tolerances
 from nutdamp.views.spacecraft import bounds_text, requested
 from nutdamp.views.summary import summary
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures
 from nutdamp.views.text import degrees, digits
-from nutdamp.views.tolerances import (
-    budgeted_outputs,
-    correlation_json,
-    in_words,
-    inputs_table,
-    main_causes,
-    tolerance_budget,
-    unused_table,
-)
 
 if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopResults
@@ -50,12 +39,33 @@ LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "9
 BOTH = "screen full"
 """The default screen, and that of all values."""
 
-NAMES = (
-    *((part.label, "deg", 1.0) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
-    ("spin change", "mrad/s", 1e3),
-    ("propellant", "g", 1e3),
+
+class StudyOutput(NamedTuple):
+    """An output of a study: its ``key`` in files, its heading and unit for people, and the factor to that unit."""
+
+    name: str
+    key: str
+    heading: str
+    unit: str = "deg"
+    scale: float = 1.0
+
+    @property
+    def shown_unit(self) -> tuple[str, float]:
+        """Unit of screens, and the factor to it."""
+        return screen_unit(self.unit, self.scale)
+
+    @property
+    def label(self) -> str:
+        """Heading and unit."""
+        return f"{self.heading}, {self.shown_unit[0]}" if self.unit else self.heading
+
+
+FLOWN_OUTPUTS = (
+    *(StudyOutput(part.value, f"{part.value}_deg", part.label) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
+    StudyOutput("spin_change", "spin_change_rad_s", "spin change", "mrad/s", 1e3),
+    StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
 )
-"""Names of `OUTPUTS` for people, their units, and the factors to these from the units of files."""
+"""The outputs of a schedule, in the order of `OUTPUTS`."""
 
 NOTHING = 1e-9
 """Values, in these units, below which a number is rounding."""
@@ -67,11 +77,11 @@ EMPTY = "the pulses take more propellant than there is, so that the last ones do
 def dispersion_brief(results: Results, *, scheme: str) -> RenderableType:
     """The default screen of ``disperse``: verdict, percentiles, what counts most, and the worst case."""
     head = [_title(results, scheme), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    notes, case = list(main_causes(results)), ""
+    notes, case = list(tolerances.main_causes(results)), ""
     if _varies(results):
         case = f" · {_again(results)} (worst)"
     if unused := results.study.model.inputs.unused:
-        notes.append(f"Dispersions without effect: {', '.join(in_words(entry.name) for entry in unused)}.")
+        notes.append(f"Dispersions without effect: {', '.join(tolerances.in_words(entry.name) for entry in unused)}.")
     return summary(head, lambda **_: _percentiles(results).screen("screen"), notes, f"--plot cases.png{case}")
 
 
@@ -83,17 +93,14 @@ def dispersion_screen(results: Results, *, scheme: str, worst: int, nominal: Fli
     if not results.exact:
         parts.append(Text("Percentiles are right to 0.006 % of their value; nominal and max are exact.", style="dim"))
     if nominal is not None:
-        parts += [Text(), Text("Nominal case", style="bold"), facts(end_rows(nominal, aspects(nominal)))]
+        parts += [Text(), Text("Nominal case", style="bold"), facts(decisions.end_rows(nominal, aspects(nominal)))]
     parts += [Text(), *requirement_lines(results), *cone_lines(results), *_emptied(results)]
-    parts += [Text(), *tolerance_budget(results)]
+    parts += [Text(), *tolerances.tolerance_budget(results)]
     if worst and _varies(results):
         cases = _cases(results.study, _worst(results, worst))
         parts += [Text(), Text(cases.title, "bold"), cases.screen("full")]
         parts.append(Text(f"Inspect one: nutdamp disperse, as here, with {_again(results)}", "dim"))
-    unused = results.study.model.inputs.unused
-    if unused:
-        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(unused)]
-    return Group(*parts)
+    return Group(*parts, *tolerances.unused_table(results.study.model.inputs.unused))
 
 
 def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, Any]:
@@ -106,25 +113,25 @@ def dispersion_json(results: Results, *, scheme: str, worst: int) -> dict[str, A
     study, body = results.study, results.study.model.spacecraft
     nominal = study.outputs_of({}).tolist()
     return {
-        **heading(body),
+        **decisions.heading(body),
         "scheme": scheme,
         "samples": results.done,
         "requested": results.requested,
         "interrupted": results.done < results.requested,
         "seed": study.seed,
         "redrawn": results.redrawn,
-        "final": final_json(study.nominal),
-        "target": target_json(body),
+        "final": decisions.final_json(study.nominal),
+        "target": decisions.target_json(body),
         "exact_percentiles": results.exact,
         "percentiles": {
-            column: percentiles_json(column, value, results.distribution(output))
-            for column, value, output in zip(OUTPUT_COLUMNS, nominal, OUTPUTS, strict=True)
+            output.key: percentiles_json(output.key, value, results.distribution(output.name))
+            for output, value in zip(FLOWN_OUTPUTS, nominal, strict=True)
         },
         "requirement": requirement_of(results),
         **cones_json(results),
         **({"tank_empty_fraction": results.emptied / results.done} if body.tank else {}),
         "shares": list(_shares(results)),
-        **correlation_json(body),
+        **tolerances.correlation_json(body),
         "unused": [entry.name for entry in study.model.inputs.unused],
         "unused_because": {entry.name: entry.reason for entry in study.model.inputs.unused},
         "worst": _worst(results, worst),
@@ -174,22 +181,18 @@ def percentiles_json(
     return {name: None if value is None else shown(column, value) for name, value in values}
 
 
-def _names() -> Iterator[tuple[str, str, float]]:
-    """`NAMES` in the units of screens."""
-    return ((name, *screen_unit(unit, scale)) for name, unit, scale in NAMES)
-
-
 def _percentiles(results: Results) -> DataTable:
     """One row an output: values by shares of the cases; where any are negative, lower ones in a row of their own."""
     rows = []
     nominal = results.study.outputs_of({}).tolist()
-    for output, column, (name, unit, scale), plan in zip(OUTPUTS, OUTPUT_COLUMNS, _names(), nominal, strict=True):
-        distribution, signs = results.distribution(output), [""]
+    for output, plan in zip(FLOWN_OUTPUTS, nominal, strict=True):
+        distribution, signs = results.distribution(output.name), [""]
+        unit, scale = output.shown_unit
         if distribution is not None and distribution.minimum < 0.0:
             signs = [" ≤", " ≥"] if distribution.maximum > 0.0 else [" ≥"]
         for sign in signs:
-            given = percentiles_json(column, plan, distribution, lower=sign == " ≥")
-            row = percentile_row(f"{name}{sign}, {unit}", scale, given, lower=sign == " ≥")
+            given = percentiles_json(output.key, plan, distribution, lower=sign == " ≥")
+            row = percentile_row(f"{output.heading}{sign}, {unit}", scale, given, lower=sign == " ≥")
             if distribution is not None:  # the nominal value has digits of its own: other places show it alone
                 plain = scale * (given["nominal"] or 0.0)
                 row["nominal"] = "0" if abs(plain) < NOTHING else digits(plain, 4)
@@ -329,7 +332,7 @@ def case_json(study: Study, case: int, draws: Mapping[str, float]) -> dict[str, 
     return {
         "case": case + 1,
         "inputs": {entry.name: entry.nominal + draws.get(entry.name, 0.0) for entry in study.model.inputs.drawn},
-        **{column: shown(column, value) for column, value in zip(OUTPUT_COLUMNS, outputs, strict=True)},
+        **{output.key: shown(output.key, value) for output, value in zip(FLOWN_OUTPUTS, outputs, strict=True)},
         **({} if aspects is None else angles_json(study.model.spacecraft, aspects[:, :, 0])),
     }
 
@@ -342,42 +345,44 @@ def _cases(study: Study, rows: Sequence[Mapping[str, Any]]) -> DataTable:
 def _case_columns(study: Study, rows: Sequence[Mapping[str, Any]]) -> Iterator[Column]:
     yield Column("", Shared.CASE, "", itemgetter("case"), where="full", kind=WHOLE)
     yield Column("", "", "", lambda row: Shared.THIS_CASE if row["case"] else Shared.NOMINAL, where="case", kind=TEXT)
-    for key, (name, unit, scale) in zip(OUTPUT_COLUMNS, _names(), strict=True):
-        largest = max((scale * abs(row[key]) for row in rows), default=0.0)
-        yield Column("", name, unit, _known(key, scale), partial(beside, largest=largest), "case")
-        if unit == "deg":
-            yield Column("", name, unit, itemgetter(key), _four, "full")
+    for output in FLOWN_OUTPUTS:
+        yield case_column(output, partial(_known, output.key), rows)
+        if output.unit == "deg":
+            yield Column("", output.heading, "deg", itemgetter(output.key), to_figures(4), "full")
     for at, cone in enumerate(study.model.spacecraft.keep):
         for which in ("least", "largest"):
-            where = "full case" if which in _bounded(cone) else "case"
-            yield Column("", f"{which} from {cone.name}", "deg", _angle(at, which), _four, where)
-    yield Column("", "largest contributors, in sigmas", "", _contributors(study), where="full", kind=TEXT)
+            where = "full case" if which in bounded(cone) else "case"
+            yield Column("", f"{which} from {cone.name}", "deg", partial(_angle, at, which), to_figures(4), where)
+    contributors = partial(_contributors, study)
+    yield Column("", "largest contributors, in sigmas", "", contributors, where="full", kind=TEXT)
 
 
-def _known(key: str, scale: float) -> Callable[[Mapping[str, Any]], float | None]:
-    return lambda row: None if math.isnan(row[key]) else scale * row[key]
+def case_column(output: StudyOutput, value: Callable[[Any], float | None], rows: Sequence[Any]) -> Column:
+    """An output of few cases beside each other, to the digits of the largest; numbers without a unit are whole."""
+    unit, factor = output.shown_unit
+    largest = max((abs(factor * known) for row in rows if (known := value(row)) is not None), default=0.0)
+
+    def text(known: float) -> str:
+        return beside(factor * known, largest) if output.unit else f"{known:.0f}"
+
+    return Column("", output.heading, unit, value, text, "case")
 
 
-def _angle(cone: int, which: str) -> Callable[[Mapping[str, Any]], float]:
-    return lambda row: float(row["aspects"][cone][f"{which}_deg"])
+def _known(key: str, row: Mapping[str, Any]) -> float | None:
+    return None if math.isnan(row[key]) else row[key]
 
 
-def _four(value: float) -> str:
-    return f"{value:.4g}"
+def _angle(cone: int, which: str, row: Mapping[str, Any]) -> float:
+    return float(row["aspects"][cone][f"{which}_deg"])
 
 
-def _contributors(study: Study) -> Callable[[Mapping[str, Any]], str]:
+def _contributors(study: Study, row: Mapping[str, Any]) -> str:
     """The three inputs that count most in a case, by name and size in sigmas."""
     inputs = study.model.inputs.drawn
-    outputs = [output for output, _ in budgeted_outputs(study)]
-
-    def text(row: Mapping[str, Any]) -> str:
-        effects = np.hypot(*(study.first_order.effects(output) for output in outputs))
-        sigmas = [(row["inputs"][entry.name] - entry.nominal) / (entry.sigma or math.inf) for entry in inputs]
-        order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3].tolist()
-        return ", ".join(f"{in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
-
-    return text
+    effects = np.hypot(*(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study)))
+    sigmas = [(row["inputs"][entry.name] - entry.nominal) / (entry.sigma or math.inf) for entry in inputs]
+    order = np.argsort(-np.abs(effects * sigmas), kind="stable")[:3].tolist()
+    return ", ".join(f"{tolerances.in_words(inputs[at].name)} {sigmas[at]:+.1f}" for at in order if sigmas[at])
 
 
 def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str) -> RenderableType:
@@ -385,21 +390,13 @@ def case_screen(study: Study, case: int, draws: dict[str, float], *, scheme: str
     outcome = _cases(study, [case_json(study, -1, {}), case_json(study, case, draws)])
     empty = [Text(f"Tank empty too soon: {EMPTY}.", "red")] * bool(study.ends_of(draws).drained > 1.0)
     title = Text.assemble((study.model.spacecraft.name, "bold"), f": {scheme}, seed {study.seed}, case {case + 1}")
-    inputs = inputs_table(study.model.inputs.drawn, draws)
+    inputs = tolerances.inputs_table(study.model.inputs.drawn, draws)
     return Group(title, Text(), inputs, Text(), outcome.transposed("case"), *empty)
 
 
-def _bounded(keep: Keep) -> list[str]:
+def bounded(keep: Keep) -> list[str]:
     """Bounded ones of the angles to the direction of a cone: the least, the largest."""
     return ["least"] * (keep.least > 0.0) + ["largest"] * (keep.most < math.pi)
-
-
-def angle_rows(keep: Sequence[Keep], flights: Sequence[Array]) -> Iterator[tuple[str, ...]]:
-    """Two rows for each cone: the least and the largest angle from its direction in each of ``flights``, (m, 2) rad."""
-    for index, cone in enumerate(keep):
-        for row, which in enumerate(("least", "largest")):
-            cells = (f"{math.degrees(angles[index, row]):.4g}" for angles in flights)
-            yield f"{which} from {cone.name}, deg", *cells
 
 
 def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:

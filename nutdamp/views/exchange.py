@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from nutdamp.errors import BadRequest, Unsuitable
 
 if TYPE_CHECKING:
     from nutdamp.common.results import Note
-    from nutdamp.common.time import Epoch
-    from nutdamp.files.ccsds.message import Message
     from nutdamp.flight.propagation import Flight
     from nutdamp.planning.plan import Plan
 
@@ -36,7 +32,7 @@ class Request(NamedTuple):
 
 
 class Format(NamedTuple):
-    """A format: its ``name``, a ``summary`` for help pages, the function that gives the text.
+    """A format: its ``name``, and a ``summary`` for help pages.
 
     ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
     frame of the attitude. ``needs_orbit``: incomplete without one. ``nutates``: as symmetric bodies do.
@@ -44,7 +40,6 @@ class Format(NamedTuple):
 
     name: str
     summary: str
-    text: Callable[[Request], str]
     message: bool = False
     track: bool = False
     dated: bool = False
@@ -52,88 +47,57 @@ class Format(NamedTuple):
     nutates: bool = False
 
 
-def _json(request: Request) -> str:
-    from nutdamp.files.tabular import json_text
-    from nutdamp.planning.decision import compare_plans
-    from nutdamp.views.decisions import comparison_json
-
-    return json_text(comparison_json(compare_plans((request.plan,))))
-
-
-def _basilisk(request: Request) -> str:
-    from nutdamp.files.export import basilisk_script
-
-    return basilisk_script(request.plan)
-
-
-def _spin_table(request: Request) -> str:
-    from nutdamp.views.simulation import spin_table
-
+def _text(form: str, request: Request) -> str:
+    """The text of a plan in the format ``form``."""
     plan, until = request.plan, request.until
-    return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
+    if form == "json":
+        from nutdamp.files.tabular import json_text
+        from nutdamp.planning.decision import compare_plans
+        from nutdamp.views.decisions import comparison_json
+
+        return json_text(comparison_json(compare_plans((plan,))))
+    if form == "spin-table":
+        from nutdamp.views.simulation import spin_table
+
+        return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
+    if FORMATS[form].message:
+        return _message(form, request)
+    from nutdamp.files.export import basilisk_script, reference, stk_attitude
+
+    if form == "basilisk":
+        return basilisk_script(plan)
+    return stk_attitude(request.flight(), request.end(), reference(plan.spacecraft))
 
 
-def _stk(request: Request) -> str:
-    from nutdamp.files.export import reference, stk_attitude
-
-    return stk_attitude(request.flight(), request.end(), reference(request.plan.spacecraft))
-
-
-def _apm(request: Request) -> str:
-    from nutdamp.files.ccsds.write import apm
-    from nutdamp.files.export import reference
-
-    return _notation(request, apm(request.plan, reference(request.plan.spacecraft), _now()))
-
-
-def _opm(request: Request) -> str:
-    from nutdamp.files.ccsds.write import opm
-    from nutdamp.files.export import reference
-
-    return _notation(request, opm(request.plan, reference(request.plan.spacecraft), _now()))
-
-
-def _aem(request: Request, *, spin: bool = False) -> str:
-    from nutdamp.files.ccsds.message import QUATERNION_ANGVEL, SPIN_NUTATION_MOM
-    from nutdamp.files.ccsds.write import aem
-    from nutdamp.files.export import reference
-
-    place, kind = reference(request.plan.spacecraft), SPIN_NUTATION_MOM if spin else QUATERNION_ANGVEL
-    return _notation(request, aem(request.plan, request.flight(), request.end(), place, _now(), kind))
-
-
-def _notation(request: Request, message: Message) -> str:
-    from nutdamp.files.ccsds.message import to_kvn, to_xml
-
-    return to_xml(message) if request.xml else to_kvn(message)
-
-
-def _now() -> Epoch:
-    """Date of creation of a message, to the second."""
+def _message(kind: str, request: Request) -> str:
+    """A CCSDS message, created now to the second."""
     from nutdamp.common.time import Epoch
+    from nutdamp.files.ccsds import message, write
+    from nutdamp.files.export import reference
 
-    return Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    plan, place = request.plan, reference(request.plan.spacecraft)
+    now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    if kind == "apm":
+        written = write.apm(plan, place, now)
+    elif kind == "opm":
+        written = write.opm(plan, place, now)
+    else:
+        form = message.SPIN_NUTATION_MOM if kind == "aem-spin" else message.QUATERNION_ANGVEL
+        written = write.aem(plan, request.flight(), request.end(), place, now, form)
+    return message.to_xml(written) if request.xml else message.to_kvn(written)
 
 
 FORMATS = {
     row.name: row
     for row in (
-        Format("apm", "state and pulses (CCSDS)", _apm, message=True, dated=True),
-        Format("aem", "attitude history (CCSDS) as quaternions", _aem, message=True, track=True, dated=True),
-        Format(
-            "aem-spin",
-            "as spin, nutation and momentum",
-            partial(_aem, spin=True),
-            message=True,
-            track=True,
-            dated=True,
-            nutates=True,
-        ),
-        Format("opm", "velocity change of each pulse (CCSDS)", _opm, message=True, dated=True, needs_orbit=True),
-        Format("stk", "attitude history as .a", _stk, track=True, dated=True),
-        Format("spin-table", "CSV, one row a spin", _spin_table, track=True),
-        Format("basilisk", "a script that flies the schedule", _basilisk),
-        Format("json", "as `plan --json`", _json),
+        Format("apm", "state and pulses (CCSDS)", message=True, dated=True),
+        Format("aem", "attitude history (CCSDS) as quaternions", message=True, track=True, dated=True),
+        Format("aem-spin", "as spin, nutation and momentum", message=True, track=True, dated=True, nutates=True),
+        Format("opm", "velocity change of each pulse (CCSDS)", message=True, dated=True, needs_orbit=True),
+        Format("stk", "attitude history as .a", track=True, dated=True),
+        Format("spin-table", "CSV, one row a spin", track=True),
+        Format("basilisk", "a script that flies the schedule"),
+        Format("json", "as `plan --json`"),
     )
 }
 """Formats by name."""
@@ -167,7 +131,7 @@ def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None
         if plan.spacecraft.utc(last) is None:
             cure = "an earlier --until" if row.track else "a shorter horizon"
             raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
-    return row.text(request)
+    return _text(form, request)
 
 
 def export_notes(plan: Plan, form: str) -> list[Note]:

@@ -19,21 +19,7 @@ from nutdamp.files.keys import SpacecraftFile
 from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
 from nutdamp.views import guide
-from nutdamp.views.guide import (
-    FILE,
-    MOTION,
-    PAGES,
-    SCHEMES,
-    SOURCES,
-    Block,
-    CommandHelp,
-    Formula,
-    Topic,
-    TopicPart,
-    TopicRows,
-    meant,
-    page,
-)
+from nutdamp.views.guide import Block, CommandHelp, Formula, Topic, TopicPart, TopicRows
 
 
 def _notes() -> Iterator[tuple[str, str]]:
@@ -44,10 +30,10 @@ def _notes() -> Iterator[tuple[str, str]]:
 
 
 WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
-    ("glossary", lambda: page("glossary").rows),
-    ("column of CSV", lambda: page("csv").rows),
-    ("name in JSON", lambda: page("json").rows),
-    ("symbol", lambda: page("symbols").rows),
+    ("glossary", lambda: guide.page("glossary").rows),
+    ("column of CSV", lambda: guide.page("csv").rows),
+    ("name in JSON", lambda: guide.page("json").rows),
+    ("symbol", lambda: guide.page("symbols").rows),
     ("note", _notes),
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
@@ -67,23 +53,32 @@ def explained(requested: str) -> Topic:
     Raises BadRequest, which names a near one, where there is nothing.
     """
     name, _, below = requested.partition(".")
-    if name.casefold() == FILE:
+    if name.casefold() == guide.FILE:
         return file_topic(below)
-    texts, topic, keys = list(_texts(requested)), _known(requested), _keys(requested)
+    try:
+        topic = guide.found(requested)
+    except BadRequest:
+        topic = None
+    wanted = _folded(requested)
+    keys = [key for key in _plain_keys() if wanted in (_folded(key.name), _folded(key.path))]
+    texts = list(_texts(requested))
     if topic is None and not texts:
         if not keys:
-            return next(_sections(requested), None) or _missing(requested)
+            if (section := next(_sections(wanted), None)) is not None:
+                return section
+            if re.fullmatch(r"[mk(]*[0-9]+\)?", requested.casefold()):
+                return guide.found(requested)  # raises, and says which equations there are
+            near = guide.meant(nearest(wanted, guide.NAMES) or wanted, tuple(names()))
+            raise BadRequest(f"there is no topic {requested!r}; {near}")
         if len(keys) == 1:
             return file_topic(keys[0].path)
-    summary = "keys of the spacecraft file"
-    if topic is not None:
-        summary = topic.summary
-    elif texts:
+    summary = "keys of the spacecraft file" if topic is None else topic.summary
+    if topic is None and texts:
         (_, summary), *texts = texts
     parts = [TopicPart("", (TopicRows(tuple(texts)),))] if texts else []
     parts += [] if topic is None else topic.parts
     if keys:
-        rows = tuple((f"{FILE}.{key.path}", key.field.description) for key in keys)
+        rows = tuple((f"{guide.FILE}.{key.path}", key.field.description) for key in keys)
         parts.append(TopicPart("In the spacecraft file", (TopicRows(rows),)))
     return Topic(requested if topic is None else topic.name, summary, tuple(parts))
 
@@ -138,37 +133,14 @@ def _plain_keys() -> Iterator[KeyGuide]:
     return (key for key in keys() if not key.parent.startswith("dispersions."))
 
 
-def _keys(requested: str) -> list[KeyGuide]:
-    """Keys of the file of that name, or of that path."""
-    wanted = _folded(requested)
-    return [key for key in _plain_keys() if wanted in (_folded(key.name), _folded(key.path))]
-
-
-def _known(requested: str) -> Topic | None:
-    """The page, topic or equation of that name."""
-    try:
-        return guide.found(requested)
-    except BadRequest:
-        return None
-
-
-def _sections(requested: str) -> Iterator[Topic]:
-    """Sections of pages of that title, or whose title begins so."""
-    wanted = _folded(requested)
+def _sections(wanted: str) -> Iterator[Topic]:
+    """Sections of pages of that title, folded, or whose title begins so."""
     for begins in (False, True):
         for name in guide.NAMES:
-            for part in guide.found(name).parts if name not in (FILE, guide.OVERVIEW) else ():
+            for part in guide.found(name).parts if name not in (guide.FILE, guide.OVERVIEW) else ():
                 title = _folded(part.title)
                 if title == wanted or (begins and len(wanted) > 3 and title.startswith(wanted)):
                     yield Topic(part.title, f"in explain {name}", (TopicPart("", part.blocks),))
-
-
-def _missing(requested: str) -> Topic:
-    """Raise BadRequest: there is no topic of that name."""
-    if re.fullmatch(r"[mk(]*[0-9]+\)?", requested.casefold()):
-        return guide.found(requested)  # raises, and says which equations there are
-    close = nearest(_folded(requested), guide.NAMES)
-    raise BadRequest(f"there is no topic {requested!r}; {guide.meant(close or _folded(requested), tuple(names()))}")
 
 
 class KeyGuide(NamedTuple):
@@ -194,23 +166,19 @@ class KeyGuide(NamedTuple):
     @property
     def row(self) -> tuple[str, str]:
         """The key, and its description, unit, default and example."""
-        example = next(iter(self.field.examples), None)
-        facts = [self._unit(), self._default(), "" if example is None else f"example: {flow(example)}"]
-        return self.name, "\n".join([self.field.description, "; ".join(fact for fact in facts if fact)])
-
-    def _unit(self) -> str:
+        unit, default, example = "", "", next(iter(self.field.examples), None)
         if self.section is ToleranceSection:
             names = [unit for kind in unit_kinds(QUANTITIES[self.name]) for unit in KINDS[kind].factors]
-            return f"unit {listed([*dict.fromkeys(names)], 'or')}"
-        return "" if self.section is not None else _what(self.field)
-
-    def _default(self) -> str:
-        if self.field.default is fields.REQUIRED:
-            return "required"
-        if "default" in self.field.description.casefold():
-            return ""
+            unit = f"unit {listed([*dict.fromkeys(names)], 'or')}"
+        elif self.section is None:
+            unit = _what(self.field)
         value = self.field.default
-        return "default none" if value is None or value == [] else f"default {value:g}"
+        if value is fields.REQUIRED:
+            default = "required"
+        elif "default" not in self.field.description.casefold():
+            default = "default none" if value is None or value == [] else f"default {value:g}"
+        facts = [unit, default, "" if example is None else f"example: {flow(example)}"]
+        return self.name, "\n".join([self.field.description, "; ".join(filter(None, facts))])
 
 
 def keys(model: type[Section] = SpacecraftFile, prefix: str = "") -> Iterator[KeyGuide]:
@@ -233,12 +201,15 @@ def file_topic(below: str = "") -> Topic:
         parts = [TopicPart("", (INTRODUCTION, TopicRows(tuple(key.row for key in roots))))]
         for key in roots:
             parts += _key_sections(key, every)
-        return Topic(FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
+        return Topic(guide.FILE, SpacecraftFile.__doc__ or "", (*parts, _SEE))
     requested = next((key for key in every if key.path == below), None)
     if requested is None:
-        raise BadRequest(f"the spacecraft file has no key {below!r}; {_near(below)}")
+        paths = tuple(f"{guide.FILE}.{key.path}" for key in _plain_keys())
+        same = (path for path in paths if path.rpartition(".")[2] == below.rpartition(".")[2])
+        near = guide.meant(next(same, f"{guide.FILE}.{below}"), paths, "nutdamp explain file")
+        raise BadRequest(f"the spacecraft file has no key {below!r}; {near}")
     return Topic(
-        f"{FILE}.{below}",
+        f"{guide.FILE}.{below}",
         "a key of the spacecraft file",
         (TopicPart("", (TopicRows((requested.row,)),)), *_key_sections(requested, every), _SEE),
     )
@@ -268,13 +239,6 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
         return
     for child in below:
         yield from _key_sections(child, every)
-
-
-def _near(below: str) -> str:
-    """A key of the same name elsewhere, or one that is spelt alike."""
-    paths = tuple(f"{FILE}.{key.path}" for key in _plain_keys())
-    same = (path for path in paths if path.rpartition(".")[2] == below.rpartition(".")[2])
-    return meant(next(same, f"{FILE}.{below}"), paths, "nutdamp explain file")
 
 
 def _what(field: fields.Key) -> str:
@@ -314,7 +278,6 @@ def flow(value: object) -> str:
 WIDEST = 100
 """Largest width of a text in columns: longer lines are hard to read."""
 
-
 NARROW = 60
 """Columns below which names are above their texts, and not beside them."""
 
@@ -322,12 +285,12 @@ NARROW = 60
 def topics_screen() -> RenderableType:
     """All pages with a line about each, and what else can be asked for."""
     parts: list[RenderableType] = [Text("The guide: nutdamp explain TOPIC")]
-    for group, names in PAGES:
-        rows = tuple((name, page(name).summary) for name in names)
+    for group, names in guide.PAGES:
+        rows = tuple((name, guide.page(name).summary) for name in names)
         parts += [Text(group, style="bold"), Padding(_Pairs(rows), (0, 0, 0, 2))]
     others = (
-        ("Schemes", ", ".join(topic.name for topic in SCHEMES)),
-        ("Motion", ", ".join(topic.name for topic in MOTION)),
+        ("Schemes", ", ".join(topic.name for topic in guide.SCHEMES)),
+        ("Motion", ", ".join(topic.name for topic in guide.MOTION)),
         ("Equations", "17, K7, 24.4"),
         ("Words", "any heading, column, name in JSON, symbol or key: explain tilt"),
     )
@@ -356,7 +319,7 @@ def equations_screen() -> RenderableType:
     """Every numbered equation: its subject, its place in the code, its differences from the print."""
     rows = [(entry.number, "\n".join([f"{entry.subject}: {entry.place}", *entry.remarks])) for entry in guide.EQUATIONS]
     hint = Text("Formula, symbols and units of one: nutdamp explain 17, explain K7, explain 24.4")
-    return Constrain(Group(*(Text(source) for source in SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
+    return Constrain(Group(*(Text(source) for source in guide.SOURCES), hint, Text(), _Pairs(tuple(rows))), WIDEST)
 
 
 def _block(block: Block) -> RenderableType:
@@ -396,18 +359,11 @@ class _Typed:
         self.commands = commands
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        for parts in self.commands.lines:
-            for line in _broken(parts, options.max_width - 2):
-                yield Padding(Text(line, overflow="fold"), (0, 0, 0, 2))
-
-
-def _broken(parts: tuple[str, ...], width: int) -> Iterator[str]:
-    """The ``parts`` of a command in lines of up to ``width`` characters; longer parts have a line each."""
-    line = ""
-    for part in parts:
-        if line and len(line) + len(part) + 3 > width:
-            yield f"{line} \\"
-            line = f"  {part}"
-        else:
-            line = f"{line} {part}" if line else part
-    yield line
+        for first, *parts in self.commands.lines:
+            lines = [first]
+            for part in parts:
+                if len(lines[-1]) + len(part) + 3 > options.max_width - 2:
+                    lines[-1:] = [f"{lines[-1]} \\", f"  {part}"]
+                else:
+                    lines[-1] += f" {part}"
+            yield Padding(Text("\n".join(lines), overflow="fold"), (0, 0, 0, 2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -17,7 +17,7 @@ from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
 from nutdamp.views.summary import opening, summary
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 
 FAR = 4.0
@@ -76,7 +76,7 @@ ESTIMATES = (
     Column("", "quantity", "", lambda row: row.label, where="screen", kind=TEXT),
     Column("value", "", "", lambda row: row.value * row.factor, where="json"),
     Column("", "value", "", _value, where="screen"),
-    Column("", "sigma", "", lambda row: _scaled("sigma", row), lambda sigma: f"{sigma:.2g}", "screen"),
+    Column("", "sigma", "", lambda row: _scaled("sigma", row), to_figures(2), "screen"),
     Column("sigma", "", "", lambda row: row.sigma * row.factor, where="json"),
     Column("unit", "unit", "", lambda row: _unit(row)[0], where="screen json", kind=TEXT),
     Column("file", "", "", lambda row: _scaled("file", row), where="json"),
@@ -92,92 +92,76 @@ def estimate_table(rows: Sequence[Estimate]) -> DataTable:
     return DataTable("Estimates", ESTIMATES, rows)
 
 
-class SignalRow(NamedTuple):
-    """A signal of a record, counted from 0."""
-
-    fit: Fit
-    at: int
-    name: str
-
-    @property
-    def outliers(self) -> int:
-        """Samples left out."""
-        return int(((self.fit.model.signal == self.at) & ~self.fit.used).sum())
-
-    @property
-    def verdict(self) -> str:
-        """Result of the residual test."""
-        if not self.fit.resolved[self.at]:
-            return "limited by resolution"
-        return "white" if self.fit.white(self.at) else "NOT white, sigmas too small"
-
-
-SIGNALS = (
-    Column("signal", "signal", "", lambda row: row.name, where="screen json", kind=TEXT),
-    Column("samples", "samples", "", lambda row: int((row.fit.model.signal == row.at).sum()), where="screen json",
-           kind=WHOLE),
-    Column("outliers", "outliers", "", lambda row: row.outliers, where="screen json", kind=WHOLE),
-    Column("noise_SI", "", "", lambda row: float(row.fit.noise[row.at]), where="json"),
-    Column("", "noise", "", lambda row: float(row.fit.noise[row.at]) * in_shown(row.name)[1],
-           lambda noise: f"{noise:.3g}", "screen"),
-    Column("", "unit", "", lambda row: in_shown(row.name)[0], where="screen", kind=TEXT),
-    Column("white", "", "", lambda row: row.fit.white(row.at), where="json", kind=YES_NO),
-    Column("", "residuals", "", lambda row: row.verdict, where="screen", kind=TEXT),
-)  # fmt: skip
-
-
 def signal_table(fit: Fit) -> DataTable:
-    """The signals of the record, with the test of their residuals."""
-    return DataTable("Signals", SIGNALS, [SignalRow(fit, at, name) for at, name in enumerate(fit.model.signals)])
+    """The signals of the record, counted from 0, with the test of their residuals."""
+    of_signal = [fit.model.signal == at for at in range(len(fit.model.signals))]
 
+    def verdict(at: int) -> str:
+        if not fit.resolved[at]:
+            return "limited by resolution"
+        return "white" if fit.white(at) else "NOT white, sigmas too small"
 
-def _probe(row: Prospect) -> str | None:
-    return f"{row.probe}, {row.on_time:.3g} s" if row.probe else None
+    def noise(at: int) -> str:
+        return f"{float(fit.noise[at]) * in_shown(fit.model.signals[at])[1]:.3g}"
+
+    columns = (
+        Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
+        Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
+        Column(
+            "outliers",
+            "outliers",
+            "",
+            lambda at: int((of_signal[at] & ~fit.used).sum()),
+            where="screen json",
+            kind=WHOLE,
+        ),
+        Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
+        Column("", "noise", "", noise, where="screen"),
+        Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
+        Column("white", "", "", fit.white, where="json", kind=YES_NO),
+        Column("", "residuals", "", verdict, where="screen", kind=TEXT),
+    )
+    return DataTable("Signals", columns, range(len(of_signal)))
 
 
 def prospect_table(ahead: Outlook) -> DataTable:
     """A row for each coast and probe pulse of the forecast."""
-    level = exact_percent(ahead.probability)
+    now, level = ahead.now, exact_percent(ahead.probability)
 
     def gain(row: Prospect) -> float | None:
         rate = ahead.gain(row)
         return None if rate is None else math.degrees(rate)
 
+    def probe(row: Prospect) -> str | None:
+        return f"{row.probe}, {row.on_time:.3g} s" if row.probe else None
+
     columns = (
         Column("coast_s", "", "", lambda row: row.length, where="json"),
-        Column("", "coast", "s", lambda row: f"{row.length:.4g}" + " (now)" * (row is ahead.now), where="screen",
-               kind=TEXT),
+        Column("", "coast", "s", lambda row: f"{row.length:.4g}{' (now)' * (row is now)}", where="screen", kind=TEXT),
         Column("probe", "", "", lambda row: row.probe or None, where="json", kind=TEXT),
-        Column("", "probe pulse", "", _probe, where="screen"),
+        Column("", "probe pulse", "", probe, where="screen"),
         Column("on_time_s", "", "", lambda row: row.on_time, where="json"),
-        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, lambda ratio: f"{ratio:.2g}",
-               "screen json"),
+        Column("sigma_C_over_A", "sigma of C/A", "", lambda row: row.ratio, to_figures(2), "screen json"),
         Column("sigma_thrust", "", "", lambda row: row.thrust, where="json"),
         Column("", "sigma of thrust", "%", lambda row: 100.0 * row.thrust if row.probe else None,
-               lambda thrust: f"{thrust:.2g}", "screen"),
+               to_figures(2), "screen"),
         Column("nutation_deg", f"nutation {level}", "deg", lambda row: math.degrees(row.nutation),
-               lambda angle: f"{angle:.3g}", "screen json"),
-        Column("met_fraction", "", "", lambda row: row.met, where="json"),
-        Column("", "comply", "%", lambda row: None if row.met is None else 100.0 * row.met,
-               lambda share: f"{share:.4g}", "screen"),
-        Column("propellant_kg", "", "", lambda row: row.propellant, where="json"),
-        Column("", Shared.PROPELLANT, "g", lambda row: row.propellant and 1e3 * row.propellant, lambda kg: f"{kg:.3g}",
-               "screen"),
-        Column("gain_deg_kg", "", "", gain, where="json"),
-        Column("", "gain", "deg/g", lambda row: (rate := gain(row)) and 1e-3 * rate, lambda rate: f"{rate:.2g}",
-               "screen"),
+               to_figures(3), "screen json"),
+        Column("met_fraction", "comply", "%", lambda row: row.met, to_figures(4, 100.0), "screen json"),
+        Column("propellant_kg", Shared.PROPELLANT, "g", lambda row: row.propellant, to_figures(3, 1e3), "screen json"),
+        Column("gain_deg_kg", "gain", "deg/g", gain, to_figures(2, 1e-3), "screen json"),
     )  # fmt: skip
     return DataTable("Forecast with more telemetry", columns, (*ahead.coasts, *ahead.probes))
 
 
 def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: bool = True) -> RenderableType:
     """The screen of ``fit``; the motion is that at ``time`` s, ``ahead`` the forecast with more telemetry."""
-    rows, signals = estimates(fit, time), signal_table(fit)
-    colored = [row.name for row in signals.rows if fit.resolved[row.at] and not fit.white(row.at)]
+    rows, names = estimates(fit, time), fit.model.signals
+    colored = [name for at, name in enumerate(names) if fit.resolved[at] and not fit.white(at)]
     test = f"residuals NOT white: {', '.join(colored)}; the sigmas are too small" if colored else "residuals: noise"
-    outliers = sum(row.outliers for row in signals.rows)
+    outliers = int((~fit.used).sum())
     test += f"; outliers left out: {outliers}" if outliers else ""
-    headline = Text.assemble("FIT ", (", ".join(fit.model.signals), "bold"), f", {_record(fit)}")
+    headline = Text.assemble("FIT ", (", ".join(names), "bold"), f", {_record(fit)}")
     head = [*opening(fit.model.spacecraft, verbose), headline, Text(test, "bold red" if colored else "green")]
     table = estimate_table(rows)
     return summary(
@@ -185,7 +169,7 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
         lambda first=None: table.screen("screen", first=first and max(first, 3)),
         [*(advice(ahead) if ahead is not None else ()), *told(fit, rows)],
         "-o now.yaml · --plot fit.png" + " · --next" * (ahead is None),
-        more=[signals.screen("screen"), *[prospect_table(each).screen("screen") for each in (ahead,) if each]],
+        more=[each.screen("screen") for each in (signal_table(fit), *map(prospect_table, filter(None, [ahead])))],
         verbose=verbose,
     )
 
@@ -236,7 +220,8 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[str]:
     kept = [estimate.label for estimate in rows if estimate.source == UNTOLD]
     if kept:
         yield f"the data do not tell {', '.join(kept)}: kept as the file has it"
-    tied = [f"{first} and {second} {value:+.4f}" for first, second, value in _moments(fit)]
+    known = carried(fit, fit.model.start)  # A and C are correlated where both are estimated
+    tied = [f"A and C {float(known.correlation[0, 1]):+.4f}"] if known.sigmas[0] > 0.0 else []
     tied += [f"{first} and {second} {value:+.3f}" for first, second, value in correlated(fit)[:MOST_PAIRS]]
     if tied:
         yield f"correlated: {', '.join(tied)}"
@@ -246,13 +231,6 @@ def told(fit: Fit, rows: Sequence[Estimate]) -> Iterator[str]:
         yield f"farther from the file than its tolerances allow, in their sigmas: {', '.join(far)}"
     if fit.model.unequal and fit.model.spacecraft.inertia.symmetric:
         yield "I1 and I2 differ: the file has one A for both"
-
-
-def _moments(fit: Fit) -> Iterator[tuple[str, str, float]]:
-    """The correlation of A and C, where both are estimated."""
-    known = carried(fit, fit.model.start)
-    if known.sigmas[0] > 0.0:
-        yield "A", "C", float(known.correlation[0, 1])
 
 
 def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings: Sequence[str] = ()) -> dict[str, Any]:
@@ -283,18 +261,14 @@ def fit_json(fit: Fit, at_time: Carried, ahead: Outlook | None = None, warnings:
             "correlation": at_time.correlation.tolist(),
         },
         "notes": [*warnings, *doubts(fit), *untold(model.record), *notes(fit, at_time)],
-        "next": None if ahead is None else _outlook(ahead),
-    }
-
-
-def _outlook(ahead: Outlook) -> dict[str, Any]:
-    longer, probe = ahead.longer, ahead.probe
-    return {
-        "scheme": ahead.scheme,
-        "propellant_kg": ahead.propellant,
-        "probability": ahead.probability,
-        "longer_coast_s": None if longer is None else longer.length,
-        "probe": None if probe is None else probe.probe,
-        "probe_per_propellant": None if ahead.thrifty is None else ahead.thrifty.probe,
-        "prospects": prospect_table(ahead).json(),
+        "next": ahead
+        and {
+            "scheme": ahead.scheme,
+            "propellant_kg": ahead.propellant,
+            "probability": ahead.probability,
+            "longer_coast_s": ahead.longer and ahead.longer.length,
+            "probe": ahead.probe and ahead.probe.probe,
+            "probe_per_propellant": ahead.thrifty and ahead.thrifty.probe,
+            "prospects": prospect_table(ahead).json(),
+        },
     }

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from rich.console import Group, RenderableType
@@ -22,10 +24,10 @@ from nutdamp.planning.decision import Comparison, Decision, decide, infeasibilit
 from nutdamp.planning.notes import alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
+from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
-from nutdamp.views.decisions import COUNT, coloured, decision_screen, lasting, limit, size, verdict
+from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
 from nutdamp.views.pulses import block_table, pulse_table
 from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, derived_table, title, turn_floor, turning
 from nutdamp.views.summary import blocks_screen
@@ -40,6 +42,7 @@ from nutdamp.views.tables import (
     angle_of,
     facts,
     lines_of,
+    to_figures,
 )
 from nutdamp.views.text import (
     RPM,
@@ -63,9 +66,6 @@ SHORT_NAMES = ("RA", "dec")
 """Right ascension and declination, where there is little room."""
 
 
-Getter = Callable[[Plan], Any]
-
-
 class SchemeRow(NamedTuple):
     """A plan among those ``compared``; without a schedule most values are unknown."""
 
@@ -81,15 +81,13 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     """
     rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
-    title = f"Cost and residuals of each scheme with nominal values, by {flown_by(compared)}"
+    how, ideal = (
+        model_name(plan.pulses for plan in compared.plans),
+        [plan.scheme for plan in compared.plans if plan.pulses.idealised],
+    )
+    alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
+    title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
     return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
-
-
-def flown_by(compared: Comparison) -> str:
-    """Model by which schemes are flown beside each other, with those that alone fire ideal impulses."""
-    how = model_name(plan.pulses for plan in compared.plans)
-    ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
-    return how if how != REAL_WIDTHS or not ideal else f"{how} (ideal impulses: {listed(ideal)})"
 
 
 def limits(body: Spacecraft) -> tuple[float, float]:
@@ -99,9 +97,10 @@ def limits(body: Spacecraft) -> tuple[float, float]:
     return most.get(Part.NUTATION, math.inf), min(ends, default=math.inf)
 
 
-def _feasible(get: Getter) -> Callable[[SchemeRow], Any]:
-    """A value of plans that have a schedule."""
-    return lambda row: get(row.plan) if row.plan.feasible else None
+def _feasible(get: Callable[[Plan], Any] | str) -> Callable[[SchemeRow], Any]:
+    """A value of plans that have a schedule, or an attribute of them."""
+    value = attrgetter(get) if isinstance(get, str) else get
+    return lambda row: value(row.plan) if row.plan.feasible else None
 
 
 def _met(row: SchemeRow) -> bool | None:
@@ -119,11 +118,6 @@ def _share(row: SchemeRow) -> str:
     return decisions.share_text(row.compared.shares.get(row.plan)).removesuffix(" %")
 
 
-def _exact_share(row: SchemeRow) -> float | None:
-    share = row.compared.shares.get(row.plan)
-    return None if share is None else share.exact
-
-
 def _four(value: float) -> str:
     return digits(value, 4) if value else "0"
 
@@ -132,88 +126,62 @@ def _columns(compared: Comparison, chosen: Plan | None) -> Iterator[Column]:
     body, least = compared.spacecraft, limits(compared.spacecraft)
     feasible = [plan for plan in compared.plans if plan.feasible]
     fuelled = any(plan.pulses.propellant is not None for plan in feasible)
-    aimed, cases = body.goal.axis is not None, bool(compared.shares)
+    aimed, everywhere = body.goal.axis is not None, "screen full page"
+    exact = {plan: share.exact for plan, share in compared.shares.items()}
 
     def shortly(largest: float) -> Callable[[float], str]:
         return lambda angle: short_angle(math.radians(angle), largest)
 
-    yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where="screen full page csv", kind=TEXT)
+    yield Column("scheme", Shared.SCHEME, "", lambda row: row.plan.scheme, where=f"{everywhere} csv", kind=TEXT)
     yield Column("feasible", "", "", lambda row: row.plan.feasible, where="csv", kind=YES_NO)
     yield Column("recommended", "", "", lambda row: row.plan is chosen, where="csv", kind=YES_NO)
     yield Column("meets_requirement", "", "", lambda row: row.compared.meets(row.plan), where="csv", kind=YES_NO)
-    yield Column("met_fraction", "", "", _exact_share, where="csv")
-    yield Column(
-        "pulses",
-        Shared.PULSES,
-        "",
-        lambda row: len(row.plan.pulses) if row.plan.feasible else None,
-        where="screen full page",
-        kind=WHOLE,
-    )
+    yield Column("met_fraction", "", "", lambda row: exact.get(row.plan), where="csv")
+    count = _feasible(lambda plan: len(plan.pulses))
+    yield Column("", Shared.PULSES, "", count, where=everywhere, kind=WHOLE)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="csv", kind=WHOLE)
-    end, impulse = _feasible(lambda plan: plan.pulses.end), _feasible(lambda plan: plan.pulses.total_impulse)
-    yield Column("", "end", "s", end, lambda value: f"{value:.4g}", "screen")
+    end, impulse = _feasible("pulses.end"), _feasible("pulses.total_impulse")
+    yield Column("", "end", "s", end, to_figures(4), "screen")
     yield Column("end_s", "end", "s", end, lambda value: f"{value:.3f}", "full page csv")
-    yield Column(
-        "total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, "full page csv" + " screen" * (not fuelled)
-    )
-    yield Column("least_impulse_Nms", "", "", _feasible(lambda plan: plan.spacecraft.least_impulse), where="csv")
+    where = "full page csv" + " screen" * (not fuelled)
+    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, _four, where)
+    yield Column("least_impulse_Nms", "", "", _feasible("spacecraft.least_impulse"), where="csv")
     for name, whole in ratios(body):
         yield Column("", f"impulse over {name}", "", _feasible(_over(whole)), lambda value: f"{value:.4f}", "full page")
-    propellant = _feasible(lambda plan: plan.pulses.propellant)
-    yield Column("propellant_kg", Shared.PROPELLANT, "kg", propellant, where="csv")
+    yield Column("propellant_kg", Shared.PROPELLANT, "kg", _feasible("pulses.propellant"), where="csv")
     if fuelled:
         spent = _feasible(lambda plan: None if plan.pulses.propellant is None else 1e3 * plan.pulses.propellant)
         yield Column("", Shared.PROPELLANT, "g", spent, _four, "full page")
-        yield Column("", Shared.PROPELLANT, "g", spent, lambda value: f"{value:.4g}", "screen")
+        yield Column("", Shared.PROPELLANT, "g", spent, to_figures(4), "screen")
     for name in ("nutation", "momentum_shift"):
-        yield Column(
-            "", f"{_words(name)}, impulses (17)", "deg", angle_of(f"plan.residual.{name}"), small_angle, "full"
-        )
-    names = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
-    shown = {"nutation": "screen full page", "axis_error": "screen full page" if aimed else "",
-             "momentum_shift": "full page" if aimed else "screen full page"}  # fmt: skip
-    for name in names:
-        where, angle = shown.get(name, "full"), angle_of(f"plan.flown.{name}")
-        largest = least[0] if name == "nutation" else least[1]
+        heading = f"{name.replace('_', ' ')}, impulses (17)"
+        yield Column("", heading, "deg", angle_of(f"plan.residual.{name}"), small_angle, "full")
+    ends = ("full page", everywhere) if aimed else (everywhere, "")
+    shown = {"nutation": everywhere, "body_cone": "full", "space_cone": "full", "momentum_shift": ends[0],
+             "axis_error": ends[1]}  # fmt: skip
+    for name, where in shown.items():
+        heading, angle = name.replace("_", " "), angle_of(f"plan.flown.{name}")
         if "screen" in where:
-            yield Column("", _words(name), "", angle, shortly(largest), "screen")
-        yield Column(f"{name}_deg", _words(name), "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
+            yield Column("", heading, "", angle, shortly(least[name != "nutation"]), "screen")
+        yield Column(f"{name}_deg", heading, "deg", angle, small_angle, where.removeprefix("screen ") + " csv")
     yield from _directions(body)
-    yield Column("spin_rad_s", "", "", _feasible(lambda plan: plan.flight.final.spin), where="csv")
+    yield Column("spin_rad_s", "", "", _feasible("flight.final.spin"), where="csv")
     if body.goal.spin is not None:
-        yield Column(
-            "",
-            "final spin",
-            "rad/s",
-            _feasible(lambda plan: plan.flight.settled.spin),
-            lambda value: f"{value:.6g}",
-            "full",
-        )
-    yield Column(
-        "spin_change_rad_s",
-        "spin change",
-        "rad/s",
-        lambda row: row.plan.spin_change,
-        _four,
-        "full csv" + " page" * any(plan.spin_change for plan in compared.plans),
-    )
-    speed = any(plan.delta_v is not None for plan in compared.plans)
-    yield Column("delta_v_m_s", "|ΔV|", "m/s", lambda row: _speed(row.plan), _four, "csv" + " full page" * speed)
-    if cases:
+        yield Column("", "final spin", "rad/s", _feasible("flight.settled.spin"), to_figures(6), "full")
+    where = "full csv" + " page" * any(plan.spin_change for plan in compared.plans)
+    yield Column("spin_change_rad_s", "spin change", "rad/s", lambda row: row.plan.spin_change, _four, where)
+    where = "csv" + " full page" * any(plan.delta_v is not None for plan in compared.plans)
+    yield Column("delta_v_m_s", "|ΔV|", "m/s", _speed, _four, where)
+    if compared.shares:
         yield Column("", Shared.CASES, "%", _share, where="screen", kind=TEXT)
         yield Column("", COUNT, "%", _share, where="full page", kind=TEXT)
     yield from _bounds(compared)
-    yield Column("", Shared.VERDICT, "", scheme_verdict, where="screen full page", kind=TEXT, met=_met)
+    yield Column("", Shared.VERDICT, "", scheme_verdict, where=everywhere, kind=TEXT, met=_met)
     yield Column("why", "", "", lambda row: infeasibility(row.plan), where="csv", kind=TEXT)
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _speed(plan: Plan) -> float | None:
-    return None if plan.delta_v is None else math.hypot(*plan.delta_v)
+def _speed(row: SchemeRow) -> float | None:
+    return None if row.plan.delta_v is None else math.hypot(*row.plan.delta_v)
 
 
 def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
@@ -223,7 +191,7 @@ def ratios(body: Spacecraft) -> Iterator[tuple[str, float]]:
         yield turn_floor(body), turning(body)
 
 
-def _over(whole: float) -> Getter:
+def _over(whole: float) -> Callable[[Plan], float | None]:
     return lambda plan: plan.pulses.total_impulse / whole if whole > 0.0 else None
 
 
@@ -233,24 +201,19 @@ def _directions(body: Spacecraft) -> Iterator[Column]:
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     for which in ("axis", "momentum"):
         for at, key in enumerate(keys):
-            yield Column(f"{which}_{key}", "", "", _feasible(_direction(which, at)), where="csv")
+            yield Column(f"{which}_{key}", "", "", _feasible(partial(_direction, which, at)), where="csv")
             if which == "axis":
-                yield Column("", f"axis {names[at]}", "deg", _feasible(_shown_direction(at)), where="full page")
+                shown = _feasible(partial(_shown_direction, at))
+                yield Column("", f"axis {names[at]}", "deg", shown, where="full page")
 
 
-def _direction(which: str, at: int) -> Getter:
-    def degree(plan: Plan) -> float | None:
-        body, final = plan.spacecraft, plan.flight.final
-        vector: Vector = final.axis if which == "axis" else final.momentum
-        around, other = body.angles_of(vector)
-        angle = ((other, around) if body.attitude is None else (around, other))[at]
-        return None if angle is None else math.degrees(angle)
-
-    return degree
+def _direction(which: str, at: int, plan: Plan) -> float | None:
+    angles = decisions.direction_json(plan.spacecraft, getattr(plan.flight.final, which))
+    return list(angles.values())[at]
 
 
-def _shown_direction(at: int) -> Getter:
-    return lambda plan: angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
+def _shown_direction(at: int, plan: Plan) -> str:
+    return angle_texts(plan.spacecraft, plan.flight.final.axis)[at].removesuffix(" deg")
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
@@ -258,28 +221,23 @@ def _bounds(compared: Comparison) -> Iterator[Column]:
     if not requirements.judged(compared.spacecraft):
         return
     for bound in requirements.required(compared.spacecraft):
-        yield Column("", f"{bound.part.label} {limit(bound)}", "", _feasible(_part(bound)), where="full", kind=TEXT)
+        name, cell = f"{bound.part.label} {limit(bound)}", partial(_part, bound)
+        yield Column("", name, "", _feasible(cell), where="full", kind=TEXT)
     for at, cone in enumerate(at_start(compared.spacecraft)[: len(compared.spacecraft.keep)]):
         for kept, _, _ in cone_margins(cone):
             name = f"axis from {cone.keep.name} {kept}"
-            yield Column("", name, "", _feasible(_cone(at, kept)), where="full", kind=TEXT)
+            yield Column("", name, "", _feasible(partial(_cone, at, kept)), where="full", kind=TEXT)
 
 
-def _part(bound: Bound) -> Getter:
-    def cell(plan: Plan) -> str:
-        (part,) = (part for part in plan.held if part.bound == bound)
-        shown = size(bound, part.left).removesuffix(" deg")  # the heading has the unit
-        return shown if part.met else f"{NOT} {shown}"
-
-    return cell
+def _part(bound: Bound, plan: Plan) -> str:
+    (part,) = (part for part in plan.held if part.bound == bound)
+    shown = size(bound, part.left).removesuffix(" deg")  # the heading has the unit
+    return shown if part.met else f"{NOT} {shown}"
 
 
-def _cone(at: int, kept: str) -> Getter:
-    def cell(plan: Plan) -> str:
-        angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
-        return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
-
-    return cell
+def _cone(at: int, kept: str, plan: Plan) -> str:
+    angles = ((angle, left) for bound, angle, left in cone_margins(plan.aspects[at]) if bound == kept)
+    return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
 
 
 LINES = 24
@@ -297,8 +255,6 @@ TIGHTEST = 2
 NOTES = 3
 """Notes that are shown, at most."""
 
-NEXT = "--plot plan.png · nutdamp report"
-"""Next steps at the end of the last line."""
 
 DIGITS = 8
 """Figures of a value beside its limit, at most."""
@@ -316,15 +272,22 @@ def glance(
     head = [*title(body), headline(compared, decision, robust)]
     remarks = ordered([*beside, *notes(compared, decision, robust)])
     more = [screen_line(note) for note in remarks if severity(note) != WARNING]
+    name = robust or ("" if decision is None else decision.plan.scheme)
+    chosen = next((plan for plan in compared.plans if plan.scheme == name), None)
+    table = scheme_table(compared, chosen).screen("screen", between=" ")
     if decision is None:
-        return _fitted(head, [], [], more, _schemes(compared, ""))
+        return _fitted(head, [], [], more, table)
     plan = decision.plan
     head.append(coloured(verdict(decision), decision.met))
     head += [screen_line(note) for note in remarks if severity(note) == WARNING]
-    table = _schemes(compared, robust or plan.scheme)
 
     def screen(first: int) -> RenderableType:
-        fired = [Text(), _fired(plan, first)] if len(plan.pulses) else []
+        fired: list[RenderableType] = []
+        if plan.pulses.blocks:
+            fired = [Text(), block_table(plan.flight).screen("screen", first=first)]
+        elif len(plan.pulses):
+            shown = pulse_table(plan.flight, least=limits(body)[0])
+            fired = [Text(), shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)]
         required, middle = requirement_rows(decision), [ends(decision), *fired]
         blocks = bool(plan.pulses.blocks)
         return _fitted(head, required, middle, more, table, blocks=blocks)
@@ -396,26 +359,17 @@ def requirement_rows(decision: Decision) -> list[RequirementRow]:
         dispersed = "" if values[1] is None else level + _left(bound, values[1])
         words = dispersed, f"nominal {_left(bound, line.nominal)}", f"limit {limit(bound)[2:]}"
         used = [math.nan if value is None else value / bound.most for value in values]
-        met = coloured(decisions.VERDICT[line.met], line.met)
-        rows.append(RequirementRow(bound.part.label, *words, met, _margin(bound, line.margin), (used[0], used[1])))
+        met, spin = coloured(decisions.VERDICT[line.met], line.met), bound.part is Part.SPIN
+        left = size(bound, line.margin) if spin else f"{short_angle(line.margin, bound.most)} deg"
+        rows.append(RequirementRow(bound.part.label, *words, met, left, (used[0], used[1])))
     for aspect in decision.aspects:
+        name, keep = f"axis from {aspect.keep.name}", aspect.keep
         for text, angle, margin in cone_margins(aspect):
-            kept = margin >= -SLACK
-            words = "", f"nominal {degrees(angle)}", f"limit {text}"
-            least = margin == aspect.least - aspect.keep.least
-            near = (aspect.keep.least, max(angle, SLACK)) if least else (angle, aspect.keep.most)
-            used_up = near[0] / near[1]
-            met = coloured(decisions.VERDICT[kept], kept)
-            rows.append(
-                RequirementRow(
-                    f"axis from {aspect.keep.name}", *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)
-                )
-            )
+            kept, least = margin >= -SLACK, margin == aspect.least - keep.least
+            used_up = keep.least / max(angle, SLACK) if least else angle / keep.most
+            words, met = ("", f"nominal {degrees(angle)}", f"limit {text}"), coloured(decisions.VERDICT[kept], kept)
+            rows.append(RequirementRow(name, *words, met, f"{short_angle(margin)} deg", (used_up, math.nan)))
     return rows
-
-
-def _margin(bound: Bound, margin: float) -> str:
-    return size(bound, margin) if bound.part is Part.SPIN else f"{short_angle(margin, bound.most)} deg"
 
 
 def _left(bound: Bound, value: float | None) -> str:
@@ -450,21 +404,6 @@ def ends(decision: Decision) -> Table:
     return facts(rows)
 
 
-def _fired(plan: Plan, first: int) -> RenderableType:
-    """The blocks or pulses to fire, of many the ``first`` ones and the last."""
-    if plan.pulses.blocks:
-        return block_table(plan.flight).screen("screen", first=first)
-    least, _ = limits(plan.spacecraft)
-    shown = pulse_table(plan.flight, least=least)
-    return shown.screen("screen", between=", ", first=first if len(shown.rows) > ROWS else None)
-
-
-def _schemes(compared: Comparison, chosen: str) -> FittedColumns:
-    """One line a scheme; the one to fly is marked."""
-    plan = next((plan for plan in compared.plans if plan.scheme == chosen), None)
-    return scheme_table(compared, plan).screen("screen", between=" ")
-
-
 def _fitted(
     head: Sequence[Text],
     required: Sequence[RequirementRow],
@@ -491,7 +430,8 @@ def _fitted(
         shown_notes.append(note)
     hidden = len(more) - len(shown_notes) + len(required) - len(shown)
     further = f"-v all values ({hidden} more)" if hidden else "-v all values"
-    steps = Text(f"{further} · {'--blocks blocks.csv' if blocks else '--csv pulses.csv'} · {NEXT}", style="dim")
+    written = "--blocks blocks.csv" if blocks else "--csv pulses.csv"
+    steps = Text(f"{further} · {written} · --plot plan.png · nutdamp report", style="dim")
     return Group(*head, *[facts(row[:5] for row in shown)] * bool(shown), *middle, *apart, schemes, *shown_notes, steps)
 
 
@@ -516,4 +456,12 @@ def comparison_screen(compared: Comparison) -> RenderableType:
         results += [Text(), blocks_screen(decided.plan.flight, decided.plan.delta_v)]
     elif len(decided.plan.pulses):
         results += [Text(), pulse_table(decided.plan.flight).screen("full")]
-    return Group(*parts, *decision_screen(compared, decided), *results)
+    why, warnings = joined(reasons(compared)), comparison_warnings(compared, cones=False)
+    return Group(
+        *parts,
+        Text.assemble("Recommended: ", (decided.plan.scheme, "bold"), f" – {why}."),
+        decisions.statement(decided),
+        *map(screen_line, ordered([*warnings, *decision_notes(decided), *alternatives(compared)])),
+        *decisions.figures(decided),
+        *results,
+    )

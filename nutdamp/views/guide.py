@@ -148,12 +148,11 @@ def _table(lines: list[str]) -> TopicRows:
     )
     if len(heads) == 2:
         return TopicRows(tuple((name, text) for name, text in cells))
-    return TopicRows(
-        tuple(
-            (name, "\n".join(f"{head}: {text}" for head, text in zip(heads[1:], texts, strict=True) if text))
-            for name, *texts in cells
-        )
-    )
+    rows = []
+    for name, *texts in cells:
+        named = (f"{head}: {text}" for head, text in zip(heads[1:], texts, strict=True) if text)
+        rows.append((name, "\n".join(named)))
+    return TopicRows(tuple(rows))
 
 
 _LINK = re.compile(r"(?P<before>explain |, )?\[(?P<text>[^\]]+)\]\((?P<page>[^)#]*?)(\.md)?(#(?P<entry>[^)]*))?\)")
@@ -216,24 +215,18 @@ def found(requested: str) -> Topic:
     if _FIGURE.fullmatch(name):
         return page_or_topic("figures")
     if match := _NUMBER.fullmatch(requested.strip().casefold()):
-        return _equation(match["source"] or "", match["number"])
+        number = match["number"]
+        called = number if "." in number else f"{'K' if match['source'] == 'k' else 'M'}({number})"
+        for equation in EQUATIONS:
+            if equation.number == called:
+                return equation.topic
+        raise BadRequest(f"there is no equation {called}; there are M(1) to M(27), K(5) to K(15) and 24.4")
     raise BadRequest(f"there is no topic {requested!r}; {meant(name, NAMES)}")
 
 
 def page_or_topic(name: str) -> Topic:
     """The entry of `NAMES`."""
     return next((topic for topic in (*SCHEMES, *MOTION) if topic.name == name), None) or page(name)
-
-
-def _equation(source: str, number: str) -> Topic:
-    """The topic of the equation of that ``source`` (m, k or §, empty: Magnus) and ``number``; raises BadRequest."""
-
-    section = "." in number
-    name = number if section else f"{source.upper() if source == 'k' else 'M'}({number})"
-    for equation in EQUATIONS:
-        if equation.number == name:
-            return equation.topic
-    raise BadRequest(f"there is no equation {name}; there are M(1) to M(27), K(5) to K(15) and 24.4")
 
 
 def meant(name: str, known: tuple[str, ...], listed: str = "nutdamp explain") -> str:
@@ -294,9 +287,8 @@ EQUATIONS = tuple(map(Equation.of, entries("equations")))
 
 
 class NoteEntry(NamedTuple):
-    """One code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
+    """A code of the catalogue: its severity, its sentence with names of values in braces, and what it means."""
 
-    code: str
     severity: str
     sentence: str
     paragraph: str
@@ -312,5 +304,5 @@ def note_entries() -> dict[str, NoteEntry]:
     entries = {}
     for code, severity, quoted, paragraph in NOTE_ENTRY.findall(text):
         words = " ".join(line.removeprefix("> ") for line in quoted.splitlines())
-        entries[code] = NoteEntry(code, severity, words, " ".join(paragraph.split()))
+        entries[code] = NoteEntry(severity, words, " ".join(paragraph.split()))
     return entries

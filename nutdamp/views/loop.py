@@ -19,20 +19,10 @@ from nutdamp.planning.decision import Decision
 from nutdamp.planning.notes import decision_notes
 from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.views.decisions import (
-    cost,
-    end_rows,
-    final_json,
-    heading,
-    margin_lines,
-    requirement_json,
-    residual_json,
-    statement,
-    target_json,
-)
+from nutdamp.views import decisions
 from nutdamp.views.pulses import pulse_table, seconds
 from nutdamp.views.summary import Remark, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts
+from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
 SHOWN = 40
@@ -61,8 +51,9 @@ def _apart(value: float) -> str:
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json",
-           kind=TEXT),
+    Column(
+        "channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json", kind=TEXT
+    ),
     Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
     Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
     Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
@@ -75,9 +66,15 @@ FIRINGS = (
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
-    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
-           "verified verified_json"),
-)  # fmt: skip
+    Column(
+        "nutation_difference_deg",
+        "differs by",
+        "deg",
+        lambda row: math.degrees(row.apart[2]),
+        _apart,
+        "verified verified_json",
+    ),
+)
 
 
 def firing_table(run: LoopRun) -> DataTable:
@@ -93,14 +90,12 @@ def _finite(value: float) -> float | None:
 
 MARGINS = (
     Column("channel", Shared.CHANNEL, "", lambda row: row.channel, where="screen json", kind=TEXT),
-    Column("late_deg", "late", "deg", angle_of("late"), lambda late: f"{late:.4g}", "screen json"),
+    Column("late_deg", "late", "deg", angle_of("late"), to_figures(4), "screen json"),
     Column("latest_deg", "", "", lambda row: _finite(math.degrees(row.latest)), where="json"),
-    Column("gain", "", "", lambda row: row.gain, where="json"),
-    Column("", "remaining", "%", lambda row: 0.0 if row.gain < ROUNDING else 100.0 * row.gain,
-           lambda left: f"{left:.4g}", "screen"),
-    Column("growth", "", "", lambda row: row.growth, where="json"),
-    Column("", "growth in a period", "%", lambda row: 100.0 * (row.growth - 1.0), lambda growth: f"{growth:.3g}",
-           "screen"),
+    Column("gain", "remaining", "%", lambda row: row.gain,
+           lambda gain: f"{100.0 * gain:.4g}" if gain >= ROUNDING else "0", "screen json"),
+    Column("growth", "growth in a period", "%", lambda row: row.growth, lambda growth: f"{100.0 * (growth - 1.0):.3g}",
+           "screen json"),
     Column("", "delay margin", "", lambda row: row.delay, lambda delay: "none" if delay < 0.0 else duration(delay),
            "screen"),
     Column("delay_margin_s", "", "", lambda row: _finite(row.delay), where="json"),
@@ -117,17 +112,18 @@ def margin_table(rows: tuple[Margin, ...]) -> DataTable:
 def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
     """The screen of ``loop``."""
     run, decision = plan.flown_run, Decision(plan)
-    (_, spent), (_, end) = cost(decision)
+    (_, spent), (_, end) = decisions.cost(decision)
     fired = f"{spent}, last ends at {end}" if run.fired else "no firing"
     headline = Text.assemble("LOOP ", (run.loop.law, "bold"), f": {fired}; first quiet {_settled(run)}")
     head = [*opening(plan.spacecraft, verbose), headline, *_verdict(plan, decision)]
-    head += [*warnings_of(warnings(plan.spacecraft)), *margin_lines(decision, "this case" if run.case else "nominal")]
+    head += warnings_of(warnings(plan.spacecraft))
+    head += decisions.margin_lines(decision, Shared.THIS_CASE if run.case else Shared.NOMINAL)
     return summary(
         head,
         partial(firing_table(run).screen, "screen", first=SHOWN - 1) if run.fired else None,
         _remarks(plan, decision),
         "--plot loop.png · nutdamp disperse --loop",
-        more=[margin_table(plan.margins).screen("screen"), facts(end_rows(plan.flight, plan.aspects))],
+        more=[margin_table(plan.margins).screen("screen"), facts(decisions.end_rows(plan.flight, plan.aspects))],
         verbose=verbose,
     )
 
@@ -161,7 +157,7 @@ def _verdict(plan: LoopPlan, decision: Decision) -> Iterator[Text]:
         why = "limits.max_pulses is reached" if full else "the loop is never down to its stop threshold"
         yield Text.assemble("Requirement ", (f"NOT met: {why}", "bold red"), ".")
     else:
-        yield statement(decision)
+        yield decisions.statement(decision)
 
 
 def described(loop: Loop, *, thresholds: bool = True) -> str:
@@ -220,14 +216,14 @@ def warnings(spacecraft: Spacecraft) -> Iterator[str]:
             f"half of {degrees(band.step)}, which the smallest pulse takes away, is above loop.stop: a firing may "
             "leave more than stop that no pulse lowers, and the loop then never pauses"
         )
+    noise = f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above"
     if band.noise > loop.start:
-        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.start: they set off firings"
+        yield f"{noise} loop.start: they set off firings"
     elif band.noise > loop.stop > 0.0:
-        yield f"noise, bias and steps of the sensor, {degrees(band.noise)}, are above loop.stop"
+        yield f"{noise} loop.stop"
 
 
 def _settled(run: LoopRun) -> str:
-    """The time when the loop was first quiet."""
     if run.settled is not None:
         return f"at {moment(run.settled)}"
     if not run.fired and not run.lost:
@@ -262,7 +258,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
     run, body = plan.flown_run, plan.spacecraft
     pulses = zip(pulse_table(run.flight).json("flown"), firing_table(run).json(), strict=True)
     return {
-        **heading(body),
+        **decisions.heading(body),
         "law": run.loop.law,
         "seed": run.seed,
         "case": run.case,
@@ -270,7 +266,7 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "stopped": run.stop.name.lower(),
         "channel": run.channel,
         "meets_requirement": False if run.stop.fault else plan.meets_requirement,
-        "requirement": requirement_json(plan),
+        "requirement": decisions.requirement_json(plan),
         "quiet_s": list(run.quiet),
         "largest_since_quiet_deg": None if run.settled is None else math.degrees(plan.largest[0]),
         "dead_band_deg": math.degrees(plan.band.most),
@@ -278,9 +274,9 @@ def loop_json(plan: LoopPlan) -> dict[str, Any]:
         "total_impulse_Nms": plan.total_impulse,
         "propellant_kg": plan.propellant,
         "end_s": plan.end,
-        "flown": residual_json(plan.flight.residual),
-        "final": final_json(plan.flight),
-        "target": target_json(body),
+        "flown": decisions.residual_json(plan.flight.residual),
+        "final": decisions.final_json(plan.flight),
+        "target": decisions.target_json(body),
         "margins": margin_table(plan.margins).json(),
     }
 
@@ -289,7 +285,7 @@ def verified_json(verification: LoopVerification) -> dict[str, Any]:
     """The object of ``verify --loop --json``: of each firing the difference by DOP853."""
     run = verification.run
     return {
-        **heading(run.flight.spacecraft),
+        **decisions.heading(run.flight.spacecraft),
         "scheme": "loop",
         "agree": None if verification.missing else verification.agree,
         "missing": verification.missing or None,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from operator import itemgetter
 from typing import IO, Any, NamedTuple
 
 import numpy as np
@@ -21,58 +20,22 @@ from nutdamp.files.export import column, cone_columns
 from nutdamp.montecarlo.inputs import DispersedInput
 from nutdamp.montecarlo.statistics import Array, Exact, binomial_interval
 from nutdamp.montecarlo.study import CONFIDENCE
-from nutdamp.units import screen_unit
-from nutdamp.views import decisions
-from nutdamp.views.decisions import heading
-from nutdamp.views.dispersion import (
-    PERCENTILES,
-    angle_rows,
-    angles_json,
-    angles_note,
-    beside,
-    cone_lines,
-    cones_json,
-    percentile_row,
-    percentiles_json,
-    requirement_lines,
-    requirement_of,
-    shown,
-)
+from nutdamp.views import decisions, dispersion
+from nutdamp.views.dispersion import StudyOutput
 from nutdamp.views.loop import described
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared
-from nutdamp.views.text import MISSING, degrees, duration
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, to_figures
+from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
 
-
-class LoopOutput(NamedTuple):
-    """An output of `OUTPUTS`: its ``key`` in files, its heading and unit for people, and the factor to that unit."""
-
-    name: str
-    key: str
-    heading: str
-    unit: str = "deg"
-    scale: float = 1.0
-
-    @property
-    def label(self) -> str:
-        """Heading and unit."""
-        return f"{self.heading}, {screen_unit(self.unit)[0]}" if self.unit else self.heading
-
-    @property
-    def factor(self) -> float:
-        """Factor to the unit of screens."""
-        return screen_unit(self.unit, self.scale)[1]
-
-
 SHOWN_OUTPUTS = (
-    LoopOutput("settled", "settled_s", "first quiet", "s"),
-    LoopOutput("quiet", "quiet_nutation_deg", "left then"),
-    LoopOutput("nutation", "largest_nutation_deg", "largest"),
-    LoopOutput("momentum_shift", "momentum_shift_deg", "momentum shift"),
-    LoopOutput("axis_error", "axis_error_deg", "axis error"),
-    LoopOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3),
-    LoopOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
-    LoopOutput("firings", "firings", "firings", ""),
+    StudyOutput("settled", "settled_s", "first quiet", "s"),
+    StudyOutput("quiet", "quiet_nutation_deg", "left then"),
+    StudyOutput("nutation", "largest_nutation_deg", "largest"),
+    StudyOutput("momentum_shift", "momentum_shift_deg", "momentum shift"),
+    StudyOutput("axis_error", "axis_error_deg", "axis error"),
+    StudyOutput("spin_change", "spin_change_rad_s", "spin off", "mrad/s", 1e3),
+    StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
+    StudyOutput("firings", "firings", "firings", ""),
 )
 """The outputs, in the order of `OUTPUTS`."""
 
@@ -83,8 +46,12 @@ RANKED = (*SHARED, SHOWN_OUTPUTS[-1])
 """Outputs by which worst cases are shown."""
 
 
+NOMINAL = -1
+"""Number of the nominal case."""
+
+
 class LoopCaseRow(NamedTuple):
-    """A case, from 0: deviations of its inputs, outputs (8,), ending, and angles (m, 2) rad to the cones."""
+    """A case, from 0, or the nominal one: deviations of inputs, outputs (8,), ending, angles (m, 2) rad to cones."""
 
     case: int
     draws: dict[str, float]
@@ -93,10 +60,12 @@ class LoopCaseRow(NamedTuple):
     angles: Array
 
 
-def _value(output: LoopOutput, row: LoopCaseRow) -> float | int | None:
+def _value(output: StudyOutput, row: LoopCaseRow) -> float | int | None:
     """An output in the unit of its key; None where it is not known."""
     value = row.values[OUTPUTS.index(output.name)]
-    return None if math.isnan(value) else int(value) if output.name == "firings" else shown(output.key, value)
+    if math.isnan(value):
+        return None
+    return int(value) if output.name == "firings" else dispersion.shown(output.key, value)
 
 
 def _true_value(entry: DispersedInput, row: LoopCaseRow) -> float:
@@ -108,24 +77,22 @@ def _angle(at: int, row: LoopCaseRow) -> float:
     return math.degrees(row.angles.flat[at])
 
 
-def _figures(scale: float, value: float) -> str:
-    return f"{scale * value:.4g}"
-
-
-def _columns(study: LoopStudy) -> Iterator[Column]:
+def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
     """Columns of a case: its number (from 1), true inputs, outputs, angles to cones."""
     yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
+    named = (Shared.THIS_CASE, Shared.NOMINAL)
+    yield Column("", "", "", lambda row: named[row.case == NOMINAL], where="case", kind=TEXT)
     for entry in study.model.inputs.drawn:
         yield Column(column(entry), "", "", partial(_true_value, entry), where="csv")
     for output in SHOWN_OUTPUTS:
-        where, text = "csv json" + " screen" * (output in RANKED), partial(_figures, output.scale)
+        where, text = "csv json" + " screen" * (output in RANKED), to_figures(4, output.scale)
         yield Column(output.key, output.heading, output.unit, partial(_value, output), text, where, kind=WHOLE)
+        yield dispersion.case_column(output, partial(_value, output), rows)
     yield Column("stopped", "", "", lambda row: row.stop.name.lower() if row.stop else None, where="csv", kind=TEXT)
-    keep = study.spacecraft.keep
-    names = [f"{which} from {cone.name}" for cone in keep for which in ("least", "largest")]
-    limited = [bound for cone in keep for bound in (cone.least > 0.0, cone.most < math.pi)]
-    for at, (key, name, bounded) in enumerate(zip(cone_columns(study.spacecraft), names, limited, strict=True)):
-        yield Column(key, name, "deg", partial(_angle, at), partial(_figures, 1.0), "csv" + " screen" * bounded)
+    angles = [(which, cone) for cone in study.spacecraft.keep for which in ("least", "largest")]
+    for at, (key, (which, cone)) in enumerate(zip(cone_columns(study.spacecraft), angles, strict=True)):
+        where, name = "csv case" + " screen" * (which in dispersion.bounded(cone)), f"{which} from {cone.name}"
+        yield Column(key, name, "deg", partial(_angle, at), to_figures(4), where)
     yield Column("", "largest inputs, in sigmas", "", partial(_largest, study), where="screen", kind=TEXT)
 
 
@@ -136,8 +103,8 @@ def _largest(study: LoopStudy, row: LoopCaseRow) -> str:
     return ", ".join(f"{name} {sigma:+.1f}" for name, sigma in sorted(sigmas, key=lambda pair: -abs(pair[1]))[:3])
 
 
-def _cases(study: LoopStudy, rows: Iterable[LoopCaseRow]) -> DataTable:
-    return DataTable("Worst cases", tuple(_columns(study)), list(rows))
+def _cases(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> DataTable:
+    return DataTable("Worst cases", tuple(_columns(study, rows)), rows)
 
 
 def _worst(results: LoopResults, count: int) -> list[LoopCaseRow]:
@@ -161,9 +128,8 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
         drawn += f", unphysical ones drawn again: {results.redrawn:,}"
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, 0 to {duration(study.until)}, {drawn}")
     parts: list[RenderableType] = [title, Text(described(study.law.loop)), Text(), _percentiles(results).screen("full")]
-    parts += [angles_note(study.spacecraft), Text()]
-    parts += [*_settled(results), _dead_band(results), *requirement_lines(results), *cone_lines(results)]
-    parts += list(_shares(results))
+    parts += [dispersion.angles_note(study.spacecraft), Text(), *_settled(results), _dead_band(results)]
+    parts += [*dispersion.requirement_lines(results), *dispersion.cone_lines(results), *_shares(results)]
     anew = ", ".join(f"{in_words(entry.name)} {size_text(entry)}" for entry in study.model.of_firings)
     if anew:
         parts.append(Text(f"Each firing draws anew, one sigma or bias: {anew}.", "dim"))
@@ -172,9 +138,7 @@ def loop_cases_screen(results: LoopResults, *, worst: int) -> Group:
         table, options = _cases(study, rows), f"--seed {study.seed} --case {rows[0].case + 1}"
         parts += [Text(), Text(table.title, style="bold"), table.screen("screen")]
         parts.append(Text(f"Inspect one: {options}; firing by firing: nutdamp loop {options}", "dim"))
-    if study.model.inputs.unused:
-        parts += [Text(), Text("Unused dispersions", style="bold"), unused_table(study.model.inputs.unused)]
-    return Group(*parts)
+    return Group(*parts, *unused_table(study.model.inputs.unused))
 
 
 def _percentiles(results: LoopResults) -> DataTable:
@@ -183,25 +147,10 @@ def _percentiles(results: LoopResults) -> DataTable:
         distribution = results.distribution(output.name)
         if distribution is not None and output.name == "spin_change":  # up or down, the largest change is the worst
             distribution, plan = Exact(np.abs(results.of(output.name))), abs(plan)
-        given = percentiles_json(output.key, None if distribution is None else plan, distribution)
-        rows.append(percentile_row(output.label, output.factor, given, whole=output.name == "firings"))
-    return DataTable("Percentiles", PERCENTILES, rows)
-
-
-ENDS = (
-    Column("", "", "", itemgetter(0), where="screen", kind=TEXT),
-    Column("", Shared.NOMINAL, "", itemgetter(1), where="screen"),
-    Column("", Shared.THIS_CASE, "", itemgetter(2), where="screen"),
-)
-"""Columns of one case beside the nominal one, of rows of texts."""
-
-
-def _numbers(output: LoopOutput, values: Iterable[float], largest: float) -> list[str]:
-    """Values beside the ``largest`` of them."""
-    scaled = [output.factor * shown(output.key, value) for value in values]
-    whole = output.name == "firings"
-    texts = (f"{value:.0f}" if whole else beside(value, output.factor * shown(output.key, largest)) for value in scaled)
-    return [MISSING if math.isnan(value) else text for value, text in zip(scaled, texts, strict=True)]
+        given = dispersion.percentiles_json(output.key, None if distribution is None else plan, distribution)
+        whole, (_, factor) = output.name == "firings", output.shown_unit
+        rows.append(dispersion.percentile_row(output.label, factor, given, whole=whole))
+    return DataTable("Percentiles", dispersion.PERCENTILES, rows)
 
 
 def _share(count: int, of: int) -> str:
@@ -239,7 +188,7 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
     if not inputs or not any(shares.values()):
         return
 
-    def percent(output: LoopOutput, entry: DispersedInput) -> float | None:
+    def percent(output: StudyOutput, entry: DispersedInput) -> float | None:
         share = shares[output.name]
         return 100.0 * share[entry.name] if share else None
 
@@ -264,12 +213,8 @@ def _shares(results: LoopResults) -> Iterator[RenderableType]:
 def loop_case_screen(study: LoopStudy, case: int, flown: FlownLoops) -> Group:
     """One case (from 0), ``flown`` alone: every input, and its end beside the nominal one."""
     row = _flown_case(study, case, flown)
-    rows: list[tuple[str, ...]] = []
-    for output, *pair in zip(SHOWN_OUTPUTS, study.nominal.tolist(), row.values, strict=True):
-        largest = max((abs(value) for value in pair if not math.isnan(value)), default=0.0)
-        rows.append((output.label, *_numbers(output, pair, largest)))
-    rows += angle_rows(study.spacecraft.keep, [study.nominal_aspects, row.angles])
-    table = DataTable("End", ENDS, rows).screen("screen")
+    nominal = LoopCaseRow(NOMINAL, {}, study.nominal.tolist(), None, study.nominal_aspects)
+    table = _cases(study, [nominal, row]).transposed("case", names="")
     title = Text.assemble((study.spacecraft.name, "bold"), f": loop, seed {study.seed}, case {case + 1}")
     parts: list[RenderableType] = [title, Text(), inputs_table(study.model.inputs.drawn, row.draws), Text(), table]
     if row.stop is not None and row.stop is not Ending.END:
@@ -282,7 +227,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
     """Percentiles, the shares that fall quiet and keep the dead band, requirement, worst cases; degrees, else SI."""
     study = results.study
     return {
-        **heading(study.spacecraft),
+        **decisions.heading(study.spacecraft),
         "law": study.law.loop.law,
         "until_s": study.until,
         "samples": results.done,
@@ -292,7 +237,7 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
         "redrawn": results.redrawn,
         "alone_because": study.alone or None,
         "percentiles": {
-            output.key: percentiles_json(output.key, nominal, results.distribution(output.name))
+            output.key: dispersion.percentiles_json(output.key, nominal, results.distribution(output.name))
             for output, nominal in zip(SHOWN_OUTPUTS, study.nominal.tolist(), strict=True)
         },
         "settled": _fraction(results.settled, results.done),
@@ -302,8 +247,8 @@ def loop_cases_json(results: LoopResults, *, worst: int) -> dict[str, Any]:
             **_fraction(results.within, len(results.of("quiet"))),
         },
         "stopped": {stop.name.lower(): count for stop, count in results.stops.items() if stop is not Ending.END},
-        "requirement": requirement_of(results),
-        **cones_json(results),
+        "requirement": dispersion.requirement_of(results),
+        **dispersion.cones_json(results),
         "shares": {output.key: results.shares(output.name) for output in SHARED},
         **correlation_json(study.spacecraft),
         "each_firing": {entry.name: entry._asdict() for entry in study.model.of_firings},
@@ -322,7 +267,7 @@ def loop_case_json(study: LoopStudy, case: int, flown: FlownLoops) -> dict[str, 
 def _case_json(study: LoopStudy, row: LoopCaseRow) -> dict[str, Any]:
     inputs = {entry.name: entry.nominal + row.draws[entry.name] for entry in study.model.inputs.drawn}
     (outputs,) = _cases(study, [row]).json()
-    return {"case": row.case + 1, "inputs": inputs, **outputs, **angles_json(study.spacecraft, row.angles)}
+    return {"case": row.case + 1, "inputs": inputs, **outputs, **dispersion.angles_json(study.spacecraft, row.angles)}
 
 
 def _fraction(count: int, of: int) -> dict[str, float | None]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,12 +15,8 @@ from nutdamp.flight.propagation import Flight, Track
 from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
-
-if TYPE_CHECKING:
-    pass
-
 
 MILLISECONDS = 3
 """Digits of a second that tables show of a date."""
@@ -49,13 +45,11 @@ def seconds(value: float) -> str:
     return f"{value:.4f}"
 
 
-def on_time(value: float) -> str:
-    """An on-time; an impulse that takes none is ideal."""
+def _on_time(value: float) -> str:
     return seconds(value) if value else "ideal"
 
 
-def clock(date: str) -> str:
-    """Month, day and time of a date in UTC, for columns with little room."""
+def _clock(date: str) -> str:
     return date[5:].replace("T", " ").removesuffix("Z")
 
 
@@ -71,7 +65,7 @@ def _vector(name: str, unit: str) -> Column:
         vector = getattr(row.pulse, name)
         return None if vector is None else row.body.inertia.in_file(vector)
 
-    return Column(f"{name}#_{unit}", name, unit, components, where="csv json flown")
+    return Column(f"{name}#_{unit}", name, unit, components, where=FILES)
 
 
 def _date(row: PulseRow) -> str | None:
@@ -82,35 +76,21 @@ def _valves(schedule: Schedule) -> bool:
     return any(pulse.through_valve for pulse in schedule)
 
 
+PEOPLE, FILES = "screen full simulate page", "csv json flown"
 PULSES = (
-    Column("pulse", "pulse", "", lambda row: row.at + 1, where="screen full simulate page csv", kind=WHOLE),
-    Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, "csv json flown"),
-    Column(
-        "start_s",
-        Shared.START,
-        "s",
-        lambda row: row.pulse.loaded[0],
-        seconds,
-        "screen full simulate page csv json flown",
-    ),
-    Column("", Shared.START, "UTC", _date, clock, "full", kind=TEXT),
+    Column("pulse", "pulse", "", lambda row: row.at + 1, where=f"{PEOPLE} csv", kind=WHOLE),
+    Column("t_s", "centre", "s", lambda row: row.pulse.t, seconds, FILES),
+    Column("start_s", Shared.START, "s", lambda row: row.pulse.loaded[0], seconds, f"{PEOPLE} {FILES}"),
+    Column("", Shared.START, "UTC", _date, _clock, "full", kind=TEXT),
     Column("", Shared.START, "UTC", _date, where="page", kind=TEXT),
     Column("", "spin phase", "deg", lambda row: row.phase, lambda phase: longitude(phase).removesuffix(" deg"), "page"),
-    Column(
-        "on_time_s",
-        Shared.ON_TIME,
-        "s",
-        lambda row: row.pulse.loaded[1],
-        on_time,
-        "screen full simulate page csv json flown",
-    ),
+    Column("on_time_s", Shared.ON_TIME, "s", lambda row: row.pulse.loaded[1], _on_time, f"{PEOPLE} {FILES}"),
     Column("", Shared.EFFECTIVE, "s", lambda row: row.pulse.on_time, seconds, "full page", _valves),
-    Column("", Shared.CHANNEL, "", lambda row: channel_text(row.pulse, row.body), where="screen full simulate page",
-           kind=TEXT),
-    Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where="csv json flown", kind=TEXT),
+    Column("", Shared.CHANNEL, "", lambda row: channel_text(row.pulse, row.body), where=PEOPLE, kind=TEXT),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.pulse.channel, where=FILES, kind=TEXT),
     _vector("torque", "Nm"),
     _vector("impulse", "Nms"),
-    Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where="csv json flown"),
+    Column("propellant_kg", Shared.PROPELLANT, "kg", lambda row: row.pulse.propellant, where=FILES),
     Column("", Shared.IMPULSE, "N m s", lambda row: row.pulse.magnitude, lambda size: digits(size, 4), "full page"),
     _cone("nutation", "before", "full simulate page csv flown"),
     _cone("nutation", "after", "full simulate page csv flown"),
@@ -118,10 +98,10 @@ PULSES = (
     _cone("body_cone", "after", "simulate page flown"),
     _cone("space_cone", "before", "page flown"),
     _cone("space_cone", "after", "simulate page flown"),
-    Column("effective_start_s", "", "", lambda row: row.pulse.start, where="csv json flown", when=_valves),
-    Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where="csv json flown", when=_valves),
-    Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where="csv json flown", kind=TEXT),
-)  # fmt: skip
+    Column("effective_start_s", "", "", lambda row: row.pulse.start, where=FILES, when=_valves),
+    Column("effective_on_time_s", "", "", lambda row: row.pulse.on_time, where=FILES, when=_valves),
+    Column("utc", "", "", lambda row: row.body.utc(row.pulse.loaded[0]), where=FILES, kind=TEXT),
+)
 
 
 def commanded(schedule: Schedule, body: Spacecraft) -> DataTable:
@@ -179,10 +159,6 @@ def _nine(value: float) -> float:
     return float(f"{value:.9g}")
 
 
-def _six(value: float) -> str:
-    return f"{value:.6g}"
-
-
 EVERYWHERE = "screen page csv"
 BLOCKS = (
     Column("block", "block", "", lambda row: row.at + 1, where=EVERYWHERE, kind=WHOLE),
@@ -190,16 +166,16 @@ BLOCKS = (
     Column("first_sun_pulse", Shared.FIRST_SUN_PULSE, "", lambda row: row.block.first, where=EVERYWHERE, kind=WHOLE),
     Column("first_utc", "first pulse", "UTC", lambda row: row.body.utc(row.pulses[0].loaded[0]), where="csv page",
            kind=TEXT),
-    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, _six, EVERYWHERE),
+    Column("delay_s", Shared.DELAY, "s", lambda row: row.block.delay, to_figures(6), EVERYWHERE),
     Column("delay_counts", Shared.DELAY, "counts", _counts("delay"), where=EVERYWHERE, kind=WHOLE),
     Column("delay_deg", Shared.DELAY, "deg", lambda row: _nine(math.degrees(row.block.delay * abs(row.body.spin))),
            lambda angle: f"{angle:.2f}", EVERYWHERE),
-    Column("width_s", "width", "s", lambda row: row.block.width, _six, EVERYWHERE),
+    Column("width_s", "width", "s", lambda row: row.block.width, to_figures(6), EVERYWHERE),
     Column("width_counts", "width", "counts", _counts("width"), where=EVERYWHERE, kind=WHOLE),
     Column("count", Shared.PULSES, "", lambda row: row.block.count, where=EVERYWHERE, kind=WHOLE),
     Column("every", Shared.EVERY, "turn", lambda row: row.block.every, where=EVERYWHERE, kind=WHOLE),
     Column("impulse_Nms", Shared.IMPULSE, "N m s",
-           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), _six, "csv page"),
+           lambda row: _nine(math.fsum(pulse.magnitude for pulse in row.pulses)), to_figures(6), "csv page"),
     Column("nutation_after_deg", Shared.NUTATION_AFTER, "deg", angle_of("nutation"), small_angle, "csv page"),
 )  # fmt: skip
 

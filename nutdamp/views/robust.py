@@ -14,15 +14,16 @@ from nutdamp.common.results import Note, note
 from nutdamp.errors import listed
 from nutdamp.montecarlo.study import CONFIDENCE
 from nutdamp.planning.decision import infeasibility
+from nutdamp.planning.notes import decision_notes
 from nutdamp.planning.robust import RobustComparison, robust_cost, robust_reasons
 from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
 from nutdamp.views import decisions
-from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, requirement, target_json
+from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
 from nutdamp.views.pulses import pulse_table
 from nutdamp.views.spacecraft import derived_table
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of
-from nutdamp.views.text import in_degrees, joined, note_json, screen_line
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
+from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
 from nutdamp.views.tolerances import in_words, stated_text
 
 MOST_ROWS = 12
@@ -33,10 +34,10 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
     """All tables of ``plan --robust``."""
     body, decided = robust.comparison.spacecraft, robust.decision
     reason = joined(robust_reasons(robust))
-    infeasible = [plan for plan in robust.comparison.plans if not plan.feasible]
     reasons = [
         Text.assemble((f"{plan.scheme}: ", "bold"), "infeasible: " * (plan.failure is None), f"{infeasibility(plan)}")
-        for plan in infeasible
+        for plan in robust.comparison.plans
+        if not plan.feasible
     ]
     if decided is None or robust.chosen is None:
         none = Text(f"No recommendation: {reason}.", style="bold")
@@ -46,8 +47,9 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
     parts: list[RenderableType] = [
         Text(body.name, style="bold"),
         Text.assemble("Robust plan: ", (named, "bold"), f" – {reason}."),
-        *requirement(decided),
-        *(Text(text) for text in _fresh(robust)),
+        statement(decided),
+        *map(screen_line, ordered(decision_notes(decided))),
+        *map(Text, _fresh(robust)),
         *map(screen_line, robust_notes(robust)),
         *figures(decided),
         *(Text(), derived_table(body), Text()),
@@ -60,21 +62,16 @@ def robust_screen(robust: RobustComparison) -> RenderableType:
 
 
 def robust_notes(robust: RobustComparison) -> list[Note]:
-    """Tolerances that would have to shrink, and the plan against the usual one."""
-    return [*_needed(robust), *robust_cost(robust)]
-
-
-def _needed(robust: RobustComparison) -> Iterator[Note]:
-    """Tolerances with which enough cases would comply, where they are known."""
+    """Tolerances with which enough cases would comply, where they are known, and the plan against the usual one."""
     needed = robust.tightening
     if needed is None or robust.chosen is None:
-        return
+        return list(robust_cost(robust))
     sizes, tolerances = [], [entry.tolerance for entry, _ in needed.inputs]
     for entry, relative in needed.inputs:
         less = stated_text(entry._replace(size=needed.factor * entry.size), relative, down=True)
         named = in_words(entry.tolerance if tolerances.count(entry.tolerance) == 1 else entry.name)
         sizes.append(f"{named} {{{entry.kind}: {less}}} instead of {stated_text(entry, relative)}")
-    yield note(
+    tighter = note(
         "tolerances-needed",
         required_share=100.0 * robust.probability,
         tolerances=", ".join(sizes),
@@ -84,11 +81,12 @@ def _needed(robust: RobustComparison) -> Iterator[Note]:
         least=f"{math.floor(1e4 * needed.least) / 100.0:.4g} %",
         confidence_share=100.0 * CONFIDENCE,
     )
+    return [tighter, *robust_cost(robust)]
 
 
 def robust_json(robust: RobustComparison) -> dict[str, Any]:
     """Part of ``plan --robust --json`` beside the plans: candidates, the best first, the one to fly, and its cost."""
-    chosen, fresh, cost = robust.chosen, robust.fresh, robust.cost
+    chosen, fresh, cost, needed = robust.chosen, robust.fresh, robust.cost, robust.tightening
     given = [entry for entry in (*robust.candidates, chosen, robust.usual) if entry is not None]
     entries = dict(zip(map(id, given), _table(robust, given).json(), strict=True))
     return {
@@ -108,7 +106,24 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
             "met_fraction": fresh.met,
             "interval": list(fresh.interval),
         },
-        "tightening": _tightening(robust),
+        "tightening": needed
+        and {
+            "factor": needed.factor,
+            "tolerances": {
+                entry.tolerance: {"sigma": entry.sigma, "needed": needed.factor * entry.sigma}
+                for entry, _ in needed.inputs[::-1]
+            },
+            "inputs": [
+                {"name": entry.name, entry.kind: entry.size, "needed": needed.factor * entry.size, "unit": entry.unit}
+                for entry, _ in needed.inputs
+            ],
+            "checked": {
+                "samples": needed.cases,
+                "seed": needed.seed,
+                "met_fraction": needed.complied,
+                "at_least": needed.least,
+            },
+        },
         "against": entries.get(id(robust.usual)),
         "cost": cost
         and {
@@ -116,30 +131,6 @@ def robust_json(robust: RobustComparison) -> dict[str, Any]:
             "total_impulse_Nms": cost.impulse,
             "end_s": cost.end,
             "nutation_deg": math.degrees(cost.nutation),
-        },
-    }
-
-
-def _tightening(robust: RobustComparison) -> dict[str, Any] | None:
-    """Tolerances that enough cases would comply with; None where they are not known."""
-    needed = robust.tightening
-    if needed is None:
-        return None
-    inputs = [entry for entry, _ in needed.inputs]
-    return {
-        "factor": needed.factor,
-        "tolerances": {
-            entry.tolerance: {"sigma": entry.sigma, "needed": needed.factor * entry.sigma} for entry in inputs[::-1]
-        },
-        "inputs": [
-            {"name": entry.name, entry.kind: entry.size, "needed": needed.factor * entry.size, "unit": entry.unit}
-            for entry in inputs
-        ],
-        "checked": {
-            "samples": needed.cases,
-            "seed": needed.seed,
-            "met_fraction": needed.complied,
-            "at_least": needed.least,
         },
     }
 
@@ -158,10 +149,11 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "variant", "", lambda row: row.variant + " *" * (row is robust.usual), where="full", kind=TEXT)
     yield Column("pulses", "", "", lambda row: len(row.plan.pulses), where="json", kind=WHOLE)
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
-    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", attrgetter("plan.pulses.total_impulse"), _four,
-                 "json" if fuelled else "full json")  # fmt: skip
-    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
-    yield Column("", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, _four, "full" * fuelled)
+    impulse, where = attrgetter("plan.pulses.total_impulse"), "json" if fuelled else "full json"
+    yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
+    yield Column(
+        "", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, to_figures(4), "full" * fuelled
+    )
     yield Column("nominal_nutation_deg", "", "", angle_of("plan.flown.nutation"), where="json")
     yield Column("nutation_deg", "", "", angle_of("nutation"), where="json")
     yield Column(f"{requirements.aim(body).value}_deg", "", "", angle_of("off"), where="json")
@@ -173,10 +165,6 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("", "cases that comply", "", attrgetter("share"), decisions.share_text,
                  "full" * requirements.judged(body))  # fmt: skip
     yield Column("final", "", "", lambda row: final_json(row.plan.flight), where="json")
-
-
-def _four(value: float) -> str:
-    return f"{value:.4g}"
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import LEGENDRE, aspects
-from nutdamp.flight.propagation import Flight
+from nutdamp.flight.propagation import IMPULSE_SUM, REAL_WIDTHS, Flight
 from nutdamp.flight.verification import AGREE, AS_FLOWN, IDEAL, WITHOUT, Conservation, Verification
 from nutdamp.physics.attitude import full_turn
 from nutdamp.planning.decision import Simulation
@@ -32,85 +33,56 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions
-from nutdamp.views.decisions import (
-    aspects_json,
-    coloured,
-    cost,
-    decision_json,
-    final_json,
-    heading,
-    margin_lines,
-    residual_json,
-    size,
-    statement,
-    target_json,
-)
 from nutdamp.views.pulses import pulse_table, shown_rows
 from nutdamp.views.spacecraft import FRAME_N, angle_names, angle_texts, aspect_facts, derived_table, requested
 from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warnings_of
-from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts
+from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
-IMPULSES, WIDTHS = "impulse approximation (17)", "full simulation"
+MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}
 """Names of the two models."""
 
 
-class ModelEnd(NamedTuple):
-    """The end of a flight by one of the models."""
-
-    model: str
-    flight: Flight
+def _direction(name: str, at: int, flight: Flight) -> str:
+    return angle_texts(flight.spacecraft, getattr(flight.final, name))[at]
 
 
-def _direction(name: str, at: int) -> Callable[[ModelEnd], str]:
-    return lambda row: angle_texts(row.flight.spacecraft, getattr(row.flight.final, name))[at]
-
-
-def _columns(body: Spacecraft) -> Iterator[Column]:
-    yield Column("", "model", "", lambda row: row.model, where="screen", kind=TEXT)
-    for name in ("nutation", "body_cone", "space_cone", "momentum_shift"):
-        yield Column("", name.replace("_", " "), "", attrgetter(f"flight.residual.{name}"), degrees, "screen")
-    if body.goal.axis is not None:
-        yield Column("", "axis error", "", attrgetter("flight.residual.axis_error"), degrees, "screen")
-    for heading_, name in (("spin axis", "axis"), ("H", "momentum")):
+def _columns(simulation: Simulation) -> Iterator[Column]:
+    """Residuals and directions at the end of a flight by one of the models."""
+    body = simulation.flown.spacecraft
+    yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
+    names = ["nutation", "body_cone", "space_cone", "momentum_shift", *["axis_error"] * (body.goal.axis is not None)]
+    for name in names:
+        yield Column("", name.replace("_", " "), "", attrgetter(f"residual.{name}"), degrees, "screen")
+    for heading, name in (("spin axis", "axis"), ("H", "momentum")):
         for at, angle in enumerate(angle_names(body)):
-            yield Column("", f"{heading_}: {angle}", "", _direction(name, at), where="screen")
-    yield Column("", Shared.SPIN, "rad/s", lambda row: row.flight.final.spin, lambda spin: f"{spin:.6g}", "screen")
-
-
-def end_comparison(simulation: Simulation) -> DataTable:
-    """Residuals and directions at the end by both models."""
-    rows = ModelEnd(IMPULSES, simulation.impulses), ModelEnd(WIDTHS, simulation.flown)
-    columns = tuple(_columns(simulation.flown.spacecraft))
-    return DataTable("Final state by both models", columns, rows)
+            yield Column("", f"{heading}: {angle}", "", partial(_direction, name, at), where="screen")
+    yield Column("", Shared.SPIN, "rad/s", attrgetter("final.spin"), to_figures(6), "screen")
 
 
 def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> RenderableType:
     """The screen of ``simulate``."""
     decided, body, extremes = simulation.decision, simulation.flown.spacecraft, simulation.extremes
-    (_, spent), (_, end) = cost(decided)
+    (_, spent), (_, end) = decisions.cost(decided)
     fired = f"{spent}, last ends at {end}" if len(simulation.flown.schedule) else "no pulse"
     track = f"track by the {simulation.shown.model}, 0 to {moment(extremes.until)}"
     headline = Text.assemble("SIMULATED ", (simulation.plan.scheme, "bold"), f": {fired}; {track}")
     head = [*opening(body, verbose), headline]
-    head += warnings_of([*_cut(simulation), *model_warnings(simulation.impulses, simulation.flown)])
+    begun, pulses, cut = len(simulation.shown.schedule), len(simulation.plan.pulses), []
+    if begun < pulses:
+        cut = [f"the track ends at {moment(extremes.until)}, with {begun or 'none'} of {pulses} pulses begun"]
+    head += warnings_of([*cut, *model_warnings(simulation.impulses, simulation.flown)])
+    ends = DataTable("", tuple(_columns(simulation)), (simulation.impulses, simulation.flown))
     near, far = (f"{degrees(angle)} at {moment(at)}" for angle, at in (extremes.nearest, extremes.farthest))
     remarks: list[Remark] = [*decision_notes(decided), f"spin axis from H(0): min {near}, max {far}"]
     return summary(
-        [*head, statement(decided), *margin_lines(decided)],
-        lambda **_: end_comparison(simulation).transposed("screen", f"end of track, {moment(extremes.until)}"),
+        [*head, decisions.statement(decided), *decisions.margin_lines(decided)],
+        lambda **_: ends.transposed("screen", f"end of track, {moment(extremes.until)}"),
         [*remarks, *[FRAME_N] * (body.attitude is None)],
         "--csv track.csv · --plot motion.png · nutdamp verify",
         more=[*_fired(simulation), facts(_extremes(simulation))] if verbose else (),
         verbose=verbose,
     )
-
-
-def _cut(simulation: Simulation) -> Iterator[str]:
-    """Warning of a track that ends before the schedule does."""
-    begun, pulses = len(simulation.shown.schedule), len(simulation.plan.pulses)
-    if begun < pulses:
-        yield f"the track ends at {moment(simulation.extremes.until)}, with {begun or 'none'} of {pulses} pulses begun"
 
 
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
@@ -146,19 +118,20 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     """Pulses with the cone angles around them, ends of both models, and extremes of the axis track in degrees."""
     flight, extremes, impulses, flown = simulation.shown, simulation.extremes, simulation.impulses, simulation.flown
     attitude = flight.spacecraft.attitude
+    east_west = None if attitude is None else [full_turn(angle) for angle in extremes.right_ascension]
     return {
-        **heading(flight.spacecraft),
+        **decisions.heading(flight.spacecraft),
         "scheme": simulation.plan.scheme,
         "propagated": "flown" if simulation.real else "residual",
         "pulses": pulse_table(flight).json("flown"),
-        "residual": residual_json(impulses.residual),
-        "flown": residual_json(flown.residual),
-        "final": final_json(flown),
-        "final_by_impulses": final_json(impulses),
+        "residual": decisions.residual_json(impulses.residual),
+        "flown": decisions.residual_json(flown.residual),
+        "final": decisions.final_json(flown),
+        "final_by_impulses": decisions.final_json(impulses),
         "differ": [bound.part.value for bound in end_state.deviations(impulses, flown)],
-        "target": target_json(flight.spacecraft),
-        **aspects_json(aspects(flight, extremes.until)),
-        "decision": decision_json(simulation.decision),
+        "target": decisions.target_json(flight.spacecraft),
+        **decisions.aspects_json(aspects(flight, extremes.until)),
+        "decision": decisions.decision_json(simulation.decision),
         "until_s": extremes.until,
         "axis_track": {
             "frame": "N" if attitude is None else attitude.frame,
@@ -166,13 +139,11 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
             "farthest_s": extremes.farthest[1],
             "nearest_to_momentum_deg": math.degrees(extremes.nearest[0]),
             "nearest_s": extremes.nearest[1],
-            "x_deg": [math.degrees(value) for value in extremes.x],
-            "y_deg": [math.degrees(value) for value in extremes.y],
+            "x_deg": [*map(math.degrees, extremes.x)],
+            "y_deg": [*map(math.degrees, extremes.y)],
             # Western and eastern end, for any range between.
-            "right_ascension_deg": None
-            if attitude is None
-            else [math.degrees(full_turn(angle)) for angle in extremes.right_ascension],
-            "declination_deg": None if attitude is None else [math.degrees(v) for v in extremes.declination],
+            "right_ascension_deg": east_west and [*map(math.degrees, east_west)],
+            "declination_deg": None if attitude is None else [*map(math.degrees, extremes.declination)],
         },
     }
 
@@ -209,19 +180,14 @@ class SpinRow(NamedTuple):
 
 def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], str]:
     """Seconds or degrees of each pulse of a spin."""
-    return lambda row: BETWEEN.join(number(_rounded(value(row, pulse))) for pulse in row.fired)
-
-
-def _rounded(value: float) -> float:
-    """Seconds or degrees without the rounding of the search."""
-    return round(value, DIGITS)
+    return lambda row: BETWEEN.join(number(round(value(row, pulse), DIGITS)) for pulse in row.fired)
 
 
 SPINS = (
     Column("spin", "", "", attrgetter("number"), where="csv", kind=WHOLE),
     Column("start_utc", "", "", attrgetter("utc"), where="csv", kind=TEXT),
-    Column("start_s", "", "", lambda row: _rounded(row.begin), where="csv"),
-    Column("period_s", "", "", lambda row: _rounded(row.period), where="csv"),
+    Column("start_s", "", "", lambda row: round(row.begin, DIGITS), where="csv"),
+    Column("period_s", "", "", lambda row: round(row.period, DIGITS), where="csv"),
     Column("pulses", "", "", lambda row: len(row.fired), where="csv", kind=WHOLE),
     Column("channel", "", "", lambda row: BETWEEN.join(pulse.channel for pulse in row.fired), where="csv", kind=TEXT),
     Column("phase_deg", "", "", _several(lambda row, pulse: 360.0 * (1.0 - (row.end - pulse.loaded[0]) / row.period)),
@@ -242,16 +208,13 @@ def spin_table(body: Spacecraft, schedule: Schedule, until: float) -> str:
         raise BadRequest(f"the table would have more than {MOST_SPINS} spins; choose an earlier end (until)")
     first, begins = _begins(body, schedule, last)
     fired: dict[int, list[Pulse]] = {}
-    starts = sorted(schedule, key=lambda pulse: pulse.loaded[0])
-    for pulse, index in zip(starts, np.searchsorted(begins, [each.loaded[0] for each in starts], "right"), strict=True):
-        fired.setdefault(max(int(index) - 1, 0), []).append(pulse)
+    for pulse in sorted(schedule, key=lambda pulse: pulse.loaded[0]):
+        fired.setdefault(max(int(np.searchsorted(begins, pulse.loaded[0], "right")) - 1, 0), []).append(pulse)
     rows = []
-    spins = pairwise(begins[: int(np.searchsorted(begins, last, "right")) + 1].tolist())
-    for index, (begin, end) in enumerate(spins):
-        firing = fired.get(index, [])
+    for index, (begin, end) in enumerate(pairwise(begins[: np.searchsorted(begins, last, "right") + 1].tolist())):
         # Spin 0 is the rest of a spin: it ends a whole period after it began.
         period = end - begin if first + index > 0 else begins[2] - begins[1]
-        rows.append(SpinRow(first + index, body.utc(begin), begin, end, period, firing))
+        rows.append(SpinRow(first + index, body.utc(begin), begin, end, period, fired.get(index, [])))
     return DataTable("Spins", SPINS, rows).csv()
 
 
@@ -325,7 +288,13 @@ BUDGET_NOTE = (
 
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
     """The default screen of ``verify``: verdict, requirement, methods."""
-    notes = [conservation(verification), *_largest(verification), *_missing(verification)]
+    notes = [conservation(verification), *_missing(verification)]
+    # The imperfection that leaves the most nutation alone, where one leaves more than ideal impulses.
+    single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
+    most = max(single, key=lambda row: row.nutation, default=None)
+    if most is not None and most.nutation - verification.budget[0].nutation > SHOWN:
+        largest = f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."
+        notes.insert(1, largest)
     return summary([*_head(plan, verification)], lambda **_: methods_table(verification), notes, "--json verified.json")
 
 
@@ -333,10 +302,10 @@ def _head(plan: Plan, verification: Verification) -> Iterator[Text]:
     """Title, verdict, and the residual of the flown motion beside the requirement."""
     body = plan.spacecraft
     yield Text.assemble((body.name, "bold"), f": {plan.scheme}; Δ: maximum difference from the flown motion")
-    yield coloured(verdict(verification), verification.agree)
+    yield decisions.coloured(verdict(verification), verification.agree)
     if required := requested(body):
-        left = "; ".join(f"{line.bound.part.label} {size(line.bound, line.left)}" for line in plan.held)
-        met = coloured(decisions.VERDICT[plan.meets_requirement], plan.meets_requirement)
+        left = "; ".join(f"{line.bound.part.label} {decisions.size(line.bound, line.left)}" for line in plan.held)
+        met = decisions.coloured(decisions.VERDICT[plan.meets_requirement], plan.meets_requirement)
         yield Text.assemble(("Requirement ", "bold"), f"({required}) ", met, f" with nominal values: {left}.")
 
 
@@ -353,12 +322,12 @@ def verification_json(flown: Flight, name: str, verification: Verification) -> d
     """Methods with their differences from the motion of ``flown`` (rad), conservation, error budget."""
     spacecraft = flown.spacecraft
     return {
-        **heading(spacecraft),
+        **decisions.heading(spacecraft),
         "scheme": name,
         "agree": verification.agree if verification.checks else None,
         "disagreeing": list(verification.disagreeing),
-        "final": final_json(flown),
-        "target": target_json(spacecraft),
+        "final": decisions.final_json(flown),
+        "target": decisions.target_json(spacecraft),
         "methods": DataTable("", METHODS, verification.methods).json(),
         "momentum_drift": verification.momentum.drift,
         "momentum_kept": verification.momentum.kept,
@@ -430,12 +399,3 @@ def _course(course: Conservation) -> str:
     how = f"changed by {' and '.join(course.changed)}" if course.changed else "constant to rounding"
     how = "NOT constant" if course.kept is False else how
     return f"{how} (by {_difference(course.drift)} of itself at most)" if course.drift else how
-
-
-def _largest(verification: Verification) -> list[str]:
-    """The imperfection that leaves the most nutation alone; empty where none leaves more than ideal impulses."""
-    single = [row for row in verification.budget if row.name not in (IDEAL, AS_FLOWN) and WITHOUT not in row.name]
-    most = max(single, key=lambda row: row.nutation, default=None)
-    if most is None or most.nutation - verification.budget[0].nutation <= SHOWN:
-        return []
-    return [f"Largest single imperfection: {most.name}, which alone leaves {degrees(most.nutation)} of nutation."]

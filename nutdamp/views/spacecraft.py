@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -92,15 +91,11 @@ def required(spacecraft: Spacecraft) -> str:
     texts = []
     for bound in requirements.required(spacecraft):
         if bound.part is Part.SPIN:
-            tolerance = 100.0 * requirements.SPIN_TOLERANCE
-            texts.append(f"spin within {tolerance:g} % of {_rpm(spacecraft.goal.spin or 0.0)}")
+            tolerance, spin = 100.0 * requirements.SPIN_TOLERANCE, (spacecraft.goal.spin or 0.0) * RPM
+            texts.append(f"spin within {tolerance:g} % of {spin:.5g} rpm")
         else:
             texts.append(f"{bound.part.label} within {most(bound.most)}")
     return listed(texts)
-
-
-def _rpm(spin: float) -> str:
-    return f"{spin * RPM:.5g} rpm"
 
 
 def beyond_floors(spacecraft: Spacecraft) -> str:
@@ -121,11 +116,6 @@ def turn_floor(spacecraft: Spacecraft) -> str:
 def turning(spacecraft: Spacecraft) -> float:
     """C |ω3| β in N m s, |H3| β with a wheel; 0 where H points at the target already, but for rounding."""
     return 0.0 if spacecraft.to_turn < NO_NUTATION else spacecraft.turning_impulse
-
-
-def header(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> RenderableType:
-    """Name and derived quantities of the spacecraft at t = 0, and ``more`` of them (name, value)."""
-    return Group(Text(spacecraft.name, style="bold"), derived_table(spacecraft, more))
 
 
 def derived_table(spacecraft: Spacecraft, more: Iterable[tuple[str, str]] = ()) -> Table:
@@ -153,7 +143,7 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
     in_body = "none in the body, where ω does not turn" if still else f"{duration(spacecraft.body_period)} in the body"
     yield "nutation period", f"{in_body}, {duration(spacecraft.inertial_period)} inertially"
     if spacecraft.dissipation is not None:
-        yield "dissipation", dissipation_text(spacecraft, spacecraft.dissipation)
+        yield "dissipation", _dissipation(spacecraft, spacecraft.dissipation)
     beyond = beyond_floors(spacecraft)
     floor = f"no least impulse with {beyond}" if beyond else "lower bound"
     name = "impulse" if beyond else "least impulse"
@@ -165,21 +155,21 @@ def _derived(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
         yield "", f"β = {degrees(spacecraft.to_turn)} from H; {turn_floor(spacecraft)} = {turn}{least}"
     if spacecraft.goal.spin is not None:
         yield "final spin", spin_text(spacecraft.goal.spin)
-    yield "actuators", _actuators(spacecraft)
-    for line, text in enumerate(_requirement(spacecraft)):
-        yield "" if line else "requirement", text
+    actuators, torquer = [], spacecraft.torquer
+    if torquer is not None:
+        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
+        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
+        actuators.append(f"steerable torquer, {strength}{assumed}")
+    if spacecraft.channels:
+        actuators.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
+    yield "actuators", "; ".join(actuators)
+    if text := required(spacecraft):
+        yield "requirement", text
+    if any(bound.part is Part.DISTANCE for bound in requirements.required(spacecraft)):
+        yield "", "momentum_shift bounds the axis error: the angle of H from the target"
 
 
-def _requirement(spacecraft: Spacecraft) -> Iterator[str]:
-    """The requirement, and the differences from the key of the file."""
-    bounds = requirements.required(spacecraft)
-    if bounds:
-        yield required(spacecraft)
-    if any(bound.part is Part.DISTANCE for bound in bounds):
-        yield "momentum_shift bounds the axis error: the angle of H from the target"
-
-
-def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
+def _dissipation(spacecraft: Spacecraft, time_constant: float) -> str:
     """Effect of energy dissipation on the nutation, and a note where it is too fast for its model."""
     if spacecraft.growth == 0.0:
         return "none: a sphere has no energy to lose"
@@ -187,15 +177,3 @@ def dissipation_text(spacecraft: Spacecraft, time_constant: float) -> str:
     slow = time_constant >= spacecraft.inertial_period
     rough = "" if slow else "; less than one inertial period: results are rough"
     return f"the nutation {what} e-fold in {duration(time_constant)}{rough}"
-
-
-def _actuators(spacecraft: Spacecraft) -> str:
-    torquer = spacecraft.torquer
-    texts = []
-    if torquer is not None:
-        strength = "an ideal impulse" if torquer.torque is None else quantity(torquer.torque, "N m")
-        assumed = " (assumed: the file names no actuator)" if spacecraft.steerable is None else ""
-        texts.append(f"steerable torquer, {strength}{assumed}")
-    if spacecraft.channels:
-        texts.append("channels " + " ".join(channel.name for channel in spacecraft.channels))
-    return "; ".join(texts)

@@ -16,7 +16,7 @@ from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.views.pulses import block_table
-from nutdamp.views.spacecraft import angle_names, angle_texts, header, spin_text, title
+from nutdamp.views.spacecraft import angle_names, angle_texts, derived_table, spin_text, title
 from nutdamp.views.tables import facts, lines_of
 from nutdamp.views.text import NOTE, WARNING, degrees, mass, moment, quantity, screen_line
 
@@ -33,10 +33,7 @@ Rows = Callable[..., RenderableType]
 
 def opening(body: Spacecraft, verbose: bool) -> Iterator[RenderableType]:
     """Name and motion of a spacecraft at t = 0; ``verbose``: all its derived quantities."""
-    if verbose:
-        yield from (header(body), Text())
-        return
-    yield from title(body)
+    yield from (Text(body.name, style="bold"), derived_table(body), Text()) if verbose else title(body)
 
 
 Remark = str | Note
@@ -99,23 +96,17 @@ def _effects(flown: Flight, velocity: Vector | None) -> Iterator[tuple[str, str]
         angle_names(body), angle_texts(body, body.momentum), angle_texts(body, final.momentum), strict=True
     ):
         yield f"H: {name}", f"{before_} to {after_}"
-    yield "Sun angle of H", f"{_sun_angle(body, body.momentum)} to {_sun_angle(body, final.momentum)}"
+    assert body.sun is not None
+    ends = (attitude.angle_between(momentum, body.sun) for momentum in (body.momentum, final.momentum))
+    yield "Sun angle of H", " to ".join(degrees(float(angle)) for angle in ends)
     yield "spin", f"{spin_text(body.spin)} to {spin_text(final.spin)}"
     largest = float(max(before.nutation.max(), after.nutation.max()))
     yield "nutation", f"{degrees(body.nutation)} to {degrees(final.nutation)}; largest {degrees(largest)}"
-    used = schedule.propellant
-    tank = body.tank
-    left = "" if used is None or tank is None else f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
-    weighs = (
-        ""
-        if used is None or body.mass is None
-        else "; mass " + " to ".join(quantity(size, "kg", 6) for size in (body.mass, body.mass - used))
-    )
-    yield "propellant", f"{mass(used)}{left}{weighs}"
+    used, tank, spent = schedule.propellant, body.tank, mass(schedule.propellant)
+    if used is not None and tank is not None:
+        spent += f" of {mass(tank.propellant)}; {mass(tank.propellant - used)} left"
+    if used is not None and body.mass is not None:
+        spent += f"; mass {quantity(body.mass, 'kg', 6)} to {quantity(body.mass - used, 'kg', 6)}"
+    yield "propellant", spent
     if velocity is not None:
         yield "|ΔV|", quantity(float(np.linalg.norm(velocity)), "m/s")
-
-
-def _sun_angle(body: Spacecraft, direction: Vector) -> str:
-    assert body.sun is not None
-    return degrees(float(attitude.angle_between(direction, body.sun)))

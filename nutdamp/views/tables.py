@@ -89,18 +89,14 @@ class FittedColumns(Table):
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         room = options.max_width - GAP * (len(self.columns) - 1)
-        widths = _widths(self._texts, room, [str(column.header) in self.whole for column in self.columns])
+        texts = [[str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in self.columns]
+        widths = _widths(texts, room, [str(column.header) in self.whole for column in self.columns])
         if options.max_width < NARROW or widths is None:
             yield from self._blocks()
             return
         for column, width in zip(self.columns, widths, strict=True):
             column.width = width
         yield from super().__rich_console__(console, options)
-
-    @property
-    def _texts(self) -> list[list[str]]:
-        """Heading and cells of each column."""
-        return [[str(column.header), *(_cell(cell).plain for cell in column.cells)] for column in self.columns]
 
     def _blocks(self) -> RenderResult:
         names = [str(column.header).replace("\n", ", ").strip(", ") for column in self.columns]
@@ -159,9 +155,9 @@ def angle_of(path: str) -> Callable[[Any], float | None]:
     return value
 
 
-def always(_: Any) -> bool:
-    """True: the column belongs to every table of its kind."""
-    return True
+def to_figures(count: int, scale: float = 1.0) -> Callable[[float], str]:
+    """Text of a column: ``scale`` times a number, to ``count`` figures."""
+    return lambda value: f"{scale * value:.{count}g}"
 
 
 class Column(NamedTuple):
@@ -170,8 +166,8 @@ class Column(NamedTuple):
     ``key``: its name in CSV and JSON; ``#`` stands for the three components of a vector, which CSV has in columns of
     their own. ``value`` of a row in the unit of the key, or of the heading without a key; None where it is not known.
     ``text``: the value as people read it, in the unit of screens. ``where``: the places that have the column, separated
-    by blanks. ``when``: tables that have it, by their source. ``met``: whether a requirement is met, where a verdict is
-    coloured.
+    by blanks. ``when``: tables that have it, by their source, else all. ``met``: whether a requirement is met, where a
+    verdict is coloured.
     """
 
     key: str
@@ -180,7 +176,7 @@ class Column(NamedTuple):
     value: Callable[[Any], Any]
     text: Callable[[Any], str] = str
     where: str = ""
-    when: Callable[[Any], bool] = always
+    when: Callable[[Any], bool] | None = None
     kind: str = REAL
     met: Callable[[Any], bool | None] | None = None
 
@@ -212,13 +208,13 @@ class DataTable:
 
     def at(self, place: str) -> list[Column]:
         """Columns that a place has."""
-        return [column for column in self.columns if place in column.where.split() and column.when(self.source)]
+        there = (column for column in self.columns if place in column.where.split())
+        return [column for column in there if column.when is None or column.when(self.source)]
 
     def headings(self, place: str) -> tuple[Heading, ...]:
         """Headings for people."""
-        return tuple(
-            Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT) for column in self.at(place)
-        )
+        shown = self.at(place)
+        return tuple(Heading(column.heading, screen_unit(column.unit)[0], column.kind != TEXT) for column in shown)
 
     def cells(self, place: str) -> tuple[tuple[str, ...], ...]:
         """Texts for people, row by row."""
@@ -247,21 +243,25 @@ class DataTable:
         style = "" if met is None else "green" if met else "bold red"
         return Text(_text(column, row), "bold" if first and index == self.mark else style)
 
-    def transposed(self, place: str, corner: str = "") -> FittedColumns:
-        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading."""
+    def transposed(self, place: str, corner: str = "", names: str = "dim") -> FittedColumns:
+        """A table of a screen with quantities down and rows across, named by the first column; ``corner``: heading.
+
+        ``names``: style of the names of the quantities.
+        """
         name, *shown = self.at(place)
         table = columns(corner, *(_text(name, row) for row in self.rows))
         for column in shown:
             cells = (self._cell(column, row, index, first=False) for index, row in enumerate(self.rows))
-            table.add_row(Text(column.headed(", "), style="dim"), *cells)
+            table.add_row(Text(column.headed(", "), style=names), *cells)
         return table
 
     def array(self, place: str = "csv") -> NDArray[np.void]:
         """Fields as in CSV files; unknown values are NaN or empty."""
         names, kinds, rows = self._fields(place)
-        longest = (max((len(row[at]) for row in rows), default=1) or 1 if kind == TEXT else 0 for at, kind in
-                   enumerate(kinds))  # fmt: skip
-        types = [f"U{size}" if kind == TEXT else kind for kind, size in zip(kinds, longest, strict=True)]
+        types = []
+        for at, kind in enumerate(kinds):
+            longest = max((len(row[at]) for row in rows), default=1) or 1 if kind == TEXT else 0
+            types.append(f"U{longest}" if kind == TEXT else kind)
         return np.array(rows, dtype=list(zip(names, types, strict=True)))
 
     def csv(self, place: str = "csv") -> str:

@@ -96,19 +96,14 @@ def most(angle: float) -> str:
 
 def mass(value: float | None) -> str:
     """Propellant given in kg, in g below a kilogram."""
-    return MISSING if value is None else quantity(*_in_grams(value))
-
-
-def _in_grams(value: float) -> tuple[float, str]:
-    """A mass given in kg, and its unit: g below a kilogram."""
-    return (1e3 * value, "g") if value < 1.0 else (value, "kg")
+    return quantity(1e3 * value, "g") if value is not None and value < 1.0 else quantity(value, "kg")
 
 
 def cost(value: float | None, unit: str) -> str:
     """Propellant in kg as `mass` has it, an impulse with its ``unit``: four figures, final zeros too, for columns."""
     if value is None or value == 0.0 or not math.isfinite(value):
         return mass(value) if unit == "kg" else quantity(value, unit)
-    size, unit = _in_grams(value) if unit == "kg" else (value, unit)
+    size, unit = (1e3 * value, "g") if unit == "kg" and value < 1.0 else (value, unit)
     unit, factor = screen_unit(unit)
     return f"{digits(factor * size, 4)} {unit}"
 
@@ -157,10 +152,6 @@ def fixed(value: float, digits: int, period: float = math.inf) -> str:
     """A number with so many decimals, without -0; one that rounds up to ``period`` is 0."""
     rounded = round(value, digits)
     return f"{0.0 if rounded >= period else rounded + 0.0:.{digits}f}"
-
-
-TEXT, REAL, WHOLE, YES_NO = "U", "f8", "i8", "bool"
-"""Kinds of values: text, number, whole number, and yes or no."""
 
 
 WARNING, NOTE, REASON = "warning", "note", "reason"
@@ -220,11 +211,6 @@ def screen_line(note: Note) -> Text:
     """A note for screens: severity, code, sentence."""
     level = severity(note)
     return Text.assemble((f"{level}[{note.code}]: ", "bold red" if level == WARNING else "bold"), text(note))
-
-
-def message(note: Note) -> str:
-    """A note for standard error: severity, code, sentence."""
-    return screen_line(note).plain
 
 
 def ordered(notes: Iterable[Note]) -> list[Note]:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.montecarlo.inputs import DispersedInput, Unused, together
@@ -161,38 +160,28 @@ def budgeted_outputs(study: Study) -> tuple[tuple[str, str], tuple[str, str]]:
     return (first.value, first.label), (second.value, second.label)
 
 
-class DrawnInput(NamedTuple):
-    """An input of one case, and its deviation from the nominal value."""
-
-    entry: DispersedInput
-    draw: float
-
-    def scaled(self, value: float, form: str = ".6g") -> str:
-        """A value in the unit for people."""
-        return f"{unit_of_people(self.entry)[1] * value:{form}}"
-
-    @property
-    def off(self) -> str:
-        """The deviation with its unit."""
-        if self.entry.unit == "":
-            return of_nominal(self.entry, self.draw, "+.4g")
-        return f"{self.scaled(self.draw, '+.4g')} {unit_of_people(self.entry)[0]}"
-
-
-INPUTS = (
-    Column("", Shared.INPUT, "", lambda row: in_words(row.entry.name), where="screen", kind=TEXT),
-    Column("", Shared.NOMINAL, "", lambda row: row.scaled(row.entry.nominal), where="screen"),
-    Column("", Shared.THIS_CASE, "", lambda row: row.scaled(row.entry.nominal + row.draw), where="screen"),
-    Column("", "off by", "", lambda row: row.off, where="screen"),
-    Column("", "in sigmas", "", lambda row: f"{row.draw / row.entry.sigma:+.2f}" if row.entry.sigma else "bias",
-           where="screen"),
-)  # fmt: skip
-
-
-def inputs_table(drawn: Iterable[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
+def inputs_table(drawn: Sequence[DispersedInput], draws: Mapping[str, float]) -> FittedColumns:
     """Every input of one case: nominal, drawn, and the deviation."""
-    rows = [DrawnInput(entry, draws[entry.name]) for entry in drawn]
-    return DataTable("Inputs", INPUTS, rows).screen("screen")
+
+    def scaled(entry: DispersedInput, value: float, form: str = ".6g") -> str:
+        return f"{unit_of_people(entry)[1] * value:{form}}"
+
+    def off(entry: DispersedInput) -> str:
+        if entry.unit == "":
+            return of_nominal(entry, draws[entry.name], "+.4g")
+        return f"{scaled(entry, draws[entry.name], '+.4g')} {unit_of_people(entry)[0]}"
+
+    def sigmas(entry: DispersedInput) -> str:
+        return f"{draws[entry.name] / entry.sigma:+.2f}" if entry.sigma else "bias"
+
+    columns = (
+        Column("", Shared.INPUT, "", lambda row: in_words(row.name), where="screen", kind=TEXT),
+        Column("", Shared.NOMINAL, "", lambda row: scaled(row, row.nominal), where="screen"),
+        Column("", Shared.THIS_CASE, "", lambda row: scaled(row, row.nominal + draws[row.name]), where="screen"),
+        Column("", "off by", "", off, where="screen"),
+        Column("", "in sigmas", "", sigmas, where="screen"),
+    )
+    return DataTable("Inputs", columns, drawn).screen("screen")
 
 
 def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
@@ -200,12 +189,18 @@ def unit_of_people(entry: DispersedInput) -> tuple[str, float]:
     return screen_unit(*SHOWN.get(entry.unit, (entry.unit, 1.0)))
 
 
-def unused_table(unused: Iterable[Unused]) -> Table:
-    """Inputs without effect; names that share a reason are listed together."""
+def unused_table(unused: Iterable[Unused]) -> list[RenderableType]:
+    """Inputs without effect under their heading; nothing where there are none."""
+    rows = list(without_effect(unused))
+    return [Text(), Text("Unused dispersions", style="bold"), facts(rows)] if rows else []
+
+
+def without_effect(unused: Iterable[Unused]) -> Iterator[tuple[str, str]]:
+    """Inputs without effect and the reasons; names that share a reason are listed together."""
     reasons: dict[str, list[str]] = {}
     for name, reason in unused:
         reasons.setdefault(reason, []).append(in_words(name))
-    return facts((", ".join(names), reason) for reason, names in reasons.items())
+    return ((", ".join(names), reason) for reason, names in reasons.items())
 
 
 def in_words(name: str) -> str:

@@ -181,7 +181,9 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
         if front.points:
             rows = [row for row in rows_of(fronts) if row.front is front]
             parts.append(_table(rows).screen("full"))
-    below = [BELOW] * any(map(_below, rows_of(fronts)))
+    priced = [(row.spent(row.point.cost), row.spent(row.least)) for row in rows_of(fronts)
+              if row.least is not None and row.point.cost < row.least]  # fmt: skip
+    below = [BELOW] * any(spent != least for spent, least in priced)  # as the table writes both
     for note in (*below, *_ends_off(fronts)):
         parts += [Text(), Text(note, style="dim")]
     return parts
@@ -192,12 +194,6 @@ def _ends_off(fronts: Sequence[Front]) -> Iterator[str]:
     off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield OFF
-
-
-def _below(row: TradeRow) -> bool:
-    """True where it costs less than its small-angle bound, as the table writes both."""
-    spent = row.point.cost
-    return row.least is not None and spent < row.least and row.spent(spent) != row.spent(row.least)
 
 
 def fails(point: Point) -> bool:
@@ -244,22 +240,21 @@ def trade_csv(fronts: Sequence[Front]) -> str:
 
 def trade_json(spacecraft: Spacecraft, fronts: Sequence[Front]) -> dict[str, Any]:
     """All fronts with their plans, in the form of ``plan --json``."""
-    points = [
-        (row.front, {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)})
-        for row in rows_of(fronts)
-    ]
     entries = []
     for front in fronts:
-        own = [point for owner, point in points if owner is front]
-        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": own})
+        points = [
+            {"point": row.number, "horizon_s": row.point.horizon, **plan_json(row.plan)}
+            for row in rows_of(fronts)
+            if row.front is front
+        ]
+        entries.append({"shift_allowed_deg": math.degrees(front.shift), "why": front.why, "points": points})
     return {**heading(spacecraft), "fronts": entries}
 
 
 def schedule_files(fronts: Sequence[Front], folder: str) -> list[tuple[str, str]]:
     """The pulses of every point: (path in ``folder``, contents)."""
-    plans = [row.plan for row in rows_of(fronts)]
-    files = (pulse_table(plan.flight).csv() for plan in plans)
-    return list(zip(schedule_paths(folder, len(plans)), files, strict=True))
+    files = [pulse_table(row.plan.flight).csv() for row in rows_of(fronts)]
+    return list(zip(schedule_paths(folder, len(files)), files, strict=True))
 
 
 def schedule_paths(folder: str, count: int) -> list[str]:
@@ -270,39 +265,18 @@ def schedule_paths(folder: str, count: int) -> list[str]:
 # --- beside a recommended plan
 
 
-class _Better(NamedTuple):
-    """A point better than the recommended plan: share of the cost saved, and s by which it ends earlier.
-
-    ``only``: it meets the requirement, and the recommended plan does not.
-    """
-
-    saved: float
-    earlier: float
-    row: TradeRow
-    only: bool
-
-    @property
-    def how(self) -> str:
-        """Words for its advantage."""
-        if self.only:
-            return "meets the requirement with nominal values, which the recommended plan does not"
-        costs = f"costs {100.0 * self.saved:.2g} % less than" if self.saved else "costs as much as"
-        ends = f"{duration(self.earlier)} earlier" if self.earlier > TOGETHER else "at the same time"
-        return f"{costs} the recommended plan and ends {ends}"
-
-
-def _better(fronts: Sequence[Front], chosen: Plan) -> _Better | None:
+def _better(fronts: Sequence[Front], chosen: Plan) -> tuple[float, float, TradeRow] | None:
     """The point that meets the requirement, and costs less and ends no later, or ends sooner and is not worse.
 
     Any that meets it, where the ``chosen`` plan does not. The cheapest, of those that cost as much the one that ends
-    first.
+    first. Before it the share of the cost saved, and s by which it ends earlier.
     """
     until, misses, better = chosen.pulses.end, chosen.meets_requirement is False, []
     for row in rows_of(fronts):
         saved, end = 1.0 - row.point.cost / chosen.pulses.cost_in(row.point.unit), row.plan.pulses.end
         cheaper = saved > SAME_COST and end <= until
         if row.plan.meets_requirement and (misses or cheaper or _sooner(row.plan, chosen, saved)):
-            better.append(_Better(saved if misses or saved > SAME_COST else 0.0, until - end, row, misses))
+            better.append((saved if misses or saved > SAME_COST else 0.0, until - end, row))
     return max(better, key=itemgetter(0, 1), default=None)
 
 
@@ -318,7 +292,14 @@ def beats(fronts: Sequence[Front], chosen: Plan) -> str:
     better = _better(fronts, chosen)
     if better is None:
         return ""
-    number, front, point = better.row
+    saved, earlier, row = better
+    front, point = row.front, row.point
+    too, how = "", "meets the requirement with nominal values, which the recommended plan does not"
+    if chosen.meets_requirement is not False:
+        costs = f"costs {100.0 * saved:.2g} % less than" if saved else "costs as much as"
+        ends = f"{duration(earlier)} earlier" if earlier > TOGETHER else "at the same time"
+        too = "meets the requirement with nominal values too, "
+        how = f"{costs} the recommended plan and ends {ends}"
     pointing, plans = chosen.spacecraft.goal.axis is not None, (point.plan, chosen)
     off, counts = [plan.flight.residual.axis_error for plan in plans], [len(plan.pulses) for plan in plans]
     asides = [front_name(front, pointing=pointing)]
@@ -329,8 +310,7 @@ def beats(fronts: Sequence[Front], chosen: Plan) -> str:
         asides.append(f"pulses: {counts[0]} instead of {counts[1]}")
     options = "--free-axis " if math.isinf(front.shift) else f'--shift "{degrees(front.shift)}" ' * (front.shift > 0.0)
     return (
-        f"point {number} {'meets the requirement with nominal values too, ' * (not better.only)}{better.how} "
-        f"({'; '.join(asides)}): "
+        f"point {row.number} {too}{how} ({'; '.join(asides)}): "
         f'nutdamp plan SPACECRAFT --scheme {point.plan.scheme} {options}--set "limits.horizon={point.horizon:.6g} s".'
     )
 

@@ -16,7 +16,7 @@ from nutdamp.planning.decision import compare, decide
 from nutdamp.planning.notes import TIES, alternatives, comparison_warnings, decision_notes, plan_notes, reasons
 from nutdamp.planning.recommendation import Gain
 from nutdamp.views.guide import note_entries
-from nutdamp.views.text import NAME, NOTE, REASON, WARNING, message, note_json, ordered, text
+from nutdamp.views.text import NAME, NOTE, REASON, WARNING, note_json, ordered, screen_line, text
 
 SOURCE = Path(nutdamp.__file__).parent
 
@@ -77,7 +77,7 @@ def test_a_rate_is_no_time() -> None:
 
 def test_a_note_for_people_has_severity_and_code_and_for_programs_the_values_too() -> None:
     entry = note("momentum-shift", scheme="optimal", momentum_shift_deg=0.25)
-    assert message(entry).startswith("note[momentum-shift]: optimal ")
+    assert screen_line(entry).plain.startswith("note[momentum-shift]: optimal ")
     data = note_json(entry)
     assert (data["code"], data["severity"]) == ("momentum-shift", "note")
     assert data["values"] == {"scheme": "optimal", "momentum_shift_deg": 0.25}
