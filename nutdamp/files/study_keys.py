@@ -24,7 +24,6 @@ from nutdamp.files.fields import (
     Section,
     Time,
 )
-from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.spacecraft.tolerances import KINDS, Dispersions, Tolerance
 from nutdamp.units import parse, pattern, shown
 
@@ -229,6 +228,8 @@ def dispersions(
     """
     if section is None:
         return None
+    from nutdamp.spacecraft.schedule import STEERABLE
+
     thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)

@@ -151,6 +151,7 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
     yield Column("end_s", Shared.END, "s", attrgetter("plan.pulses.end"), lambda end: f"{end:.3f}", "full json")
     impulse, where = attrgetter("plan.pulses.total_impulse"), "json" if fuelled else "full json"
     yield Column("total_impulse_Nms", Shared.IMPULSE, "N m s", impulse, to_figures(4), where)
+    yield Column("propellant_kg", "", "", attrgetter("plan.pulses.propellant"), where="json")
     yield Column(
         "", Shared.PROPELLANT, "g", lambda row: 1e3 * row.plan.pulses.propellant, to_figures(4), "full" * fuelled
     )
