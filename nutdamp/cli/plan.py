@@ -319,10 +319,10 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
     SPACECRAFT is a YAML file; without it spacecraft.yaml in this folder, else the built-in example. A FILE of - is
     standard output, as GIF.
     """
-    from nutdamp.figures import animation
+    from nutdamp.figures import image
 
     output = job.written["output"] or ""
-    animation.film_format(output)
+    image.film_format(output)
     body = job.begin()
     pulses = plan_or_read(job).pulses
 
@@ -330,15 +330,15 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
     from nutdamp.flight import propagation
 
     end = shown_until(body, pulses) if until is None else until
-    timed = animation.timing(body, end, fps, seconds)
+    timed = image.timing(body, end, fps, seconds)
     if not timed.smooth:
         job.remark(
             f"only {timed.frames / timed.turns:.1f} frames show a nutation turn, which may seem to run backwards: "
-            f"--seconds {timed.turns * animation.SMOOTH / fps:.0f} would show it, or an earlier --until"
+            f"--seconds {timed.turns * image.SMOOTH / fps:.0f} would show it, or an earlier --until"
         )
     flight = propagation.flown(body, pulses, end)
     with job.working("filming"):
-        deliver([(output, lambda: lambda stream: animation.film(stream, flight, timed, output, width))])
+        deliver([(output, lambda: lambda stream: image.film(stream, flight, timed, output, width))])
     if output != "-":
         job.remark(f"wrote {printable(output)}: {timed.frames} frames, {timed.pace:.3g}× real time")
 

@@ -11,9 +11,8 @@ import numpy as np
 from nutdamp.control_loop.budget import DAY, Budget, HeldNutation
 from nutdamp.control_loop.evaluation import LoopPlan
 from nutdamp.control_loop.sensor import Signal
-from nutdamp.figures import labels, style
-from nutdamp.figures.history import EDGE, TIME, firings, firings_height
-from nutdamp.figures.overview import title
+from nutdamp.figures import style
+from nutdamp.figures.overview import EDGE, TIME, firings, firings_height, title
 from nutdamp.figures.style import GREY, INK, MOMENTUM, MOTION, PULSE
 from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Vector
@@ -69,7 +68,7 @@ def loop_figure(plan: LoopPlan) -> Figure:
     style.legend(figure, list(panels.ravel()))
     loop = described(run.loop, thresholds=False).replace(" deg", "°")
     style.heading(figure, run.flight.spacecraft, f"{title(run.flight)}\n{loop}")
-    labels.settle(figure)
+    style.settle(figure)
     return figure
 
 

@@ -1,7 +1,4 @@
-"""The pictures of a flight by their names, and the two planes of its motion; one of them shows all on one sheet.
-
-The planes: pole curve in the body, axis track in space with H as an inset. ``track`` is a track of ``flight``.
-"""
+"""The overview of a plan: axis track beside nutation, firings and rates over time."""
 
 from __future__ import annotations
 
@@ -13,22 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nutdamp.figures import geometry, history, labels, sphere, style
-from nutdamp.figures.style import FIRED, GREY, INK, MOMENTUM, MOTION, PULSE, THIN, TURNED
+from nutdamp.figures import geometry, sphere, style
+from nutdamp.figures.style import FIRED, GREY, INK, MISSED, MOMENTUM, MOTION, PULSE, THIN, TURNED, UNCHECKED
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight, Track, model_name
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
+from nutdamp.spacecraft.requirements import Part
+from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views.spacecraft import angle_names, angle_texts
+from nutdamp.views.text import steering
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
     from nutdamp.planning.plan import Plan
-
 
 ROWS = 1000
 """Rows of the track of a plan; the figures draw a finer one where they need it."""
@@ -64,7 +65,7 @@ def flight_figure(name: str, flight: Flight, track: Track, *, narrow: bool = Fal
     until, end = float(seen.t[-1]), float(track.t[-1])
     part = f"; drawn: the first {until:.4g} s of {end:.4g} s" if until < 0.99 * end else ""
     style.heading(figure, flight.spacecraft, title(flight) + part)
-    labels.settle(figure)
+    style.settle(figure)
     return figure
 
 
@@ -85,13 +86,13 @@ def title(flight: Flight) -> str:
 
 def overview(flight: Flight, track: Track) -> Figure:
     """Motion above history: one sheet of A4 across, or longer."""
-    sizes = history.heights(flight, track)
+    sizes = heights(flight, track)
     figure = style.sheet(9.6, TALL + 1.6 + sum(sizes))
     ratio = ROOM if geometry.momentum_inset(flight, track) is not None else 1.0
     grid = figure.add_gridspec(1 + len(sizes), 2, height_ratios=[TALL, *sizes], width_ratios=[1.0, ratio])
     planes(figure, (grid[0, 0], grid[0, 1]), flight, track)
     cells = [grid[row + 1, :] for row in range(len(sizes))]
-    style.legend(figure, history.courses(figure, cells, flight, track))
+    style.legend(figure, courses(figure, cells, flight, track))
     return figure
 
 
@@ -130,10 +131,10 @@ def axis_track(axes: Axes, flight: Flight, track: Track) -> None:
     target, small = geometry.sky_target(flight, track), geometry.momentum_inset(flight, track)
     _path(axes, flight, track, path)
     places = _momentum(axes, flight, track, momentum, float(np.ptp(path, axis=0).max()))
-    labels.target(axes, target)
+    style.target(axes, target)
     middle, half = style.square(axes, np.vstack([path, momentum, target]), margin=0.14)
     if small is None:
-        labels.add(axes, "H", places[0], TURNED, role="vital")
+        style.add(axes, "H", places[0], TURNED, role="vital")
     else:
         ticks = [tick for tick in axes.get_xticks() if abs(tick - middle[0]) <= half]
         axes.set_xlim(middle[0] - half, middle[0] + (2.0 * ROOM - 1.0) * half)
@@ -149,9 +150,9 @@ def _inset(axes: Axes, flight: Flight, track: Track, small: Vector) -> None:
     momentum = geometry.sky_paths(flight, track)[1]
     stations = _momentum(inset, flight, track, momentum, float(np.ptp(small, axis=0).max()))
     for number in style.thinned(len(stations) - 1, NUMBERED):
-        labels.add(inset, str(number + 1), stations[number + 1], FIRED, meant=labels.meant(stations, [number + 1]))
-    labels.add(inset, "t = 0", stations[0], INK, role="vital")
-    labels.target(inset, geometry.sky_target(flight, track))
+        style.add(inset, str(number + 1), stations[number + 1], FIRED, meant=style.meant(stations, [number + 1]))
+    style.add(inset, "t = 0", stations[0], INK, role="vital")
+    style.target(inset, geometry.sky_target(flight, track))
     style.square(inset, small, margin=0.25)
     inset.locator_params(nbins=3)
     inset.tick_params(labelsize=style.SMALL)
@@ -206,9 +207,9 @@ def _path(axes: Axes, flight: Flight, track: Track, points: Vector) -> None:
         axes.plot(*np.array(begins).T, ".", color=PULSE, markersize=5 if thin == 1.0 else 3)
     axes.plot(*points[0], "o", color=MOTION, markersize=4.5)
     axes.plot(*points[-1], "o", color=MOTION, markersize=5.5, markerfacecolor="none", markeredgewidth=1.2, label="end")
-    labels.add(axes, "t = 0", points[0], INK, role="vital")
+    style.add(axes, "t = 0", points[0], INK, role="vital")
     if firings:
-        labels.add(axes, "end", points[-1], INK)
+        style.add(axes, "end", points[-1], INK)
 
 
 def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
@@ -217,10 +218,10 @@ def _number(axes: Axes, firings: Sequence[Vector], width: float) -> None:
     for group in together([rows[len(rows) // 2] for rows in firings], width):
         own, first, last = np.vstack([some[number] for number in group]), group[0] + 1, group[-1] + 1
         others = [rows for other, rows in enumerate(some) if other not in group]
-        meant = labels.Meant(own, np.vstack([np.empty((0, 2)), *others]))
+        meant = style.Meant(own, np.vstack([np.empty((0, 2)), *others]))
         middle = firings[group[len(group) // 2]]
         text = f"{'firing ' * (first == 1)}{first}" + (f"\N{EN DASH}{last}" if first != last else "")
-        labels.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
+        style.add(axes, text, middle[len(middle) // 2], FIRED, meant=meant)
 
 
 def together(places: Sequence[Vector], width: float) -> list[list[int]]:
@@ -264,12 +265,8 @@ def _directions(axes: Axes, flight: Flight, size: float) -> bool:
         axes.plot(*np.outer(way, [1.1, 1.28]), color=INK, linewidth=1.2)
         style.heads(axes, np.outer([1.1, 1.3], way), [1], INK)
         names = ", ".join(entry.name for entry in group[:3]) + (" …" if len(group) > 3 else "")
-        labels.add(axes, names, 1.2 * way, INK, role="vital")
+        style.add(axes, names, 1.2 * way, INK, role="vital")
     return bool(groups)
-
-
-DRAWN = {"overview": overview, "motion": motion, "sphere": sphere.sphere, "history": history.history}
-NARROW = {"history": partial(history.history, narrow=True)}
 
 
 def shown(plan: Plan) -> tuple[Flight, Track]:
@@ -283,3 +280,166 @@ def until(flight: Flight) -> float:
     """End of the time axis of a flight, s: that of the flight where it was named, else `geometry.shown_until`."""
     usual = flight.schedule.end + flight.spacecraft.inertial_period
     return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)
+
+
+TIME = "time, s"
+"""Label of time axes."""
+
+DECADES = 4.0
+"""Largest number of decades of the nutation on a log axis, unless the requirement lies lower."""
+
+EDGE = 0.012
+"""Room before t = 0, as a part of the time shown, so that events at t = 0 are seen."""
+
+FULL, PALE = 0.9, 0.35
+"""Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
+
+BAR = 0.46
+"""Height of a bar; the distance between two rows is 1."""
+
+CHANGES = 1e-3
+"""Share of the largest ω3 from which on its change is drawn."""
+
+
+def heights(flight: Flight, track: Track) -> list[float]:
+    """Height of each panel, inches: nutation, firings, ω1 and ω2, and ω3 where it changes."""
+    spin = track.rates[:, 2]
+    changes = float(np.ptp(spin)) > CHANGES * float(np.abs(spin).max())
+    return [1.9, *firings_height(flight), 1.5, *([0.9] * changes)]
+
+
+def firings_height(flight: Flight) -> list[float]:
+    """Inches of the panel of `firings`, for each row a bar, its number, and room; empty where nothing fires."""
+    rows = len(geometry.channels_fired(flight))
+    return [0.3 + 0.36 * rows] * bool(rows)
+
+
+def history(flight: Flight, track: Track, *, narrow: bool = False) -> Figure:
+    """Nutation, firings and rates over one time axis; ``narrow``: for a phone."""
+    sizes = heights(flight, track)
+    figure = style.sheet(style.PHONE if narrow else 7.4, 1.6 + sum(sizes))
+    grid = figure.add_gridspec(len(sizes), 1, height_ratios=sizes)
+    style.legend(figure, courses(figure, [grid[row] for row in range(len(sizes))], flight, track))
+    return figure
+
+
+def courses(figure: Figure, cells: Sequence[SubplotSpec], flight: Flight, track: Track) -> list[Axes]:
+    """The panels of `heights` in ``cells`` of a figure, from above."""
+    first = figure.add_subplot(cells[0])
+    panels = [first, *(figure.add_subplot(cell, sharex=first) for cell in cells[1:])]
+    others = iter(panels[1:])
+    nutation_history(first, flight, track)
+    if len(flight.schedule):
+        firings(next(others), flight, float(track.t[-1]))
+    rate_history(next(others), flight, track)
+    for axes in others:
+        _spin_history(axes, flight, track)
+    for axes in panels[:-1]:
+        axes.tick_params(labelbottom=False)
+    panels[-1].set_xlabel(TIME)
+    return panels
+
+
+def nutation_history(axes: Axes, flight: Flight, track: Track) -> None:
+    """Nutation θ on a log axis with the band that is required, and its last value."""
+    angles, limit = np.degrees(track.nutation), style.limit_of(flight.spacecraft, Part.NUTATION)
+    most, bound = max(float(angles.max()), geometry.LEAST), math.inf if limit is None else limit
+    low = max(0.5 * min(float(angles.min()), bound, 0.1 * most), min(most * 10.0**-DECADES, 0.1 * bound))
+    if limit is not None:
+        axes.axhspan(0.0, limit, facecolor=GREY, alpha=0.16, linewidth=0.0, zorder=0.4)
+        axes.axhline(limit, **style.LIMIT)
+    axes.plot(track.t, np.where(angles > low, angles, 0.1 * low), color=MOTION, label="nutation θ")
+    _bands(axes, flight, track)
+    style.log_angles(axes, low, 2.0 * (most if limit is None else max(most, limit)))
+    text, colour = _verdict(flight)
+    last = f"θ at {style.number(float(track.t[-1]))} s: {style.angle(float(track.nutation[-1]))}"
+    axes.set_title(last + text, loc="right", color=colour, **style.NOTE)
+
+
+def _verdict(flight: Flight) -> tuple[str, str]:
+    """Words, and their colour, for the requirement after the last firing; empty without one."""
+    body, left = flight.spacecraft, flight.residual
+    limits = {part: style.limit_of(body, part) for part in (Part.NUTATION, requirements.aim(body))}
+    if all(limit is None for limit in limits.values()):
+        return "", INK
+    ends = {part: math.degrees(getattr(left, part.value)) for part in limits}
+    missed = [style.part_name(part) for part, limit in limits.items() if limit is not None and ends[part] > limit]
+    if missed:
+        return f"; NOT met: {', '.join(missed)}", MISSED
+    return ("; tolerances not checked", UNCHECKED) if body.dispersions is None else ("", INK)
+
+
+def rate_history(axes: Axes, flight: Flight, track: Track) -> None:
+    """Transverse rates ω1, ω2."""
+    rates = np.degrees(track.rates)
+    width = style.thickness(rates, float(track.t[-1]) / flight.spacecraft.body_period / 2.5)
+    axes.plot(track.t, rates[:, 0], color=MOTION, linewidth=width, label="ω1")
+    axes.plot(track.t, rates[:, 1], color=INK, linewidth=0.8 * width, linestyle=(0, (4, 1.5)), label="ω2")
+    half = 1.12 * max(float(np.abs(rates[:, :2]).max()), geometry.LEAST)
+    axes.set_ylim(-half, half)
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω1, ω2, °/s")
+    axes.grid()
+
+
+def _spin_history(axes: Axes, flight: Flight, track: Track) -> None:
+    spin = np.degrees(track.rates[:, 2])
+    axes.plot(track.t, spin, color=MOTION, label="_ω3")
+    axes.margins(y=0.12)
+    _bands(axes, flight, track)
+    axes.set_ylabel("ω3, °/s")
+    axes.grid()
+    axes.locator_params(axis="y", nbins=3)
+
+
+def _bands(axes: Axes, flight: Flight, track: Track) -> None:
+    """Time axis, and bands of the firings."""
+    until = float(track.t[-1])
+    axes.set_xlim(-EDGE * until, until)
+    look: dict[str, Any] = {"facecolor": (PULSE, 0.25), "edgecolor": PULSE, "linewidth": 0.6, "zorder": 0.5}
+    for number, block in enumerate(geometry.blocks(flight, until)):
+        axes.axvspan(block.begins, block.ends, label=None if number else "firing", **look)
+
+
+def firings(axes: Axes, flight: Flight, until: float) -> None:
+    """A bar for each firing, in the row of its channel; times when nothing may fire are hatched, beside the labels."""
+    names = geometry.channels_fired(flight)
+    rows = {name: len(names) - 1 - index for index, name in enumerate(names)}
+    axes.set_xlim(-EDGE * until, until)
+    axes.set_ylim(-0.5, max(len(names), 1) + 0.25)
+    for begins, ends in geometry.closed(flight.spacecraft, until):
+        for row in rows.values():
+            axes.broken_barh(
+                [(begins, ends - begins)], (row - 0.5 * BAR, BAR), facecolor="none", edgecolor=GREY, hatch="////",
+                linewidth=0.0, label="must not fire",
+            )  # fmt: skip
+    bars = ((block, row) for name, row in rows.items() for block in geometry.blocks(flight, until, name))
+    for block, row in sorted(bars):
+        _bar(axes, flight, block, row)
+    axes.set_yticks(list(rows.values()), list(rows))
+    axes.grid(axis="x")
+    notes = ["effective on-times, not the commands"] * any(pulse.through_valve for pulse in flight.schedule)
+    if any(pulse.channel == STEERABLE for pulse in flight.schedule):
+        notes.append("angles: torque from body axis +1")
+    axes.set_title("; ".join(notes), loc="right", **style.NOTE)
+
+
+def _bar(axes: Axes, flight: Flight, block: geometry.FiredBlock, row: int) -> None:
+    """The bar of a firing, or of several that cannot be distinguished: paler where they do not fill it."""
+    size = block.ends - block.begins
+    dense = block.many == 1 or block.on > FULL * size
+    axes.broken_barh(
+        [(block.begins, size)], (row - 0.5 * BAR, BAR), facecolor=PULSE if dense else (PULSE, PALE), edgecolor=PULSE,
+        linewidth=0.8, label=None if dense else "firings too close to be distinguished",
+    )  # fmt: skip
+    how, pulse = f"{style.number(block.on)} s", flight.schedule.pulses[block.first - 1]
+    if block.many == 1:
+        how = how if pulse.on_time else f"{style.number(pulse.magnitude)} N m s"
+        if pulse.channel == STEERABLE:
+            how += f" at {steering(flight.spacecraft.inertia.in_file(pulse.impulse).tolist())}"
+    place: Vector = np.array([block.begins + 0.5 * size, row + 0.5 * BAR])
+    style.add(axes, f"{block.name}: {how}", place, INK, role="bar", short=block.name)
+
+
+DRAWN = {"overview": overview, "motion": motion, "sphere": sphere.sphere, "history": history}
+NARROW = {"history": partial(history, narrow=True)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from nutdamp.figures import geometry, labels, style
+from nutdamp.figures import geometry, style
 from nutdamp.figures.geometry import DrawnCones
 from nutdamp.figures.style import FAINT, GREY, INK, MOMENTUM, MOTION, PULSE, TURNED
 from nutdamp.flight.propagation import Flight, Track
@@ -100,11 +100,11 @@ def cones_in_space(axes: Axes, flight: Flight, track: Track) -> None:
     draw_ground(axes, looked, track)
     fired = draw_path(axes, looked, flight, track)
     draw_cones(axes, looked, rolling)
-    labels.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
+    style.target(axes, looked.seen(geometry.aimed(flight))[0], "_target")
     tips = looked.seen(_directions(rolling))[0]
     for number, (_, colour, name) in enumerate(DIRECTIONS):
-        meant = labels.meant(tips, [number])
-        labels.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
+        meant = style.meant(tips, [number])
+        style.add(axes, name, tips[number], TURNED if colour == MOMENTUM else colour, role="vital", meant=meant)
     name_lines(axes, rolling, fired=fired)
     frame(axes, looked, np.vstack([rolling.body, rolling.space, track.axis, track.momentum, geometry.aimed(flight)]))
     before = ", before firing 1" * any(pulse.thrust[0] <= 0.0 for pulse in flight.schedule.pulses[:1])

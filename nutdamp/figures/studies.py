@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nutdamp.common.numerics import down
-from nutdamp.figures import geometry, labels, style
+from nutdamp.figures import geometry, style
 from nutdamp.figures.style import GREY, INK, MISSED, MOMENTUM, MOTION, PULSE
 from nutdamp.flight.propagation import model_name
 from nutdamp.montecarlo.statistics import VECTORS, Distribution
@@ -283,7 +283,7 @@ def trade_figure(
         _graduate(axes)
     axes.grid(True, which="both")
     style.legend(figure, [axes], 3)
-    labels.settle(figure)
+    style.settle(figure)
     return figure
 
 
@@ -324,8 +324,8 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         axes.plot(*np.transpose(failing), "x", label=FAILS, **CROSS)
     places = np.array([place[:2] for place in shown])
     for row, (_, _, numbers) in enumerate(shown):
-        text, meant = ", ".join(map(str, numbers)), labels.meant(places, [row])
-        labels.add(axes, text, places[row], INK, role="vital", meant=meant)
+        text, meant = ", ".join(map(str, numbers)), style.meant(places, [row])
+        style.add(axes, text, places[row], INK, role="vital", meant=meant)
 
 
 ROWS = 6000

@@ -29,8 +29,7 @@ from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
 from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle, text
 
 if TYPE_CHECKING:
-    from nutdamp.montecarlo.checkpoints import Checkpoints
-    from nutdamp.montecarlo.study import Results
+    from nutdamp.montecarlo.study import Checkpoints, Results
 
 
 CHECKED = 24
@@ -61,7 +60,7 @@ def manoeuvre_blocks(
     yield Prose(summary, alarm=decision.met is False)
     points = None
     if dispersed is not None:
-        from nutdamp.montecarlo.checkpoints import Checkpoints
+        from nutdamp.montecarlo.study import Checkpoints
 
         points = Checkpoints(dispersed.study)
     yield FactList("GO at t = 0 with", tuple(_conditions(decision, points)))
@@ -183,7 +182,7 @@ def _counted(body: Spacecraft, which: str, value: float) -> str:
 
 def _ranges(points: Checkpoints, counts: Sequence[int], expected: Sequence[float]) -> list[str]:
     """Range of the nutation in flown cases after each row that has one, with that ``expected`` (rad) in it."""
-    from nutdamp.montecarlo.checkpoints import even
+    from nutdamp.montecarlo.study import even
 
     limit = limits(points.study.model.spacecraft)[0]
     rows = [number - 1 for number in even(len(counts), CHECKED)]

@@ -22,7 +22,7 @@ from support.colours import check_colours, contrast, pages
 from support.layout import check_layout, texts
 from support.shown import BODY, CASES, NAMES, STEERED, WIDE, check_star, drawn, flight_picture, flown, kicks, notes
 
-from nutdamp.figures import geometry, labels, overview, style
+from nutdamp.figures import geometry, overview, style
 from nutdamp.figures.overview import together
 from nutdamp.figures.style import GREY, INK, MOTION, PULSE
 from nutdamp.files.reader import load_spacecraft
@@ -46,8 +46,8 @@ def test_vital_labels_are_never_left_out_and_others_where_there_is_no_room(role:
     figure = Figure((3.0, 2.0), layout="constrained")
     axes = figure.subplots()
     for number in range(30):
-        labels.add(axes, f"label {number}", np.full(2, 0.5), INK, role=role)
-    labels.settle(figure)
+        style.add(axes, f"label {number}", np.full(2, 0.5), INK, role=role)
+    style.settle(figure)
     assert all(one.get_visible() for one in axes.texts) == complete
 
 

@@ -29,9 +29,8 @@ from support.shown import BODY, WIDE, drawn, flight_picture, flown, kicks
 
 from nutdamp.common import work
 from nutdamp.errors import BadRequest, CannotWrite, MissingExtra
-from nutdamp.figures import animation, geometry, image, overview, style
-from nutdamp.figures.animation import Scene, Timing, film_format, timing
-from nutdamp.figures.image import _brief
+from nutdamp.figures import geometry, image, overview, style
+from nutdamp.figures.image import Scene, Timing, _brief, film_format, timing
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
@@ -188,7 +187,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
     timed = timing(WIDE, end, 20, 0.4)
     stream, done = io.BytesIO(), list[int]()
     monkeypatch.setattr(work, "reach", done.append)
-    animation.film(stream, made, timed, "a.gif", 401)
+    image.film(stream, made, timed, "a.gif", 401)
     assert done == list(range(1, 9))
     picture = Image.open(stream)
     assert (picture.format, picture.size, getattr(picture, "n_frames", 1)) == ("GIF", (400, 240), 8)
@@ -198,7 +197,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
         picture.seek(number)
         frames.append(np.asarray(picture.convert("RGB")).astype(int))
         style.styled(scene.show)(number)
-        off = np.abs(frames[-1] - animation.LEVELS[style.styled(scene.pixels)()].astype(int)).max(axis=2)
+        off = np.abs(frames[-1] - image.LEVELS[style.styled(scene.pixels)()].astype(int)).max(axis=2)
         assert np.count_nonzero(off > 40) < 0.002 * off.size  # colours that the palette has not
     assert frames[0][0, 0].tolist() == [255, 255, 255]
     assert np.ptp(frames[0]) > 150  # nothing blank
@@ -209,7 +208,7 @@ def test_a_gif_has_its_frames_its_size_and_its_pace(
 @pytest.mark.deep
 def test_a_film_in_which_nothing_moves_has_all_its_frames() -> None:
     made, stream = propagation.flown(spinner(degrees=0.0), Schedule(), 5.0), io.BytesIO()
-    animation.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320)
+    image.film(stream, made, Timing(5.0, 4, 10, 1.0), "a.gif", 320)
     assert getattr(Image.open(stream), "n_frames", 1) == 4
 
 
@@ -279,7 +278,7 @@ def test_a_firing_is_announced(damped: tuple[Flight, float]) -> None:
     over = scene.caption(first.end + 0.01)  # a short one would else be missed between two frames
     assert f"fired 1: {first.channel}" in over
     assert "firing" not in over
-    assert "fire" not in scene.caption(first.end + 2.0 * animation.HELD * scene.timed.pace)
+    assert "fire" not in scene.caption(first.end + 2.0 * image.HELD * scene.timed.pace)
 
 
 @pytest.mark.parametrize(("turns", "seconds"), [(1.0, 6.0), (20.0, 12.0), (1000.0, 30.0)])
@@ -299,12 +298,12 @@ def test_an_ffmpeg_that_fails_is_no_traceback(
     (tmp_path / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     with pytest.raises(CannotWrite, match="failed with status 3"):
-        animation.film(io.BytesIO(), damped[0], Timing(damped[1], 2, 10, 1.0), "a.mp4", 320)
+        image.film(io.BytesIO(), damped[0], Timing(damped[1], 2, 10, 1.0), "a.mp4", 320)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
 def test_an_mp4_is_one(damped: tuple[Flight, float]) -> None:
     stream = io.BytesIO()
-    animation.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400)
+    image.film(stream, damped[0], Timing(damped[1], 6, 10, 1.0), "a.mp4", 400)
     assert stream.getvalue()[4:8] == b"ftyp"
     assert film_format("a.mp4") == "mp4"

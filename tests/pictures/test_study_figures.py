@@ -25,8 +25,8 @@ from nutdamp.control_loop.dispersion import LoopResults, loop_study
 from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.figures import studies
-from nutdamp.figures.history import BAR
 from nutdamp.figures.loop import first_seconds, loop_figure
+from nutdamp.figures.overview import BAR
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
 from nutdamp.page.report import dispersion_pictures

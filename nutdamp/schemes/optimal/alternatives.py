@@ -23,7 +23,7 @@ from nutdamp.flight.end_state import left_by
 from nutdamp.flight.propagation import Flight
 from nutdamp.schemes.catalogue import HalfConeOptions, RhumbLineOptions, SchemeOptions, TwoPulseOptions
 from nutdamp.schemes.correction import bounded_step
-from nutdamp.schemes.optimal import highs, refinement
+from nutdamp.schemes.optimal import linear_program, refinement
 from nutdamp.schemes.optimal.descent import Task
 from nutdamp.schemes.optimal.linear_program import Solution
 from nutdamp.schemes.optimal.problem import LEFT, UNMET, Problem
@@ -272,7 +272,7 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     whole = np.einsum("nek,ck->ecn", influence.rows(centres) * lost[:, None], torques) * (width / size)
     columns = whole.reshape(len(influence.goal), -1)
     equations, slots = len(influence.goal), len(free)
-    program = highs.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
+    program = linear_program.GrowingProgram(influence.goal / size, np.ones(slots), np.ones(equations))
     slack = np.vstack([np.hstack([np.eye(equations), -np.eye(equations)]), np.zeros((slots, 2 * equations))])
     dearest = float(problem.costs.max())
     program.add(np.full(2 * equations, 1e4 * slots), slack, np.full(2 * equations, np.inf))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
-from nutdamp.schemes.optimal import highs
+from nutdamp.schemes.optimal import linear_program
 from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
 from nutdamp.spacecraft.model import Vector
 
@@ -178,7 +178,7 @@ class ChanceProgram:
         tangents = [Tangent(limit, complex(u), *plain) for limit in self.limits for u in directions_of(limit, BEGUN)]
         columns = self._begin()
         rights = np.array([self.right(tangent, margin) for tangent in tangents]) / self.scale
-        master = highs.GrowingProgram(np.zeros(0), rights, np.zeros(0))
+        master = linear_program.GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
         master.add(np.array([10.0]), excess, np.array([np.inf]))
@@ -254,7 +254,9 @@ class ChanceProgram:
     def _slots(self, channel: NDArray[np.int_], slot: NDArray[np.int_]) -> ProgramColumns:
         return alone(channel, self.program.centres[slot], np.where(self.strong[channel], 0.0, self.program.width))
 
-    def _add(self, master: highs.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float) -> None:
+    def _add(
+        self, master: linear_program.GrowingProgram, tangents: list[Tangent], new: ProgramColumns, margin: float
+    ) -> None:
         most = np.where(new.width > 0.0, new.width / self.unit[new.channel], np.inf)
         rows = np.array([self._coefficients(tangent, new, margin) for tangent in tangents]).reshape(len(tangents), -1)
         master.add(self.cost[new.channel] / self.dearest, rows, most)

@@ -16,7 +16,7 @@ from nutdamp.flight import dynamics, propagation
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import CUT, compare, infeasibility
 from nutdamp.planning.notes import plan_notes
-from nutdamp.schemes.optimal import highs
+from nutdamp.schemes.optimal import linear_program
 from nutdamp.spacecraft.model import Disturbance, Limits
 from nutdamp.spacecraft.schedule import Schedule
 
@@ -121,12 +121,12 @@ def test_linear_programs_count_by_their_size(monkeypatch: pytest.MonkeyPatch) ->
     body = spinner(7500.0, 7500.0, 0.018, degrees=0.5, channels=cross(3e-4), limits=Limits(horizon=2e5))
     monkeypatch.setattr(work, "SCHEME", 300.0)
     sizes: list[int] = []
-    optimum = highs.GrowingProgram.optimum
+    optimum = linear_program.GrowingProgram.optimum
 
-    def counted(self: highs.GrowingProgram) -> highs.Optimum | None:
+    def counted(self: linear_program.GrowingProgram) -> linear_program.Optimum | None:
         sizes.append(self._highs.getNumNz())
         return optimum(self)
 
-    monkeypatch.setattr(highs.GrowingProgram, "optimum", counted)
+    monkeypatch.setattr(linear_program.GrowingProgram, "optimum", counted)
     assert planning.plan(aimed(body, 3.0, 0.0), "optimal").cut
     assert sum(sizes) < 200_000  # of 1.2 million

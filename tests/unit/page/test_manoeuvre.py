@@ -18,8 +18,7 @@ from support.spinners import FILE
 import nutdamp
 from nutdamp.files.reader import load_spacecraft, read_spacecraft
 from nutdamp.flight.propagation import flown
-from nutdamp.montecarlo.checkpoints import CASES, Checkpoints, even, first_pulses
-from nutdamp.montecarlo.study import Results, run, study_of
+from nutdamp.montecarlo.study import CASES, Checkpoints, Results, even, first_pulses, run, study_of
 from nutdamp.page.document import Control
 from nutdamp.page.report import Repeat
 from nutdamp.physics import attitude

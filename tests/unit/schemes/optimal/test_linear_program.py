@@ -23,9 +23,8 @@ from nutdamp.flight import propagation
 from nutdamp.planning.decision import infeasibility
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.catalogue import OptimalOptions
-from nutdamp.schemes.optimal import highs, refinement
-from nutdamp.schemes.optimal.highs import GrowingProgram, Optimum
-from nutdamp.schemes.optimal.linear_program import Program
+from nutdamp.schemes.optimal import linear_program, refinement
+from nutdamp.schemes.optimal.linear_program import GrowingProgram, Optimum, Program
 from nutdamp.schemes.optimal.problem import Problem
 from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.model import Goal, Limits, Vector
@@ -146,7 +145,7 @@ def test_the_optimum_and_its_prices(seed: int) -> None:
         check_same(found, solved(program.grown(5, 8, level=level)))
 
 
-@pytest.mark.parametrize("ways", range(1, 1 + len(highs.WAYS)))
+@pytest.mark.parametrize("ways", range(1, 1 + len(linear_program.WAYS)))
 def test_every_way_of_solving_finds_the_same(ways: int, monkeypatch: pytest.MonkeyPatch) -> None:
     usual = solved(small(1).grown())
     Failing(monkeypatch, lambda call, _: call <= ways)
@@ -180,7 +179,7 @@ assert other.run() == highspy.HighsStatus.kOk
 """
 SOLVED_IN_SILENCE = """
 import numpy as np
-from nutdamp.schemes.optimal.highs import GrowingProgram
+from nutdamp.schemes.optimal.linear_program import GrowingProgram
 program = GrowingProgram(np.ones(1), np.zeros(0), np.ones(1))
 program.add(np.array([3.0, 2.0]), np.array([[1.0, 1.0]]), np.array([9.0, 9.0]))
 found = program.optimum()
@@ -260,14 +259,14 @@ def test_goals_within_and_beyond_reach_are_told_apart(seed: int, rows: int) -> N
     assert found.x is not None
     size = float(found.x[-1])
     assert size > 0.01
-    told = [highs.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
+    told = [linear_program.supplies(most / size, share * goal) for share in (0.3, 0.99, 0.9999, 1.0001, 1.01, 3.0)]
     assert [one is not False for one in told] == [True] * 3 + [False] * 3
     assert all(told[:3])
 
 
 def test_by_so_much_the_goal_may_be_missed() -> None:
     most, goal = np.eye(4) * 0.5, np.array([0.5, 0.5, 0.9, 0.5])
-    assert [highs.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [False, False, True]
+    assert [linear_program.supplies(most, goal, off) for off in (0.0, 0.39, 0.41)] == [False, False, True]
 
 
 @pytest.mark.weekly
