@@ -21,6 +21,9 @@ from nutdamp.errors import BadRequest, Infeasible, MissingExtra
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 
+ROTOR = 0.01  # axial moment of the rotor of a wheel, over that of the body: any will do
+ACCEPT_ALL = 1e30  # tolerance that no step fails, so that the integrator keeps its step
+
 TURN, TURN_TURNING = 0.1, 0.05
 """Largest turn of the body within a default step, rad, also where a torque turns in the body: errors below rounding."""
 
@@ -149,7 +152,7 @@ class _Hub:
         initial = spacecraft.initial
         self._body = basilisk.spacecraft.Spacecraft()
         self._body.ModelTag = "body"
-        rotor = 0.01 * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
+        rotor = ROTOR * self._moments[2] if spacecraft.inertia.wheel else 0.0  # any share will do
         self._body.hub.IHubPntBc_B = np.diag(self._moments + np.array([0.0, 0.0, rotor])).tolist()
         self._body.hub.omega_BN_BInit = _column(initial.rates)
         upper = -initial.quaternion if initial.quaternion[0] < 0.0 else initial.quaternion
@@ -170,7 +173,7 @@ class _Hub:
             self._body.addStateEffector(self._wheel)
         # Kept here, as all its objects are: Basilisk's own hold on them is a plain pointer.
         self._integrator = basilisk.svIntegrators.svIntegratorRKF78(self._body)
-        self._integrator.relTol = self._integrator.absTol = 1e30  # no step fails, so that it keeps its step
+        self._integrator.relTol = self._integrator.absTol = ACCEPT_ALL  # no step fails, so that it keeps its step
         self._body.setIntegrator(self._integrator)
         self._simulation = basilisk.SimulationBaseClass.SimBaseClass()
         self._simulation.bskLogger.setLogLevel(basilisk.bskLogging.BSK_ERROR)  # handed on to the models

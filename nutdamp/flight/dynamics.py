@@ -26,6 +26,11 @@ from nutdamp.spacecraft.model import BLOWDOWN, COLD, LIGHTER, TRAVEL, VALVES, In
 from nutdamp.spacecraft.schedule import Command, Pulse, Schedule, on_command
 from nutdamp.units import STANDARD_GRAVITY
 
+EVEN = 0.01  # share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse
+NODES = 6  # nodes of the quadrature in each of them
+REPEATED = 60  # iterations, and relative tolerance of the on-time for an impulse
+CLOSE = 1e-14  # iterations, and relative tolerance of the on-time for an impulse
+
 
 class Path(Protocol):
     """Motion without jumps."""
@@ -352,9 +357,9 @@ class Supply:
         if tank is None:
             return warm
         on_time = warm / float(tank.thrust_factor(self.used))
-        for _ in range(60 if flow is not None else 0):
+        for _ in range(REPEATED if flow is not None else 0):
             before, on_time = on_time, warm / float(tank.burn(self.used, flow * effective / warm, on_time)[1])
-            if abs(on_time - before) <= 1e-14 * on_time:
+            if abs(on_time - before) <= CLOSE * on_time:
                 break
         return on_time
 
@@ -422,8 +427,8 @@ def falling(pulse: Pulse, tank: Tank, used: float, flow: float) -> Pulse:
     command = pulse.command or Command(start, on_time, (Ramp(pulse.start, pulse.end, 1.0, 1.0),), valve=False)
     gone, mean = tank.burn(used, flow, pulse.on_time)
     first, last = (float(tank.thrust_factor(used + spent) / mean) for spent in (0.0, gone))
-    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / 0.01)), list[Ramp](), 0.0, 0.0
-    nodes, weights = gauss_legendre(6)
+    pieces, ramps, moment, passed = max(1, math.ceil((first - last) / EVEN)), list[Ramp](), 0.0, 0.0
+    nodes, weights = gauss_legendre(NODES)
     for ramp in command.ramps:
         length = (ramp.end - ramp.begin) / pieces
         for number in range(pieces):

@@ -18,6 +18,9 @@ from nutdamp.spacecraft.model import SLACK, Keep, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.requirements import Left, Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
+SHARE = 0.1  # tolerance of the impulse sum, as a fraction of a bound of the requirement
+TRIED = 8  # turns of the axis that are examined closely
+
 LEGENDRE = ((-0.8611363115940526, 0.34785484513745385), (-0.33998104358485626, 0.6521451548625461))
 """Half of the four-point Gauss-Legendre rule on [-1, 1]: (node, weight); the other half is its mirror image."""
 
@@ -123,7 +126,7 @@ def tolerated(spacecraft: Spacecraft) -> dict[Part, float]:
 
     A tenth of what is required; `ANGLE` for a part that nothing bounds.
     """
-    required = {bound.part: 0.1 * bound.most for bound in requirements.required(spacecraft)}
+    required = {bound.part: SHARE * bound.most for bound in requirements.required(spacecraft)}
     return {Part.NUTATION: ANGLE, requirements.aim(spacecraft): ANGLE, **required}
 
 
@@ -283,5 +286,5 @@ def _peaks(times: Vector, values: Vector) -> Vector:
         peaked = np.flatnonzero((before > 0.0) & (after > 0.0) & (rise > fall) & (-before < way) & (way < after))
     before, after, rise, fall, way = (values[peaked] for values in (before, after, rise, fall, way))
     heights = values[1 + peaked] + (rise - fall) / (before + after) * way**2
-    highest = np.argsort(-heights)[:8]
+    highest = np.argsort(-heights)[:TRIED]
     return np.append((times[1 + peaked] + way)[highest], times[int(np.argmax(values))])

@@ -24,6 +24,8 @@ from nutdamp.spacecraft.constraints import (
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Disturbance, Spacecraft
 
+RESONANT = 3.0  # beat period over horizon from which a disturbance counts as resonant
+
 SHORTEST, GRID = 1e-6, 600
 """Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
 
@@ -204,7 +206,7 @@ def _consequence(spacecraft: Spacecraft, disturbance: Disturbance) -> Consequenc
         return Consequence(disturbance, 0.0, 0.0, 0.0, math.inf, (), spin_rate)
     largest, period = response.beat(A, turning, disturbance.transverse, disturbance.rate)
     # A beat that takes longer than everything planned, several times over, is a resonance for the user.
-    if period > 3.0 * spacecraft.horizon:
+    if period > RESONANT * spacecraft.horizon:
         omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
         times = tuple(
             (mark, response.resonant_time(A, spacecraft.axial, omega0, disturbance.transverse, mark))

@@ -38,6 +38,8 @@ from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
+ROUNDING = 1e-9  # of a number of cases
+
 MOST_TOLERANCES, ALLOCATION_HALVINGS = 4, 6
 """Tolerances that may have to shrink together, and halvings of the sizes between too few complying cases and enough."""
 
@@ -250,7 +252,7 @@ def plans(spacecraft: Spacecraft, options: Options | None = None) -> Iterator[tu
 
 def level(results: Results) -> float:
     """Severity of the last case that must comply: 1 or less where enough do, as far as it is known."""
-    last = int((1.0 - results.probability) * results.done + 1e-9)
+    last = int((1.0 - results.probability) * results.done + ROUNDING)
     severities = results.worst.severities
     if results.study.model.spacecraft.keep or last >= len(severities):
         return 1.0 if results.meets_requirement else math.inf

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
     from nutdamp.planning.screening import Cases, PlanCandidate
 
+PICTURED = 100_000  # largest number of rows of the track of a picture
+
 
 BUG = "internal error, please report"
 """Message on a plan whose scheme raised an unexpected exception, which follows by name."""
@@ -390,7 +392,7 @@ class Simulation(results.Data, results.Tabled):
     @cached_property
     def pictured(self) -> Track:
         """Track of pictures, of at most 100,000 rows."""
-        return self._both[self.real].sampled(min(self.samples, 100_000), self.drawn_to)
+        return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)
 
 
 TELLING = math.radians(1e-6)

@@ -23,6 +23,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import LIGHTER, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 
+TURNED = math.radians(0.1)  # turn of H, rad, from which it is mentioned
+
 
 def plan_notes(plan: Plan, *, cones: bool = True) -> tuple[Note, ...]:
     """Notes on a plan, those of its scheme first, or the reason for the lack of a schedule.
@@ -121,7 +123,7 @@ def decision_notes(decision: Decision, *, looped: bool = False) -> Iterator[Note
     yield from _unaided(decision)
     yield from _growing(decision)
     limited = body.goal.axis is not None or _limit_of(body, Part.SHIFT) is not None
-    if not limited and final.momentum_shift > math.radians(0.1):
+    if not limited and final.momentum_shift > TURNED:
         yield note("momentum-shift", scheme=plan.scheme, momentum_shift_deg=math.degrees(final.momentum_shift))
     yield from _spin_change(decision)
     if body.loop is not None:

@@ -10,6 +10,11 @@ from enum import Enum
 from nutdamp.planning.plan import Plan, Share, Standing
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 
+STEADIER_COST = 1.1  # largest cost ratio at which that is worth a note
+FEWER_COST = 1.05  # largest cost ratio at which that is worth a note
+SOONER_COST = 1.05  # largest cost ratio at which that is worth a note
+REAL_COST = 1.1  # largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
+
 SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
 """rad and m/s by which shifts of H and ΔV may differ and be equal: the rounding of a flight."""
 
@@ -142,10 +147,10 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
     gains_of: dict[Gain, Plan] = {}
     # With the largest cost ratio at which each is worth a note.
     for gain, ratio, gains in (
-        (Gain.STEADIER, 1.1, lambda plan: _off(plan) < turned),
-        (Gain.SIMPLER, 1.05, lambda plan: len(plan.pulses) <= few),
-        (Gain.SOONER, 1.05, lambda plan: plan.pulses.end <= soon),
-        (Gain.REAL, 1.1, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
+        (Gain.STEADIER, STEADIER_COST, lambda plan: _off(plan) < turned),
+        (Gain.SIMPLER, FEWER_COST, lambda plan: len(plan.pulses) <= few),
+        (Gain.SOONER, SOONER_COST, lambda plan: plan.pulses.end <= soon),
+        (Gain.REAL, REAL_COST, lambda plan: best.pulses.idealised and not plan.pulses.idealised),
         (Gain.COMMANDED, math.inf, lambda plan: bool(plan.pulses.blocks) and not best.pulses.blocks),
     ):
         most = ratio * best.pulses.cost_in(unit)

@@ -35,6 +35,10 @@ from nutdamp.schemes.catalogue import OPTIMAL, Options
 from nutdamp.spacecraft.constraints import keeps_limits
 from nutdamp.spacecraft.model import Spacecraft, required_share
 
+# later starts that are tried, in nutation periods as seen in the body (inertial ones for a sphere)
+LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
+WITHIN = (1.5, 2.0)  # ends by which the scheme optimal is to be done with least cost, over the earliest one
+
 ROBUST = "robust"
 """Name of the robust plan beside those of schemes."""
 
@@ -303,7 +307,7 @@ def _alignments(body: Spacecraft, scheme: str, options: Options) -> Iterator[tup
 
 def _others(body: Spacecraft, base: Plan) -> Iterator[tuple[str, Spacecraft]]:
     """Spacecraft for which the scheme plans differently: later, or without one of its channels."""
-    for periods in (0.25, 0.5, 0.75, 1.0, 2.0):  # of the nutation as seen in the body, inertial ones for a sphere
+    for periods in LATER:  # of the nutation as seen in the body, inertial ones for a sphere
         earliest = body.limits.earliest + periods * body.nutation_period
         if earliest < body.horizon:
             yield f"from {earliest:.4g} s on", replace(body, limits=replace(body.limits, earliest=earliest))
@@ -319,7 +323,7 @@ def _early(body: Spacecraft, options: Options) -> Iterator[tuple[str, Plan]]:
     if not first.feasible:
         return
     yield "earliest end", first
-    for times in (1.5, 2.0):
+    for times in WITHIN:
         horizon = times * first.end
         if horizon < body.horizon:
             soon = replace(body, limits=replace(body.limits, horizon=horizon))

@@ -33,6 +33,8 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Bounds
 
+SAME = 1e-9  # relative difference up to which a bound is that of the plan
+
 ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
 """Subjects of the equations."""
 
@@ -112,7 +114,7 @@ def certificate(plan: Plan) -> Certificate:
     except Infeasible as reason:
         raise BadRequest(f"{OPTIMAL.name} has no least cost to prove here: {reason}") from None
     proof = bounds.first_order(program, solution.prices)
-    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > 1e-9 * abs(known.first_order):
+    if solution.unmet > UNMET or abs(proof.bound - known.first_order) > SAME * abs(known.first_order):
         raise BadRequest("the plan is put together from several programs, and none of them proves what all of it costs")
     return Certificate(plan, problem, program, solution.burns, proof)
 

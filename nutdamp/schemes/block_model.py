@@ -32,6 +32,10 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
 
+SAMPLES = 32  # samples of the Sun's azimuth in each spin turn, between which a Sun pulse is found
+ITERATIONS = 60  # steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual
+EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
+
 BLIND = 32
 """Spin turns in a row without a Sun pulse, after which none is waited for."""
 
@@ -62,15 +66,15 @@ def sun_pulses(flown: Flight, until: float) -> Vector:
     sensor, turn = body.sun_sensor, spin_turn(body) * min(1.0, abs(body.spin / flown.settled.spin))
     assert sensor is not None
     assert body.sun is not None
-    times = np.linspace(0.0, until, max(int(32 * until / turn), 2) + 1)
+    times = np.linspace(0.0, until, max(int(SAMPLES * until / turn), 2) + 1)
     # The Sun goes round in the body against the spin: what is left to the sensor's azimuth falls to zero.
     ahead = to_sun_pulse(flown, times)
     index = np.flatnonzero((ahead[:-1] < 0.5 * math.pi) & (ahead[1:] > 1.5 * math.pi))
     times_of = times[index] + ahead[index] * turn / (2.0 * math.pi)
-    for _ in range(60):  # three or four are usual
+    for _ in range(ITERATIONS):  # three or four are usual
         off = (to_sun_pulse(flown, np.minimum(times_of, until)) + math.pi) % (2.0 * math.pi) - math.pi
         times_of += off * turn / (2.0 * math.pi)
-        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * 1e-13:
+        if not len(times_of) or np.abs(off).max() < 2.0 * math.pi * EXACT:
             break
     times_of = times_of[(times_of >= 0.0) & (times_of <= until)]
     angles = attitude.angle_between(flown.axis(times_of), body.sun)

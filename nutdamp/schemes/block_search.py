@@ -32,6 +32,22 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
 from nutdamp.spacecraft.schedule import Schedule
 
+GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
+# blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
+ALL_BLOCKS = 400
+# blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
+ALL_FIRSTS = 300
+AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
+MOST_WIDTHS = 24  # widths that are looked at for a second and a third block, where more can be commanded
+# share of a spin turn by which blocks in closed form keep away from blackout windows: nutation moves Sun pulses
+BESIDE = 0.01
+CHEAPER = 0.9  # multiple of the cost of a sequence below which one that leaves more is looked at, too
+# multiple of the least cost of lowering the nutation above which further blocks are looked for though one complies
+DEAR = 1.5
+CORRECTED = 4  # flights whose neighbours are looked at where none complies
+SURELY = 3.0  # largest difference of a block's length from the way to the target, over its end error
+TOGETHER = 32  # sequences behind which others are looked for at once
+
 Array = NDArray[np.float64]
 
 WAITS = 24
@@ -207,7 +223,7 @@ class BlockSearch:
         self._few_delays = len(self._delays) <= 16
         widths = sum(len(commandable_widths(commands, channel)) for channel in channels)
         # So few blocks after one wait that all are looked at.
-        self.small = self._few_delays and widths * len(self._delays) * self.allowed <= 400
+        self.small = self._few_delays and widths * len(self._delays) * self.allowed <= ALL_BLOCKS
 
     def best(self, most: int) -> list[BlockSequence]:
         """The best few sequences of up to ``most`` blocks, those that are flown."""
@@ -222,8 +238,8 @@ class BlockSearch:
                 firsts = [*_promising(sequences, FIRST), *_promising(small, FIRST), *self._parts()[:FIRST]]
                 if self.small:  # the 300 cheapest of all
                     start = self.model.start
-                    every = self.behind([START], start, self._grid(start, self.earliest), 300)
-                    firsts += sorted(every, key=lambda first: first.rank[1])[:300]
+                    every = self.behind([START], start, self._grid(start, self.earliest), ALL_FIRSTS)
+                    firsts += sorted(every, key=lambda first: first.rank[1])[:ALL_FIRSTS]
             else:
                 firsts = _promising(firsts, FIRST // 2)
             firsts = self._further([first for first in firsts if first.rank[1] < self.most], few=4)
@@ -234,7 +250,7 @@ class BlockSearch:
         # The flight differs a little, and the more the larger the nutation on the way: half of them are the cheapest
         # that comply, half those that do most clearly, and the best one of each number of blocks is among them.
         ranked = [next(alike) for _, alike in itertools.groupby(sorted(sequences, key=_rank), _blocks)]
-        clear = nsmallest(10 * FLOWN, ranked, key=_share)
+        clear = nsmallest(GENTLE * FLOWN, ranked, key=_share)
         each = {len(sequence.blocks): sequence for sequence in reversed(ranked)}.values()
         first = by_blocks((*ranked[: FLOWN // 2], *clear[: FLOWN // 2], *each))
         # Nutation on the way goes with what one pulse turns H by: where all those miss, the gentlest of many follow.
@@ -272,7 +288,7 @@ class BlockSearch:
             shortest = float(acts(channel, commandable_widths(self.commands, channel)).on_time.min())
             lasts = max(kicked / abs(channel.transverse), 2.0 * shortest)
             least = min(least, channel.cost_rate(by_propellant=True) * lasts)
-        return self.most > 1.5 * least
+        return self.most > DEAR * least
 
     def _largest_pulse(self, sequence: BlockSequence) -> float:
         """The most by which one of its pulses turns H, rad."""
@@ -363,7 +379,7 @@ class BlockSearch:
         waits = self._waits(start, self.earliest, self._waiting if abs(start.phasor) > 0.0 else 1)
         short = [(channel, every, self._short_by(start, channel, every)) for channel, every in self._kinds]
         most = max((lacks.max() for _, _, lacks in short if lacks.size), default=0.0)
-        within = surely = DOUBTFUL if self._damps else 3.0
+        within = surely = DOUBTFUL if self._damps else SURELY
         while True:
             trials = (
                 (channel, self._at_delays(start, channel, waits, np.flatnonzero(lacks[0] <= within)[None], every))
@@ -405,7 +421,7 @@ class BlockSearch:
 
     def _further(self, before: Sequence[BlockSequence], few: int) -> list[BlockSequence]:
         """Blocks behind those ``before`` that go the rest of the way, or take the nutation that is left."""
-        step = 32 if self.model.steady and not len(self.dark[0]) else 1
+        step = TOGETHER if self.model.steady and not len(self.dark[0]) else 1
         least, sequences = self.pause if before and before[0].blocks else self.earliest, list[BlockSequence]()
         for begin in range(0, len(before), step):
             some = before[begin : begin + step]
@@ -474,7 +490,7 @@ class BlockSearch:
         first = state.sun_pulse + trial.wait * turn
         interval = (after.sun_pulse - turn - first) / np.maximum(trial.count - 1, 1)
         interval = np.where(np.asarray(trial.count) > 1, interval, turn)
-        aside, lasts = 0.01 * turn, acts(channel, trial.width).over  # aside: nutation moves Sun pulses
+        aside, lasts = BESIDE * turn, acts(channel, trial.width).over  # aside: nutation moves Sun pulses
         for begins, ends in zip(*self.dark, strict=True):
             low = np.ceil((begins - aside - lasts - first - trial.delay) / interval)
             high = np.floor((ends + aside - first - trial.delay) / interval)
@@ -499,7 +515,7 @@ class BlockSearch:
             best.append(self.model.delay(channel, self.model.course(state)[0], widths))
         if np.any(state.phasor):
             best.append(self.model.damping_delay(state, channel, trial._replace(delay=0.0)))
-        steps = [np.floor(delay / self.commands.delay_step) + more for delay in best for more in (0, 1)]
+        steps = [np.floor(delay / self.commands.delay_step) + more for delay in best for more in AROUND]
         alike = np.broadcast_arrays(*steps, np.zeros((1, 1, 1, 1)))  # none at all: best just before a Sun pulse
         return trial._replace(delay=self.commanded(np.concatenate(alike, axis=-1) * self.commands.delay_step))
 
@@ -521,7 +537,7 @@ class BlockSearch:
         """
         sequences = list[BlockSequence]()
         best = of_each_kind(flight.sequence for flight in self.flights.all)
-        for flight in (self.flights.of[each.blocks] for each in best[:4]):
+        for flight in (self.flights.of[each.blocks] for each in best[:CORRECTED]):
             *earlier, last = flight.sequence.blocks
             before, state = START._replace(blocks=tuple(earlier)), self.state(tuple(earlier))
             off = self.model.apart(self.state(flight.sequence.blocks), propagation.flown(self.body, flight.schedule))
@@ -541,7 +557,7 @@ class BlockSearch:
         channel, number = self._named[last.channel], _following(before.blocks)
         every = commandable_widths(self.commands, channel)
         at = int(np.argmin(np.abs(every - last.width)))
-        widths = np.union1d(evenly(every, 24), every[max(at - 3, 0) : at + 4])
+        widths = np.union1d(evenly(every, MOST_WIDTHS), every[max(at - 3, 0) : at + 4])
         as_long = np.rint(last.count * acts(channel, np.array([last.width])).on_time / acts(channel, widths).on_time)
         waits = np.arange(-1, 2) + (last.first - number)
         waits = waits[waits >= (self.pause if before.blocks else self.earliest)]
@@ -586,7 +602,7 @@ def _promising(sequences: Iterable[BlockSequence], most: int) -> list[BlockSeque
     return list(by_blocks((*ranked[:most], *_front(ranked)[:most], *_front(ranked, 1.0)[:most])).values())
 
 
-def _front(ranked: Iterable[BlockSequence], share: float = 0.9) -> list[BlockSequence]:
+def _front(ranked: Iterable[BlockSequence], share: float = CHEAPER) -> list[BlockSequence]:
     """Of sequences in order of their rank those that cost less than a ``share`` of the cost of all before them."""
     front = list[BlockSequence]()
     for sequence in ranked:

@@ -30,6 +30,10 @@ from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import SAME_COST, Part
 from nutdamp.spacecraft.schedule import Schedule
 
+SLOWEST = 0.01  # least share of |H3| that a spin leg is reckoned to leave
+AMPLE = 1.5  # multiple of the time of the fewest pulses that a change of the spin is given
+FLOWN_PULSES = 2000  # pulses that are flown, after which no further sequence is
+
 
 def scope_note(search: BlockSearch, chosen: FlownSequence, *, first: bool) -> Note:
     """Scope of the search, and flight against closed form; ``first``: it is the best in that form."""
@@ -141,7 +145,7 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
         for number, sequence in enumerate(search.flights.fired(best if round_ == 0 else search.nearer())):
             pulses = sum(len(flight.schedule) for flight in search.flights.of.values())
             enough = search.flights.complies and number >= FLOWN * (round_ == 0)
-            spent = pulses > 2000 * (1 + round_) or (work.exhausted() and pulses > 0)
+            spent = pulses > FLOWN_PULSES * (1 + round_) or (work.exhausted() and pulses > 0)
             if spent or enough:
                 break
             try:
@@ -209,7 +213,7 @@ def _flown(
     for number in range(LEGS):
         here, turns = legs.here, turns_first == (number % 2 == 0)
         here = replace(here, goal=replace(here.goal, axis=None if shift is None else here.goal.axis, spin=None))
-        slower = min(max(abs(body.inertia.axial(goal) / here.axial), 0.01), 1.0)  # nutation opens by its inverse
+        slower = min(max(abs(body.inertia.axial(goal) / here.axial), SLOWEST), 1.0)  # nutation opens by its inverse
         there = requirements.spins_at(here, aim)
         if turns:
             there = here.nutation <= nutation and (shift is None or here.to_turn <= shift)
@@ -247,4 +251,4 @@ def _least_time(body: Spacecraft, spin: float) -> float:
     for channel in body.channels:
         on_times = acts(channel, commandable_widths(commands, channel)).on_time
         most = max(most, channel.axial * math.copysign(np.max(on_times, initial=0.0), change))
-    return (2.0 + 1.5 * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0
+    return (2.0 + AMPLE * abs(change) * body.inertia.C / most) * spin_turn(body) if most > 0.0 else 0.0

@@ -28,6 +28,20 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Attitude, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule, channel_pulse, steerable_pulse
 
+CONVERGED = 1e-14  # rad; a few roundings of the integration
+ALIKE = 1e-9  # difference in size, relative, up to which pulses are equal
+STEPS = 30
+INTEGRATED = 50_000  # steps of integration after which a correction stops: some seconds
+# least relative gain of a step; near a solution each step gains many digits, so less means a bound in the way
+PROGRESS = 0.01
+CLEARLY = 0.5  # largest residual, over that of an earlier candidate, with which a later or dearer one is taken
+# pulses up to which a schedule is corrected on the true motion: a correction flies all of them some twenty times
+MOST_CORRECTED = 1_000
+LEFT_OVER = 0.05  # largest residual, over nutation and turn together, of a schedule that reaches the target
+LEFT_OVER_BY_TICKS = 0.5  # largest residual where the resolution of commands may be to blame
+PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
+IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
+
 TAIL = 4
 """Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
 
@@ -84,7 +98,7 @@ def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> 
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
             broken = broken or schedule
-        elif best is None or left < 0.5 * best[0]:
+        elif best is None or left < CLEARLY * best[0]:
             best = left, schedule
             if left <= EXACT:
                 break
@@ -169,7 +183,7 @@ def correct(
 
     free = np.concatenate([*(pulse.free for pulse in pulses), *(factor.free for factor in common)])
     # 50,000 steps of integration take some seconds.
-    x = solve(lambda x: left(build(x)), free, lambda: steps > 50_000 or work.exhausted())
+    x = solve(lambda x: left(build(x)), free, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, schedule.notes, schedule.bounds)
     better = np.linalg.norm(left(corrected)) < np.linalg.norm(left(schedule))
@@ -193,7 +207,7 @@ class Correction:
 
         One of more than 1000 pulses stays as it is: a correction flies all of them some twenty times.
         """
-        if self.options.uncorrected or not 0 < len(schedule) <= 1_000 or work.exhausted():
+        if self.options.uncorrected or not 0 < len(schedule) <= MOST_CORRECTED or work.exhausted():
             return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
         whole, given = free == TAIL, self.options.equal and not self.options.resizable
@@ -214,7 +228,7 @@ def alike(schedule: Schedule, pulse: Pulse) -> bool:
     """True if a pulse is as large as the last one of a schedule."""
     last = schedule.pulses[-1]
     size, other = (each.magnitude if last.on_time == 0.0 else each.on_time for each in (pulse, last))
-    return abs(size - other) <= 1e-9 * other
+    return abs(size - other) <= ALIKE * other
 
 
 class _Movable:
@@ -288,8 +302,8 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
     x = np.clip(start, lower, upper)
     value = residual(x)
     norm = float(np.linalg.norm(value))
-    for _ in range(30):
-        if norm <= 1e-14 or enough():  # rad; a few roundings of the integration
+    for _ in range(STEPS):
+        if norm <= CONVERGED or enough():  # rad; a few roundings of the integration
             break
         columns = []
         for index, size in enumerate(scale):
@@ -307,7 +321,7 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
                 x, value, norm = trial, trial_value, trial_norm
                 break
         # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
-        if norm > before * (1.0 - 0.01):
+        if norm > before * (1.0 - PROGRESS):
             break
     return np.asarray(x)
 
@@ -397,7 +411,7 @@ class FlownBuilder:
 
 def tolerable(spacecraft: Spacecraft) -> float:
     """Largest residual, rad, at which the target counts as reached: more where commands have ticks."""
-    share = 0.05 if spacecraft.limits.tick is None else 0.5
+    share = LEFT_OVER if spacecraft.limits.tick is None else LEFT_OVER_BY_TICKS
     return max(share * (spacecraft.nutation + spacecraft.to_turn), ROUNDING)
 
 
@@ -443,7 +457,7 @@ def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Sc
     moments = 16  # earliest starts that are tried
     for number in range(moments):
         earliest = here.limits.earliest + number * span / moments
-        if number > 0 and earliest > 0.5 * here.horizon:  # the rest is for the turn
+        if number > 0 and earliest > IN_REACH * here.horizon:  # the rest is for the turn
             break
         try:
             damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
@@ -460,7 +474,7 @@ def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Sc
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps
-        if steps > 20_000 or work.exhausted():
+        if steps > PREDAMPING_INTEGRATED or work.exhausted():
             break
     if best is None:
         text = "the nutation is to be taken out first, and"

@@ -26,6 +26,16 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
+PATIENCE = 5  # numbers of cones that may fail before the search ends
+# sizes of a body-fixed pulse that are looked at, as shares of the one that an equal cone needs
+SHARES = np.linspace(0.6, 1.3, 15)
+WORTH_WAITING = 0.05  # share of one pulse that waiting for a better phase must save
+UNEQUAL = 0.3  # largest relative difference of a cone from equal ones: enough for a channel to be in phase
+LAGGING = 1.1  # largest ratio of the remaining cones to equal ones after a pulse; beyond, the last have too much to do
+SAMPLES = 96  # moments looked at in each turn of the body
+LONGEST_SEARCH = 6000  # moments looked at for one pulse, at most
+PLACE = 1e-3  # units of `work` of each moment at which a channel is looked at for the first pulse of a row
+
 MOST_CONES = 60
 """Cones tried at most where their number is not given."""
 
@@ -50,7 +60,7 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
             row = _row(builder.fork(), cones)
         except Infeasible as why:
             reasons.append(why)
-            if best is not None or len(reasons) > 5:
+            if best is not None or len(reasons) > PATIENCE:
                 break
         else:
             if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
@@ -135,15 +145,15 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
     and what it misses then is made up for by the cones that follow.
     """
     windows, channels = Windows(here), usable(here)
-    step = 2.0 * math.pi / here.fastest / 96  # so many moments in each turn of the body
+    step = 2.0 * math.pi / here.fastest / SAMPLES  # so many moments in each turn of the body
     share = (windows.horizon - here.limits.earliest) / (cones + 1)
     span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)
-    count = min(int(max(span, 0.0) / step) + 1, 6000)
+    count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
     best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
-    work.spend(1e-3 * count * len(channels))
+    work.spend(PLACE * count * len(channels))
     for channel in channels:
         direction = channel.transverse / abs(channel.transverse)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
@@ -152,7 +162,7 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
-    worth_waiting = 0.05 * _equal(here, cones)[1]
+    worth_waiting = WORTH_WAITING * _equal(here, cones)[1]
     for costs, on_times, channel in choices:
         for row in np.flatnonzero(costs <= least + worth_waiting)[:1]:
             pulse = channel_pulse(channel, float(times[row]), float(on_times[row]))
@@ -182,7 +192,7 @@ def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tupl
     equal, nominal = _equal(here, cones)
     h, reach = abs(here.axial), _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))
-    for size in np.unique(np.minimum(nominal * np.linspace(0.6, 1.3, 15), 0.999 * reach)):
+    for size in np.unique(np.minimum(nominal * SHARES, 0.999 * reach)):
         on_time = float(precession.on_times_to_turn(np.array([size]), abs(channel.transverse), here.spin)[0])
         if not channel.min_on_time <= on_time <= channel.max_on_time:
             continue
@@ -191,7 +201,7 @@ def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tupl
         rest = np.abs(attitude.angle_between(momentum, here.target_axis) - half_angle) / (2 * (cones - 1))
         costs = abs(channel.transverse) * on_time + h * (np.tan(half_angle) + 2 * (cones - 1) * np.tan(rest))
         # Cones may differ by so much for a channel to be in phase, but the last must not have too much to do.
-        costs[(np.abs(half_angle - equal) > 0.3 * equal) | (rest > 1.1 * equal)] = np.inf
+        costs[(np.abs(half_angle - equal) > UNEQUAL * equal) | (rest > LAGGING * equal)] = np.inf
         costs[(h * (np.tan(half_angle) + np.tan(rest)) > 1.02 * reach)] = np.inf
         better = costs < best
         best[better], chosen[better] = costs[better], size

@@ -14,6 +14,8 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
+TRAIN_SHARE = 0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
+
 LEFT_OVER = 0.01
 """Share of A|ω0| from which a remainder counts against a channel."""
 
@@ -74,7 +76,7 @@ def _train(
     longest = longest_useful(max_on_time, start.period)
     count = 1
     single = math.isinf(torque) or response.on_time_for(start.left, torque, start.turning, slope, longest)
-    share = capacity(min(max_on_time, 0.25 * start.period))  # a pulse as wide as that loses 10 % of its impulse
+    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))  # a pulse as wide as that loses 10 % of its impulse
     if not single and share > 0.0:
         most = start.most
         count = math.ceil(min(start.left / share, most + 1.0))

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from nutdamp.schemes.sequential import SymmetricModel
     from nutdamp.spacecraft.model import Spacecraft
 
+LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
+
 
 Choice = Options | SchemeOptions | None
 """Options of one scheme, of several, or None for the defaults."""
@@ -91,7 +93,7 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
             return None
 
     usual = replace(spacecraft, limits=replace(spacecraft.limits, horizon=None)).horizon
-    for horizon in sorted({usual, 4.0 * max(usual, spacecraft.horizon)}):
+    for horizon in sorted({usual, LONGER * max(usual, spacecraft.horizon)}):
         over = end(horizon) if horizon > spacecraft.horizon and not work.exhausted() else None
         if over:
             step = 10.0 ** (math.floor(math.log10(over)) - 3)

@@ -28,6 +28,25 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule, steerable_pulse
 
+# turns of the spin axis looked at from the earliest start, and one more from the end of each blackout window
+SPIN_TURNS = 4
+MOST_WINDOWS = 40  # blackout windows after which a turn is looked at
+FURTHER_TURNS = 60  # further whole turns that the second pulse may wait for, at most
+FURTHER_BESIDE = 12  # the same for the search beside the best places
+MOST_BESIDE = 1000  # moments looked at in that search, at most
+# share of the first steps at which the search for the best choice ends; the cost is flat there to its square
+NARROWEST = 1e-7
+ROUNDING = 1e-14  # relative gain that counts as one while the best choice is made exact
+SMALLEST = 0.1  # least share of both jumps that each real pulse of the two gets
+# least sine of half the angle by which the spin axis turns between two real pulses: a sixth of a turn to five
+APART = 0.5
+NOTHING = 1e-12  # jumps below this times C|ω3| are left out
+SHORTLIST = 8  # candidates that are flown and corrected, at most
+FURTHER = 60  # further whole turns of the spin axis that the second pulse may wait for, at most
+PAIR = 5e-5  # units of `work` of each moment of each pair of channels
+ON_CONE = 1e-3  # share of its natural size below which the first jump counts as nothing
+BESIDE = 0.05  # distance beside the target, over the angles at hand, of a search that finds nothing on it
+
 SPIN_SAMPLES = 256
 """Moments looked at in each turn of the spin axis, before the best is made exact."""
 
@@ -71,7 +90,7 @@ class SteerablePair:
             rates, quaternions = Arc.of(self.spacecraft.inertia, state, now).motion(np.array([moment]))
             body = attitude.matrix(quaternions[0]).T @ (after - momentum)
             push = complex(body[0], body[1])
-            if abs(push) > 1e-12 * self.h:
+            if abs(push) > NOTHING * self.h:
                 on_time = float(self.on_times(np.array([abs(push)]))[0])
                 requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
@@ -85,8 +104,8 @@ class SteerablePair:
         """Moments (n,) s of the first pulse worth looking at: four turns, and one after each blackout window."""
         period, first = self.spacecraft.inertial_period, self.spacecraft.limits.earliest
         turn = np.arange(SPIN_SAMPLES) * self.step
-        ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:40]
-        parts = [first + number * period + turn for number in range(4)] + [end + turn for end in ends]
+        ends = [end for _, end in self.spacecraft.limits.blackout if end > first][:MOST_WINDOWS]
+        parts = [first + number * period + turn for number in range(SPIN_TURNS)] + [end + turn for end in ends]
         times = np.unique(np.concatenate(parts))
         return np.asarray(times[times <= self.windows.horizon])
 
@@ -118,12 +137,12 @@ class SteerablePair:
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
         if not np.isfinite(least):
             raise Infeasible(self.no_room(1))
-        choice = self._best(times, np.zeros(len(times)), straight, 60)
+        choice = self._best(times, np.zeros(len(times)), straight, FURTHER_TURNS)
         if (choice is None or choice.cost > least * (1.0 + 1e-6)) and not straight:
             # The limits forbid the best place: others beside it, by shares of both jumps.
-            some, shares = slice(None, None, math.ceil(len(times) / 1000)), np.linspace(-1.0, 1.0, 41)
+            some, shares = slice(None, None, math.ceil(len(times) / MOST_BESIDE)), np.linspace(-1.0, 1.0, 41)
             beside = np.repeat(times[some], len(shares)), (shares * free.cost[some, None]).ravel()
-            other = self._best(*beside, straight, 12)
+            other = self._best(*beside, straight, FURTHER_BESIDE)
             if other is not None and (choice is None or other.cost < choice.cost * (1.0 - EQUAL)):
                 choice = other
         if choice is None:
@@ -148,8 +167,8 @@ class SteerablePair:
         allowed &= self.windows.allowed(second - 0.5 * longer, longer, ready)
         if self.torquer.torque is not None:
             # Widths are corrected on both pulses: both must be there, and not do the same a whole turn apart.
-            allowed &= np.minimum(jumps.first, jumps.second) > 0.1 * jumps.cost
-            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > 0.5  # a sixth of a turn to five
+            allowed &= np.minimum(jumps.first, jumps.second) > SMALLEST * jumps.cost
+            allowed &= np.sin(math.pi * jumps.wait / jumps.turn) > APART  # a sixth of a turn to five
         spent = self.spent(jumps.first) + self.spent(jumps.second)
         return np.where(allowed, spent, np.inf), second, jumps
 
@@ -209,12 +228,12 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
     best = float(cost(point[None, :])[0])
     narrowed = 1.0
     for _ in range(COMPASS_STEPS if len(rose) else 0):
-        if narrowed <= 1e-7:  # the cost is flat there to its square
+        if narrowed <= NARROWEST:  # the cost is flat there to its square
             break
         around = point + narrowed * rose
         costs = cost(around)
         index = int(np.argmin(costs))
-        if costs[index] < best * (1.0 - 1e-14):
+        if costs[index] < best * (1.0 - ROUNDING):
             best, point = float(costs[index]), around[index]
         else:
             narrowed *= 0.5
@@ -269,7 +288,7 @@ def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
     search = _PairSearch(spacecraft, channels)
-    best, _ = correction.best_of(spacecraft, _tried(spacecraft, shortlist(search.all_candidates(), 4, 8)))
+    best, _ = correction.best_of(spacecraft, _tried(spacecraft, shortlist(search.all_candidates(), 4, SHORTLIST)))
     if best is None:
         raise Infeasible(search.reason())
     schedule = _checked(spacecraft, best)
@@ -339,13 +358,13 @@ class _PairSearch:
         That is where the target lies on the cone of the spin axis itself.
         """
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
-        if abs(self.h - self.momentum @ self.target) > 1e-3 * wide**2 * self.h:
+        if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
             return self.candidates()
         candidates, target = [], self.target
         side = np.cross(self.momentum, target)
         for beside in (side, np.cross(side, target)):
             for sense in (1.0, -1.0):
-                moved = target + sense * 0.05 * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
+                moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
                 self.target = moved / float(np.linalg.norm(moved))
                 candidates += self.candidates()
         self.target = target
@@ -363,10 +382,10 @@ class _PairSearch:
                 break
             after = self.after(one, times)
             promising = adjoining & (after.first + after.second <= DEAREST * self.floor)[:-1]
-            for further in range(60):
+            for further in range(FURTHER):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
-                work.spend(5e-5 * len(times) * len(self.channels))
+                work.spend(PAIR * len(times) * len(self.channels))
                 needed = after.body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())
@@ -401,7 +420,7 @@ class _PairSearch:
             timing = ((float(first[row]), float(long[row])), (float(second[row]), float(longer[row])))
             cost = sum(price * on_time for price, (_, on_time) in zip(prices, timing, strict=True))
             pairs.append(PairCandidate(cost, timing[1][0] + 0.5 * timing[1][1], (one, two), timing))
-        return sorted(pairs, key=lambda candidate: candidate.cost)[:8]
+        return sorted(pairs, key=lambda candidate: candidate.cost)[:SHORTLIST]
 
     def _on_times(self, channel: Channel, jumps: Vector) -> Vector:
         """On-times (n,) s with which ``channel`` turns H by ``jumps`` (n,) N m s; not a number beyond its reach."""

@@ -30,6 +30,14 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
+TURN_SHARE = 0.125  # default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc
+# share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost
+WIDEST = 0.4
+BENT = 10.0  # times as many spare pulses for a last try
+WIDEST_BEND = 1.3  # rad by which the heading of a train may differ from the course to the target
+SHORT = 60  # pulses up to which their size is corrected on the flown motion too: a longer train has little to spare
+OTHERS = 4  # other lengths of the pulses that are tried where the one requested does not do
+
 STEP = math.radians(2.0)
 """Angle that one ideal impulse turns H by, at most."""
 
@@ -40,6 +48,8 @@ MOST_PULSES = 600
 
 LAST = 20
 """Largest number of last pulses that are moved."""
+
+MOVED = (6, 12, LAST)  # numbers of last pulses that are moved, one after the other until nothing is left
 
 TRIES = 4
 """Counts that are flown, at most."""
@@ -79,7 +89,7 @@ class Train:
         if options.on_time is not None:
             self._check(options.on_time)
         # By default an eighth of a spin turn: 2.6 % of the impulse is lost to the arc.
-        given = min(self.longest, 0.125 * self.turn) if options.on_time is None else options.on_time
+        given = min(self.longest, TURN_SHARE * self.turn) if options.on_time is None else options.on_time
         self.on_time = max(given, self.shortest)
         if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
             raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
@@ -157,7 +167,7 @@ class Train:
         tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size)
         tried = tried[:TRIES]
         for count in [attempt.pulses for attempt in tried[:2]]:
-            tried.append(Attempt(count, self.size(count, 10.0 * self._spare(count, left)), False, free))
+            tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
         widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
         possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
         if not possible:
@@ -197,7 +207,7 @@ class Train:
     @property
     def widest(self) -> float:
         """Longest pulse (s) worth firing, unless a longer one is given: a quarter of its impulse is lost to the arc."""
-        return min(self.longest, 0.4 * self.turn)
+        return min(self.longest, WIDEST * self.turn)
 
     def fewest(self) -> int:
         """Least number of pulses with the on-time given; two at least, to close."""
@@ -273,7 +283,7 @@ class Train:
         """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
         ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
         share = self.h * way / (remaining * self.turns_by(attempt.size))
-        bend = math.acos(max(share, math.cos(1.3))) if share < 1.0 else 0.0
+        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
         aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
         return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
@@ -418,7 +428,7 @@ def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
     except Infeasible:
         lengths = []
-    for length in lengths[:4]:
+    for length in lengths[:OTHERS]:
         digits = 3 - math.floor(math.log10(length))
         rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
         try:
@@ -469,12 +479,12 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
             break
         builder.fire((pulse,))
     fired = min(count, len(builder.pulses))
-    for last in (6, 12, LAST):
+    for last in MOVED:
         before = builder.left
         if before < EXACT or work.exhausted():
             break
         # A train of more than 60 pulses has little to spare: its size is not corrected.
-        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= 60 else 0)
+        builder.correct(min(last, fired), resized=count if attempt.resizable and count <= SHORT else 0)
         if train.here.limits.tick is not None and builder.left > 0.5 * before:
             break  # what is left is the rounding of starts
     if not builder.pulses:

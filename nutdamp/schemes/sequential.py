@@ -22,6 +22,10 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
+MISSED = 50  # alignments in a row that rounding to ticks or a disturbance may move to before the actuators are ready
+# share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles only
+CORRECTED = 1e-4
+
 ALIGNED = 1e-9
 """Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
 
@@ -58,7 +62,7 @@ class ImpulseBuilder:
     def settled(self) -> bool:
         """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
         # `response.width_factor` holds at small angles only.
-        corrected = 0.0 if self.spacecraft.growth == 0.0 else 1e-4 * self.spacecraft.least_impulse
+        corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
         return self.left <= max(1e-13 * abs(self.C * self.spin + self.wheel), corrected)
 
     @property
@@ -174,7 +178,7 @@ class ImpulseBuilder:
 
         turns = alignment(self.ready)
         # Rounding to ticks or a disturbance may move 50 in a row to before the actuators are ready.
-        for _ in range(len(self.windows.limits.blackout) + 50):
+        for _ in range(len(self.windows.limits.blackout) + MISSED):
             turned = first + turns * self.period
             centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
             if math.isinf(centre):  # dissipation stops the spin before

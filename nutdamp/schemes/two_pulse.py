@@ -28,6 +28,9 @@ from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
+# pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first
+DEAREST = 2.0
+
 MANY = 2000
 """Closings of H looked at for each pair one by one."""
 
@@ -253,7 +256,7 @@ def _promising(factor: Vector) -> Vector:
     better = np.flatnonzero(factor * CLOSE_IN_COST < before)
     cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
     chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
-    return np.asarray(chosen[factor[chosen] <= 2.0])  # beyond, the second pulse would mostly undo the first
+    return np.asarray(chosen[factor[chosen] <= DEAREST])  # beyond, the second pulse would mostly undo the first
 
 
 def _place(

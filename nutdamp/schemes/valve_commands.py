@@ -30,6 +30,13 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 
+ROUNDING = 1e-12  # share by which an on-time may pass its bounds
+# share of the longest pulse that the next plan leaves at either end of all, where there was too little room
+ROOM = 0.02
+NEARLY = 1.1  # times what the plan leaves on the plain body, and rad, that commands may leave without another plan
+EXACT = 1e-10  # times what the plan leaves on the plain body, and rad, that commands may leave without another plan
+PLANS = 6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
+
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"
 """Addition to the reasons of schemes, which know nothing of valves."""
 
@@ -93,7 +100,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
     weakest, strongest, room, used = 1.0, 1.0, 0.0, 0.0
     tried: list[tuple[bool, float, Schedule]] = []
     schedule: Schedule | None = None
-    for _ in range(6):
+    for _ in range(PLANS):
         body = plain(spacecraft, weakest, strongest, room, 0.5 * used)
         try:
             schedule = plan(body)
@@ -123,10 +130,10 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
         rounded = spacecraft.limits.tick is not None
         if work.exhausted() or not schedule.pulses:
             break
-        if kept and (rounded or left <= 1.1 * _left(body, schedule, correct) + 1e-10):
+        if kept and (rounded or left <= NEARLY * _left(body, schedule, correct) + EXACT):
             break
         # What is longer than planned, or has been moved, met its neighbour or a window: the next one leaves room.
-        room = max(2.0 * room, longer, 0.02 * max(pulse.on_time for pulse in schedule))
+        room = max(2.0 * room, longer, ROOM * max(pulse.on_time for pulse in schedule))
     assert schedule is not None
     if not tried:
         return as_commands(spacecraft, schedule, correct, body.inertia)
@@ -245,9 +252,9 @@ def _outside(
         level = float(np.linalg.norm(pulse.torque) / np.linalg.norm(channel.torque))
         if shed(spacecraft) is not None:
             level = planned_.on_time / pulse.on_time
-        if pulse.on_time > most * (1.0 + 1e-12):
+        if pulse.on_time > most * (1.0 + ROUNDING):
             weak.append(level)
-        if pulse.on_time < least * (1.0 - 1e-12):
+        if pulse.on_time < least * (1.0 - ROUNDING):
             strong.append(level)
     return weak, strong, longer
 

@@ -35,6 +35,9 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
+LINES = 4  # programs one after the other, each about the flight of the one before: at large angles small ones mislead
+PROGRAM = 4.0  # units of work of a program
+
 STARTS, CORRECTED, MOST_PULSES = 8, 4, 200
 """Starts in a nutation period that are tried of a channel that has a transverse torque, too; flights by which the
 length is corrected; pulses at most."""
@@ -229,7 +232,7 @@ def earliest(problem: Problem) -> Schedule | None:
 def within(problem: Problem, horizon: float) -> Schedule | None:
     """A schedule of one channel after another within ``horizon`` s that leaves nothing; None where none is found."""
     influence = refinement.small_angles(problem.spacecraft, problem.equations)
-    for _ in range(4):  # programs, each about the flight of the one before: at large angles small ones mislead
+    for _ in range(LINES):  # programs, each about the flight of the one before: at large angles small ones mislead
         pieces = None if work.exhausted() else _pieces(problem, influence, horizon)
         if pieces is None:
             return None
@@ -263,7 +266,7 @@ def _pieces(problem: Problem, influence: Influence, horizon: float) -> list[Piec
     width = float(edges[1] - edges[0])
     if not len(free):
         return None
-    work.spend(4.0)
+    work.spend(PROGRAM)
     centres = 0.5 * (edges[1:] + edges[:-1])[free]
     lost = influence.widths(np.array([width]))[0]
     torques = np.array([channel.torque for channel in channels])

@@ -19,6 +19,11 @@ from nutdamp.schemes.optimal import linear_program
 from nutdamp.schemes.optimal.linear_program import COLUMN, SOLVED, Burn, Program, ProgramColumns, alone, burns
 from nutdamp.spacecraft.model import Vector
 
+TIGHT = 1e-3  # share of a limit by which a solution may pass it
+# cost of passing all limits by themselves, over that of all there is to do: done where hardly anything else helps
+EXCESS = 10.0
+SOME = 1e-9  # share of what is needed below which an on-time is rounding
+
 Complex = NDArray[np.complex128]
 
 TURNS = 100_000
@@ -181,7 +186,7 @@ class ChanceProgram:
         master = linear_program.GrowingProgram(np.zeros(0), rights, np.zeros(0))
         excess = np.array([[-tangent.limit.most / self.scale] for tangent in tangents])
         # To pass all limits costs ten times all there is to do: that is done where hardly anything else helps.
-        master.add(np.array([10.0]), excess, np.array([np.inf]))
+        master.add(np.array([EXCESS]), excess, np.array([np.inf]))
         self._add(master, tangents, columns, margin)
         best, taken = None, columns
         for _ in range(ROUNDS):
@@ -214,7 +219,7 @@ class ChanceProgram:
 
     def _on_times(self, columns: ProgramColumns, amounts: Vector) -> Vector:
         """On-times (n,) s of amounts in units, without rounding."""
-        return np.where(amounts > 1e-9, amounts, 0.0) * self.unit[columns.channel]
+        return np.where(amounts > SOME, amounts, 0.0) * self.unit[columns.channel]
 
     def _coefficients(self, tangent: Tangent, columns: ProgramColumns, margin: float) -> Vector:
         """Coefficients of a tangent for one unit of each column, over the scale."""
@@ -229,7 +234,7 @@ class ChanceProgram:
             spread = self.spread(limit.kind, columns, on_times)
             directions = directions_of(limit, DIRECTIONS)
             along = (np.conj(directions) * left[limit.kind]).real + margin * spread.within(directions)
-            by = along - (1.0 + excess + 1e-3) * limit.most  # a little more passes
+            by = along - (1.0 + excess + TIGHT) * limit.most  # a little more passes
             peaked = np.flatnonzero((by > 0.0) & (by >= np.roll(by, 1)) & (by >= np.roll(by, -1)))
             for index in peaked[np.argsort(-by[peaked])][:WORST].tolist():
                 u = complex(directions[index])

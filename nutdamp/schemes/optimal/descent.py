@@ -23,6 +23,8 @@ from nutdamp.schemes.optimal.refinement import EndEquations
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
+LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
+
 Indices = NDArray[np.int_]
 Complex = NDArray[np.complex128]
 
@@ -416,7 +418,7 @@ class _LineSearch:
         """Unknowns, slacks and misses after a step, and whether it falls enough for its ``share`` of the whole."""
         old = self.old
         slack = old.slack[k] + np.einsum("bri,bi->br", self.rows[k], step)
-        inside = np.all(slack > 1e-10 * old.slack[k], axis=1)  # as much of the room must be left
+        inside = np.all(slack > LEAST_ROOM * old.slack[k], axis=1)  # as much of the room must be left
         x = np.where(inside[:, None], old.x[k] + step * self.scale[k], old.x[k])
         slack = np.where(inside[:, None], slack, old.slack[k])
         misses = self.task.misses(self.which[k], x, self.kicks)

@@ -22,6 +22,10 @@ from nutdamp.spacecraft.constraints import Windows
 from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
+SLACK_COST = 1e3  # cost of what no column supplies, over the dearest channel's: used only where there is no solution
+PROVED = 1e-6  # shortfall by which a program is proved to have no solution, over all there is to do
+LOOK = 0.05  # peaks of the price this far below zero are looked at more closely within their slots
+
 
 class ProgramColumns(NamedTuple):
     """Unknowns of the program, n each: index of the channel, moment in s, width in s (0: an impulse).
@@ -215,7 +219,7 @@ class Program:
         rows[:count] = np.hstack([np.eye(count), -np.eye(count), ring])
         rows[count : count + shares, 2 * count :] = 1.0
         # What no column supplies costs far more than the dearest channel: used only where there is no solution.
-        cost = np.repeat([1e3, 0.0], [2 * count, ring.shape[1]])
+        cost = np.repeat([SLACK_COST, 0.0], [2 * count, ring.shape[1]])
         master.add(cost, rows, np.full(len(cost), np.inf))
         self._add(master, columns)
         return master
@@ -304,7 +308,7 @@ class Program:
         size = float(np.abs(weights).max())
         most = float(np.maximum(self._worth(weights), 0.0).sum(axis=1) @ (self.width / self._unit))
         loose = self.off / self._scale * float(np.linalg.norm(weights[2:4])) if self.off > 0.0 else 0.0
-        return float(weights @ self.influence.goal) / self._scale - most - loose > 1e-6 * size
+        return float(weights @ self.influence.goal) / self._scale - most - loose > PROVED * size
 
     def _first(self) -> ProgramColumns:
         """Columns to begin with: those of the last time, or along the shortest way to the goal, spread over time."""
@@ -339,7 +343,7 @@ class Program:
         """Moments within slots at which a strong channel is worth most, in slots in which it costs little more."""
         padded = np.pad(np.where(self.strong[:, None], gains, -np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
         middle = padded[:, 1:-1]
-        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -0.05))
+        channel, slot = np.nonzero((middle >= padded[:, :-2]) & (middle >= padded[:, 2:]) & (middle > -LOOK))
         order = np.argsort(middle[channel, slot])[::-1][: 2 * BEST]
         channel, centre = channel[order], self.centres[slot[order]]
         within = 0.25 * self.width * np.arange(-2, 3)  # both ends of the slot among them: there may be none beside it

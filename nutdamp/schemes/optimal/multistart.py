@@ -20,6 +20,10 @@ from nutdamp.spacecraft.constraints import free_windows
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
+UNMET_COST = 100.0  # cost of a miss beside the propellant when the better part is chosen, per |H|, over the least cost
+NEAR = 1.03  # schedules of ideal impulses so much dearer than the best go on to the true motion
+HALF = 0.5  # share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
+
 STARTS, BEST = 512, 8
 """Random sequences to begin with, and schedules that go on to the next stage."""
 
@@ -189,7 +193,7 @@ def _screened(task: Task, starts: Starts) -> _Best:
     descent = Descent(task, *starts, kicks=1)
     for steps, share in ROUNDS:
         descent.run(steps)
-        score = np.nan_to_num(descent.cost / task.least + 100.0 * descent.left, nan=np.inf)
+        score = np.nan_to_num(descent.cost / task.least + UNMET_COST * descent.left, nan=np.inf)
         descent.keep(np.argsort(score, kind="stable")[: max(int(share * len(score)), 1)])
     return _best(descent)
 
@@ -249,7 +253,7 @@ def _flown(task: Task, best: _Best, known: Iterable[Schedule]) -> list[Schedule]
     """Schedules on the true motion from the best of ideal impulses and from ``known`` ones, the cheapest first."""
     given = [_moments_of(task, schedule) for schedule in known if 0 < len(schedule) <= _pulses(task, 2 * SPARE)]
     ideal = [_moments(which, x) for which, x in zip(best.sequences.which, best.x, strict=True)]
-    near = int(np.count_nonzero(best.cost <= 1.03 * best.cost[0])) if ideal else 0  # the cheapest come first
+    near = int(np.count_nonzero(best.cost <= NEAR * best.cost[0])) if ideal else 0  # the cheapest come first
     flown = _on_the_true_motion(task, [*ideal[:near], *given]) or _on_the_true_motion(task, ideal[near:])
     spare = [len(_needed(task, moments).which) < len(moments.which) for moments in flown]
     lean = [moments for moments, more in zip(flown, spare, strict=True) if not more]
@@ -307,7 +311,7 @@ def _schedule(task: Task, moments: Moments) -> Schedule:
 
 def _needed(task: Task, moments: Moments) -> Moments:
     """One sequence (n,) without needless pulses, and with pulses of a channel that touch as one."""
-    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], 0.5 * task.shortest[moments.which])
+    kept = moments.on > np.maximum(NEEDLESS * task.unit[moments.which], HALF * task.shortest[moments.which])
     moments = Moments(*(part[kept] for part in moments))
     which, start, on = moments.which.tolist(), (moments.t - 0.5 * moments.on).tolist(), moments.on.tolist()
     for number in reversed(range(1, len(which))):

@@ -31,6 +31,8 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule
 
+MOST_LOOSE = 5000.0  # units that may be spent where H may move, so that some are left for schedules that keep it
+
 CHOICES, AIMS = 3, 8
 """Choices of burns among all channels and moments: at small angles, then along the flight before; and flights along
 which those chosen are corrected, at most."""
@@ -252,7 +254,7 @@ class _LeastCostSearch(Problem):
             return self.with_bounds(Schedule(schedule.pulses, schedule.notes), first)
         # Where H may end elsewhere one that keeps it, or reaches the target, will do too: some work is left for it.
         looser = self.options.free_axis or self.options.shift is not None
-        with work.budget("a schedule as asked", 5000.0 if looser else math.inf):
+        with work.budget("a schedule as asked", MOST_LOOSE if looser else math.inf):
             best = self.whole_or_shorter(first)
         if best is None or self.dear(best, first.cost):
             best = self.cheaper(best, alternatives.within(self, self.spacecraft.horizon))
