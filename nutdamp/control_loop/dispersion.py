@@ -35,8 +35,7 @@ from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 from nutdamp.spacecraft.tolerances import expect_dispersions
 
-OF_FIRINGS = ("thrust_per_pulse", "timing")
-"""Tolerances that each firing draws anew."""
+OF_FIRINGS = ("thrust_per_pulse", "timing")  # tolerances that each firing draws anew
 
 
 class LoopModel(DispersedModel):
@@ -120,8 +119,7 @@ class LoopModel(DispersedModel):
         return tuple(channels)
 
 
-OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)
-"""First words of the inputs that make a thruster another."""
+OF_THRUSTERS = ("thrust", "direction", "position", *BY_VALVE)  # first words of the inputs that make a thruster another
 
 
 def _at_pressure(body: Spacecraft, draws: Draws) -> Draws:
@@ -182,23 +180,15 @@ is off its target at the end (rad), by how much the spin has changed (rad/s), pr
 
 What is not known is not a number: the first two of a loop that never falls quiet, or that never sees its start."""
 
-PORTION = 512
-"""Cases that are flown together."""
-
-CASES = (2_000, 20_000)
-"""Least and largest number of cases flown where nothing else is said."""
+PORTION = 512  # cases that are flown together
+CASES = (2_000, 20_000)  # least and largest number of cases flown where nothing else is said
 
 MORE = 1.6
 """Factor on the fewest cases that show a share by which one of them may fail: 5.6 over 3.7, as Poisson's limits are."""
 
-MOST_SAMPLES = 20_000_000_000
-"""Largest number of samples of a study, by those of its nominal case."""
-
-ALONE = 20
-"""Cost factor of a sample where cases fly alone."""
-
-FEW = 100
-"""Least number of settled cases for sensitivities."""
+MOST_SAMPLES = 20_000_000_000  # largest number of samples of a study, by those of its nominal case
+ALONE = 20  # cost factor of a sample where cases fly alone
+FEW = 100  # least number of settled cases for sensitivities
 
 
 class LoopStudy(DrawnCases):

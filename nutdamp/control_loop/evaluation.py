@@ -26,11 +26,8 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.requirements import Left
 
-AGREE = 1e-6
-"""s; firings that begin and last alike to this are the same."""
-
-EVALUATIONS = 1_000_000
-"""Evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over."""
+AGREE = 1e-6  # s; firings that begin and last alike to this are the same
+EVALUATIONS = 1_000_000  # evaluations of Euler's equations by DOP853, at most: a loop flies on where a schedule is over
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +125,7 @@ def verify_loop(spacecraft: Spacecraft, until: float | None = None, *, seed: int
     return LoopVerification(run, other, "", equations.evaluations, pairs)
 
 
-LOOP = "loop"
-"""Name in place of a scheme."""
+LOOP = "loop"  # name in place of a scheme
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -31,8 +31,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-LEADS = 100
-"""On-times of a channel for which the valve response is tabulated."""
+LEADS = 100  # on-times of a channel for which the valve response is tabulated
 
 
 class Firing(NamedTuple):
@@ -164,32 +163,15 @@ def _gauge(inertia: Inertia, spin: float) -> tuple[float, float]:
     return weights[0] * most, weights[1] * most
 
 
-WORKS = 0.25
-"""Fraction of the expected effect above which a firing works, and below whose negative it works backwards."""
-
-SIGMAS = 5.0
-"""Sigmas of noise within which a firing is not judged."""
-
-WHICH = 3.0
-"""Sigmas to tell a channel from the sensor, where it is known that one works backwards."""
-
-FED = 0.5
-"""Growth of the nutation under fire, as a share of its first size, from which firings feed it."""
-
-PHASED = 1e-3
-"""Phase uncertainty of z (rad) from which on sizes tell more of the effect of a firing."""
-
-LOST = 1.0
-"""Phase uncertainty of a firing (rad) from which on its expected effect is unknown."""
-
-LARGE = 100.0
-"""Exponent of growth beyond which further growth does not matter."""
-
-STEPPED = math.sqrt(3.0)
-"""Largest error of a quantised value over its root mean square."""
-
-ALIKE = 1e-9
-"""Share of the samples below which their information on the bias is rounding."""
+WORKS = 0.25  # fraction of the expected effect above which a firing works, and below whose negative it works backwards
+SIGMAS = 5.0  # sigmas of noise within which a firing is not judged
+WHICH = 3.0  # sigmas to tell a channel from the sensor, where it is known that one works backwards
+FED = 0.5  # growth of the nutation under fire, as a share of its first size, from which firings feed it
+PHASED = 1e-3  # phase uncertainty of z (rad) from which on sizes tell more of the effect of a firing
+LOST = 1.0  # phase uncertainty of a firing (rad) from which on its expected effect is unknown
+LARGE = 100.0  # exponent of growth beyond which further growth does not matter
+STEPPED = math.sqrt(3.0)  # largest error of a quantised value over its root mean square
+ALIKE = 1e-9  # share of the samples below which their information on the bias is rounding
 
 
 class Ending(Enum):

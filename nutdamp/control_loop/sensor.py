@@ -29,14 +29,12 @@ from nutdamp.control_loop.law import ComplexArray, Doubt, Law, known_to
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
-BLOCK = 4096
-"""Samples whose noise is drawn at a time."""
+BLOCK = 4096  # samples whose noise is drawn at a time
 
 FILTERED = 600.0
 """Time constants of the low-pass filter that are worked out at a time: the weights of more would overflow."""
 
-HARMONIC = 7
-"""Samples a nutation period from which on the sine of twice its rate can be distinguished from the others."""
+HARMONIC = 7  # samples a nutation period from which on the sine of twice its rate can be distinguished from the others
 
 FITTED, UNFITTED = 1.4, 2.0
 """Factors of the sine fitted to a period on a sine of any rate: at most 4/π where the period is one of whole samples,
@@ -46,8 +44,7 @@ which leaves a tenth for those that are not; and where twice the rate is not fit
 SETTLED = 5.0
 """Time constants of the low-pass filter until its beginning is forgotten to 1 %: till then samples are not used."""
 
-BLIND = 1e-6
-"""Share of |ω3| times the distance from the centre of mass below which an accelerometer shows nothing of ω."""
+BLIND = 1e-6  # share of |ω3| times the distance from the centre of mass below which an accelerometer shows nothing of ω
 
 
 def gain(moments: Sequence[float], position: Vector, axis: Vector) -> tuple[float, float]:

@@ -43,20 +43,11 @@ from nutdamp.spacecraft.equipment import Loop
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
-SEED = 1
-"""Default seed of the noise."""
-
-LEFT = 0.1
-"""Share of the stop threshold that a last firing leaves, about."""
-
-SMALLEST = 1e-3
-"""Share of the start threshold from which a cycle of growing nutation is counted at least."""
-
-REGROWN = 2_000_000
-"""Largest number of samples in a wait for the nutation to grow again."""
-
-ROWS = 2000
-"""Even moments at which the largest nutation of a run is looked for."""
+SEED = 1  # default seed of the noise
+LEFT = 0.1  # share of the stop threshold that a last firing leaves, about
+SMALLEST = 1e-3  # share of the start threshold from which a cycle of growing nutation is counted at least
+REGROWN = 2_000_000  # largest number of samples in a wait for the nutation to grow again
+ROWS = 2000  # even moments at which the largest nutation of a run is looked for
 
 
 class LoopRun:
@@ -173,8 +164,7 @@ def largest_since(run: LoopRun) -> tuple[float, float]:
     return float(track.nutation[row]), float(track.t[row])
 
 
-TOGETHER = 1 << 16
-"""Samples times cases that are worked out together: few enough that they stay in the cache."""
+TOGETHER = 1 << 16  # samples times cases that are worked out together: few enough that they stay in the cache
 
 Rows = NDArray[np.int_]
 

@@ -25,11 +25,8 @@ from nutdamp.spacecraft.constraints import effective_on_time, shortest_on_time
 from nutdamp.spacecraft.equipment import ACCELEROMETER, Loop, Sensor
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
-HALVINGS = 60
-"""Steps in which the largest lateness that still damps is found."""
-
-NEVER = 1e3
-"""Growth e^{κT} from which on further growth does not matter."""
+HALVINGS = 60  # steps in which the largest lateness that still damps is found
+NEVER = 1e3  # growth e^{κT} from which on further growth does not matter
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +126,7 @@ class Band(NamedTuple):
     step: float
 
 
-SURELY = 0.99
-"""Share of the cases that keep the `Band`."""
+SURELY = 0.99  # share of the cases that keep the `Band`
 
 
 def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
@@ -157,14 +153,9 @@ def dead_band(spacecraft: Spacecraft, loop: Loop) -> Band:
     return Band(*angles)
 
 
-FORGOTTEN = 12.0
-"""Time constants of the low-pass filter after which a sample counts no more."""
-
-ENOUGH = 64
-"""Samples of a nutation period that an accelerometer is followed by, at most about twice as many."""
-
-LONGEST_RESPONSE = 4096
-"""Samples that count, at most."""
+FORGOTTEN = 12.0  # time constants of the low-pass filter after which a sample counts no more
+ENOUGH = 64  # samples of a nutation period that an accelerometer is followed by, at most about twice as many
+LONGEST_RESPONSE = 4096  # samples that count, at most
 
 
 class Transfer(NamedTuple):
@@ -285,23 +276,12 @@ def _fitted(law: Law, spin: float, step: float, size: int) -> ComplexArray:
     return np.asarray((rows[1] + 1j * rows[2]) / (np.conj(Estimator(law, law.loop.sensor, 0.0).seen_gain) * spin))
 
 
-FINE = 1500
-"""Sizes of z at which the probability of an event is computed, far off and again near the threshold."""
-
-FARTHEST = 1e-12
-"""Share of a threshold below which a nutation is none."""
-
-REACH = 12.0
-"""Sigmas of noise within which sizes lie closer together."""
-
-PHASES = 16
-"""Directions of z against the bias over which a chance is averaged."""
-
-CURVED = 12.0
-"""Sigmas within which a size is so small that noise across it counts."""
-
-DEGREES = 240
-"""Terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger."""
+FINE = 1500  # sizes of z at which the probability of an event is computed, far off and again near the threshold
+FARTHEST = 1e-12  # share of a threshold below which a nutation is none
+REACH = 12.0  # sigmas of noise within which sizes lie closer together
+PHASES = 16  # directions of z against the bias over which a chance is averaged
+CURVED = 12.0  # sigmas within which a size is so small that noise across it counts
+DEGREES = 240  # terms of the mixture of Rice's distribution: of numbers with a mean of 72 none is larger
 
 
 class Odds:

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SPREAD = 6.0
-"""Standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge."""
+SPREAD = 6.0  # standard deviations to either side that residuals are drawn to; outliers beyond are marked at the edge
 
 ROUNDING = 1e-3
 """Share of the noise taken for the digits below which all residuals are rounding: of real noise some are above it."""
@@ -26,8 +25,7 @@ ROUNDING = 1e-3
 LOOKS = tuple((colour, line) for line in ("-", (0, (4, 1.5)), ":") for colour in (MOTION, INK, MOMENTUM, GREY))
 """Colour and line of the signals in turn."""
 
-FARTHEST = 6.0
-"""Pulls beyond are drawn at the edge."""
+FARTHEST = 6.0  # pulls beyond are drawn at the edge
 
 
 @style.styled

@@ -15,17 +15,10 @@ from nutdamp.spacecraft.schedule import Schedule
 
 Item = TypeVar("Item")
 
-ROWS_A_TURN = 60
-"""Rows in a nutation period from which a polygon looks like the curve."""
-
-MOST_ROWS = 30_000
-"""Largest number of rows of a picture; a longer track is drawn as far as they reach."""
-
-RIM = 121
-"""Points around the rim of a cone."""
-
-LEAST = 1e-9
-"""Degrees or deg/s below which a motion is drawn as a point."""
+ROWS_A_TURN = 60  # rows in a nutation period from which a polygon looks like the curve
+MOST_ROWS = 30_000  # largest number of rows of a picture; a longer track is drawn as far as they reach
+RIM = 121  # points around the rim of a cone
+LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
@@ -33,8 +26,7 @@ INSET_FROM, INSET_BELOW = 1e-4, 0.15
 CLOSE, MANY = 1.0 / 125.0, 3
 """Part of the time shown below which firings cannot be distinguished: 4 points on a sheet; so many are drawn as one."""
 
-NO_CONE = 1e-10
-"""Half-angle in rad below which a cone is not distinguished from its axis."""
+NO_CONE = 1e-10  # half-angle in rad below which a cone is not distinguished from its axis
 
 
 def shown_until(spacecraft: Spacecraft, schedule: Schedule) -> float:

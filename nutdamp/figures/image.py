@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg", "pdf")
 
-POINTS = 72.0
-"""Units of an SVG in an inch."""
+POINTS = 72.0  # units of an SVG in an inch
 
 LONG = 30
 """Points of a polyline from which an inline SVG has it in tenths of a point, half a pixel at four times its size."""
@@ -148,8 +147,7 @@ def untitled_svg(figure: Figure) -> str:
 
 FILMS = ("gif", "mp4")
 
-INCHES = 8.0
-"""Width of the sheet that fills a frame, inches: more pixels only make it finer."""
+INCHES = 8.0  # width of the sheet that fills a frame, inches: more pixels only make it finer
 
 LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
 """Shades of a GIF: far enough apart that Pillow finds each in a palette, and white stays white."""
@@ -157,17 +155,10 @@ LEVELS = (np.arange(256) // 8 * 255 // 31).astype(np.uint8)
 SMOOTH = 12.0
 """Frames in a nutation turn from which the eye follows it; with fewer than half of them it may see it backwards."""
 
-SHORTEST, LONGEST = 6.0, 30.0
-"""Seconds of a film whose length is not given."""
-
-MARKED = math.radians(60.0)
-"""Turn of the body from frame to frame up to which a mark on it shows how it rolls."""
-
-FRAMED = 300
-"""Frames by whose cones the scales are laid out, evenly over the film."""
-
-HELD = 0.4
-"""Seconds of film that a firing stays announced, however short it is."""
+SHORTEST, LONGEST = 6.0, 30.0  # seconds of a film whose length is not given
+MARKED = math.radians(60.0)  # turn of the body from frame to frame up to which a mark on it shows how it rolls
+FRAMED = 300  # frames by whose cones the scales are laid out, evenly over the film
+HELD = 0.4  # seconds of film that a firing stays announced, however short it is
 
 
 def film_format(path: str) -> str:

@@ -23,26 +23,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-SAMPLES = 3000
-"""Largest number of samples of the sensor drawn."""
-
-BLOCK = 4096
-"""Samples evaluated together."""
-
-DECADES = 5.0
-"""Largest number of decades of the nutation on its log axis."""
+SAMPLES = 3000  # largest number of samples of the sensor drawn
+BLOCK = 4096  # samples evaluated together
+DECADES = 5.0  # largest number of decades of the nutation on its log axis
 
 FIRST, EARLY, TURNS = 4, 0.2, 4.0
 """Firings in this share of the run, and periods of the nutation, that the enlarged first seconds hold."""
 
-SHORT = 0.5
-"""Share of the run from which on its first seconds are not drawn a second time."""
+SHORT = 0.5  # share of the run from which on its first seconds are not drawn a second time
 
 LINES = ((MOTION, "-"), (MOMENTUM, "--"), (GREY, "-."), (MOTION, ":"))
 """Colour and style of the pairs of thresholds whose limit cycles are drawn."""
 
-PERIODS = 4.0
-"""Cycles drawn of the longest limit cycle."""
+PERIODS = 4.0  # cycles drawn of the longest limit cycle
 
 ROWS = 600
 

@@ -31,23 +31,15 @@ if TYPE_CHECKING:
 
     from nutdamp.planning.plan import Plan
 
-ROWS = 1000
-"""Rows of the track of a plan; the figures draw a finer one where they need it."""
-
-TALL = 4.0
-"""Inches of the two planes of the motion on the sheet with all."""
-
-ALIKE = math.radians(2.0)
-"""Channels whose torques point within this angle share one arrow."""
-
-NUMBERED = 17
-"""Largest number of firings of a path that are numbered, and have arrowheads."""
+ROWS = 1000  # rows of the track of a plan; the figures draw a finer one where they need it
+TALL = 4.0  # inches of the two planes of the motion on the sheet with all
+ALIKE = math.radians(2.0)  # channels whose torques point within this angle share one arrow
+NUMBERED = 17  # largest number of firings of a path that are numbered, and have arrowheads
 
 CROWD, NEAR = 3, 0.05
 """Firings in a row that have one label, at least, each nearer to the one before than this part of the path's width."""
 
-MANY, SPARSE = 12, 40
-"""Numbers of firings above which lines and arrowheads are small, and up to which each has a dot."""
+MANY, SPARSE = 12, 40  # numbers of firings above which lines and arrowheads are small, and up to which each has a dot
 
 ROOM, INSET = 1.8, (0.675, 0.17, 0.315, 0.66)
 """Width of the axis track with an inset over that without, and the box of the inset as shares of the panel."""
@@ -282,23 +274,15 @@ def until(flight: Flight) -> float:
     return flight.shown_to if flight.shown_to != usual else geometry.shown_until(flight.spacecraft, flight.schedule)
 
 
-TIME = "time, s"
-"""Label of time axes."""
-
-DECADES = 4.0
-"""Largest number of decades of the nutation on a log axis, unless the requirement lies lower."""
-
-EDGE = 0.012
-"""Room before t = 0, as a part of the time shown, so that events at t = 0 are seen."""
+TIME = "time, s"  # label of time axes
+DECADES = 4.0  # largest number of decades of the nutation on a log axis, unless the requirement lies lower
+EDGE = 0.012  # room before t = 0, as a part of the time shown, so that events at t = 0 are seen
 
 FULL, PALE = 0.9, 0.35
 """Share of a bar that several firings must fill to be drawn as one, and how dense it is drawn where they do not."""
 
-BAR = 0.46
-"""Height of a bar; the distance between two rows is 1."""
-
-CHANGES = 1e-3
-"""Share of the largest ω3 from which on its change is drawn."""
+BAR = 0.46  # height of a bar; the distance between two rows is 1
+CHANGES = 1e-3  # share of the largest ω3 from which on its change is drawn
 
 
 def heights(flight: Flight, track: Track) -> list[float]:

@@ -25,17 +25,13 @@ ELEVATION, ASIDE = math.radians(28.0), math.radians(65.0)
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""
 
-SPACE, BODY = 0.28, 0.15
-"""Opacity of the cones: distinguished in grey print too."""
-
-RIM = 0.7
-"""Width of rims and edges of cones, points: thinner than the path of the spin axis, which shares their colour."""
+SPACE, BODY = 0.28, 0.15  # opacity of the cones: distinguished in grey print too
+RIM = 0.7  # width of rims and edges of cones, points: thinner than the path of the spin axis, which shares their colour
 
 DIRECTIONS = (("+", MOMENTUM, "H"), ("o", INK, "ω"), ("s", MOTION, "spin axis"))
 """Marks in the plane picture, colours and names of the three directions that lie in one plane."""
 
-HIDDEN = 0.04
-"""Share of the space cone below which the body cone lies under the marks of spin axis and ω."""
+HIDDEN = 0.04  # share of the space cone below which the body cone lies under the marks of spin axis and ω
 
 STEPS = (1.0, 2.0, 3.0, 5.0)
 

@@ -32,23 +32,12 @@ if TYPE_CHECKING:
     from nutdamp.control_loop.dispersion import LoopResults
 
 
-BINS = 60
-"""Bars of a histogram, at most."""
-
-TAIL, KNEE = 2.0, 0.999
-"""The axis is logarithmic where the largest value is more than TAIL times the quantile KNEE."""
-
-DECADES = 6.0
-"""Largest number of decades of that axis: its first bin holds all smaller values."""
-
-STEPS = 400
-"""Steps of the curve of the cases within a value, besides the last ones."""
-
-HIGHEST = 60.0
-"""Height of the highest bar of a histogram, on the scale of the curve over it, %."""
-
-ALIKE = 1e-9
-"""Relative difference up to which the values of all cases are one, but for rounding."""
+BINS = 60  # bars of a histogram, at most
+TAIL, KNEE = 2.0, 0.999  # the axis is logarithmic where the largest value is more than TAIL times the quantile KNEE
+DECADES = 6.0  # largest number of decades of that axis: its first bin holds all smaller values
+STEPS = 400  # steps of the curve of the cases within a value, besides the last ones
+HIGHEST = 60.0  # height of the highest bar of a histogram, on the scale of the curve over it, %
+ALIKE = 1e-9  # relative difference up to which the values of all cases are one, but for rounding
 
 NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
 """Degrees below which all cases together are not worth a picture, and their text."""
@@ -59,8 +48,7 @@ FAR = 4.0
 DOTS, DENSE = 2_000, 0.8
 """Cases shown as dots at most, more would only make the picture heavy, and their opacity: fainter ones are not seen."""
 
-TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}
-"""Look of the title of a panel."""
+TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}  # look of the title of a panel
 
 PANELS = {"overview": 3, "cases": 2, "momentum": 1}
 """Panels of each figure: nutation and momentum, their cases, and the final directions of H."""
@@ -218,14 +206,9 @@ def _momentum(axes: Axes, results: Results) -> None:
 LOOKS = ((MOTION, "o", "-"), (MOMENTUM, "^", (0, (5, 1.5, 1, 1.5))), (INK, "s", (0, (5, 1.5))), (GREY, "v", ":"))
 """Colour, mark and line of the fronts in turn."""
 
-SAME_ENDS = (0.02, 0.002)
-"""Relative differences in end and in cost of points that are drawn as one."""
-
-WIDTH = 14.0
-"""Characters of a line above the picture in an inch of it."""
-
-FEWEST = 3
-"""Ticks of a decade's 1, 2 and 5 below which the axis of time has others."""
+SAME_ENDS = (0.02, 0.002)  # relative differences in end and in cost of points that are drawn as one
+WIDTH = 14.0  # characters of a line above the picture in an inch of it
+FEWEST = 3  # ticks of a decade's 1, 2 and 5 below which the axis of time has others
 
 
 REACH = 1.4
@@ -328,14 +311,12 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
         style.add(axes, text, places[row], INK, role="vital", meant=meant)
 
 
-ROWS = 6000
-"""Moments of the envelope, over all windows."""
+ROWS = 6000  # moments of the envelope, over all windows
 
 AFTER, TURNS = 1.25, 2.0
 """End of the time shown over that of the last firing of the plan, and periods of the nutation shown at least."""
 
-SHALLOW = 1e-3
-"""Depth of the envelope below 0 that is the step of the linear program in time."""
+SHALLOW = 1e-3  # depth of the envelope below 0 that is the step of the linear program in time
 
 
 @style.styled

@@ -40,16 +40,14 @@ MISSED, UNCHECKED = "#b00020", "#8a5a00"
 INK, GREY, FAINT = "#1a1a1a", "#767676", "#7676764d"
 """Text and second curves; limits and axes; the circles of the sphere."""
 
-STAR = 13.0
-"""Points across of the star of the target."""
+STAR = 13.0  # points across of the star of the target
 
 TARGET: dict[str, Any] = {
     "marker": "*", "color": INK, "markersize": STAR, "markerfacecolor": "none", "linestyle": "", "zorder": 4
 }  # fmt: skip
 """Mark of the target axis: larger than the marks of ends of paths there, and over them."""
 
-PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
-"""Look of the path of H."""
+PATH_OF_H: dict[str, Any] = {"color": MOMENTUM, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}  # look of the path of H
 
 LIMIT: dict[str, Any] = {"color": GREY, "linewidth": 1.3, "linestyle": (0, (6, 2)), "label": "required", "zorder": 1.5}
 """Look of a bound of the requirement."""
@@ -57,17 +55,10 @@ LIMIT: dict[str, Any] = {"color": GREY, "linewidth": 1.3, "linestyle": (0, (6, 2
 PAPER = "#fefefe"
 """Ground under a hollow mark; in a page, its background."""
 
-LINE, THIN, LEADER = 1.3, 0.7, 0.5
-"""Line widths, points; the last is that from a label to its point."""
-
-SMALL, TICK_SIZE = 7.5, 8
-"""Sizes of labels inside a panel and of those of its ticks, points."""
-
-NOTE: dict[str, Any] = {"fontsize": SMALL, "fontweight": "normal"}
-"""Look of a remark above a panel."""
-
-FIGURES = 3
-"""Significant figures of the numbers in a picture."""
+LINE, THIN, LEADER = 1.3, 0.7, 0.5  # line widths, points; the last is that from a label to its point
+SMALL, TICK_SIZE = 7.5, 8  # sizes of labels inside a panel and of those of its ticks, points
+NOTE: dict[str, Any] = {"fontsize": SMALL, "fontweight": "normal"}  # look of a remark above a panel
+FIGURES = 3  # significant figures of the numbers in a picture
 
 _SETTINGS: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],  # comes with matplotlib, has the Greek letters
@@ -132,8 +123,7 @@ def styled(draw: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     return drawn
 
 
-PHONE = 3.7
-"""Width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it."""
+PHONE = 3.7  # width of a figure for narrow screens, inches: its smallest text is 10 px high where 360 px show it
 
 
 def sheet(width: float, height: float) -> Figure:
@@ -232,11 +222,8 @@ def limit_of(spacecraft: Spacecraft, part: Part) -> float | None:
     return next((math.degrees(bound.most) for bound in required(spacecraft) if bound.part is part), None)
 
 
-LETTERS = 11.0
-"""Bold letters of a heading that fit in an inch."""
-
-LONGEST_NAME = 40
-"""Characters of a name that fit above a picture."""
+LETTERS = 11.0  # bold letters of a heading that fit in an inch
+LONGEST_NAME = 40  # characters of a name that fit above a picture
 
 
 def heading(figure: Figure, spacecraft: Spacecraft, text: str) -> None:
@@ -269,14 +256,9 @@ def legend(figure: Figure, axes: Sequence[Axes], columns: int = 8) -> None:
             mark.set_markersize(max(mark.get_markersize(), DOT))
 
 
-DOT = 4.0
-"""Points that a mark of a legend measures at least, where a curve has smaller ones."""
-
-LETTER = 4.6
-"""Points that a letter of a legend takes, about."""
-
-HANDLE = 25.0
-"""Points to the left of the text in a legend: its line or mark."""
+DOT = 4.0  # points that a mark of a legend measures at least, where a curve has smaller ones
+LETTER = 4.6  # points that a letter of a legend takes, about
+HANDLE = 25.0  # points to the left of the text in a legend: its line or mark
 
 
 def _across(names: Sequence[str], columns: int) -> float:
@@ -294,8 +276,7 @@ class Meant(NamedTuple):
     others: Vector
 
 
-_MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()
-"""Points meant by each label, until it is settled."""
+_MEANT: WeakKeyDictionary[Artist, Meant] = WeakKeyDictionary()  # points meant by each label, until it is settled
 
 
 def add(
@@ -334,11 +315,8 @@ def target(axes: Axes, places: Vector, name: str = "target") -> None:
         add(axes, "target", places[0], INK, role="vital")
 
 
-PASSES = 8
-"""Largest number of passes of the layout, until panels of equal scales move by less than a pixel."""
-
-BAR_GAP = 2.0
-"""Points between a bar and its label."""
+PASSES = 8  # largest number of passes of the layout, until panels of equal scales move by less than a pixel
+BAR_GAP = 2.0  # points between a bar and its label
 
 _AROUND = [
     (step * x, step * y)
@@ -352,11 +330,8 @@ _FAR = [
 ]
 _OFFSETS = {"_vital": [*_AROUND, *_FAR], "_label": _AROUND[:16]}
 
-FAR = 15.0
-"""Points from which a line leads from a label to its point."""
-
-_COVERED = {"_vital": np.inf, "_label": 14.0}
-"""Points of curves, 4 pixels apart, that a label may cover."""
+FAR = 15.0  # points from which a line leads from a label to its point
+_COVERED = {"_vital": np.inf, "_label": 14.0}  # points of curves, 4 pixels apart, that a label may cover
 
 
 def panels(figure: Figure) -> list[Axes]:

@@ -27,11 +27,8 @@ ACCEPT_ALL = 1e30  # tolerance that no step fails, so that the integrator keeps 
 TURN, TURN_TURNING = 0.1, 0.05
 """Largest turn of the body within a default step, rad, also where a torque turns in the body: errors below rounding."""
 
-MOST_STEPS = 200_000
-"""Steps of a flight, at most: three thousand turns at the default step, some ten seconds."""
-
-GAUSS = math.sqrt(3.0) / 6.0
-"""Distance of the two Gauss nodes from the middle of an interval, over its length."""
+MOST_STEPS = 200_000  # steps of a flight, at most: three thousand turns at the default step, some ten seconds
+GAUSS = math.sqrt(3.0) / 6.0  # distance of the two Gauss nodes from the middle of an interval, over its length
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,8 @@ from nutdamp.units import STANDARD_GRAVITY
 
 EVEN = 0.01  # share of its mean by which the thrust falls, at most, in each of the straight pieces of a pulse
 NODES = 6  # nodes of the quadrature in each of them
-REPEATED = 60  # iterations, and relative tolerance of the on-time for an impulse
-CLOSE = 1e-14  # iterations, and relative tolerance of the on-time for an impulse
+REPEATED = 60  # iterations of the search of the on-time for an impulse, at most
+CLOSE = 1e-14  # relative tolerance of that on-time
 
 
 class Path(Protocol):
@@ -132,14 +132,12 @@ class Integrated:
 LONG = 20.0
 """Turn, rad, from which a free coast of a body with three moments is flown in closed form: Taylor pieces cost more."""
 
-LEG, PULSE = 0.03, 0.4
-"""Units of `work` of a leg of a flight, and additional ones of an integrated leg."""
+LEG, PULSE = 0.03, 0.4  # units of `work` of a leg of a flight, and additional ones of an integrated leg
 
 SPUN_STEP, STEP, SUNK_STEP = 0.012, 0.2, 0.7
 """Units of a step of a symmetric body, of any other, and of one with dissipation."""
 
-REMEMBERED = 1000
-"""Legs that are remembered, before all are forgotten."""
+REMEMBERED = 1000  # legs that are remembered, before all are forgotten
 
 
 class Push(NamedTuple):

@@ -59,8 +59,7 @@ def _forces(firing: Iterable[Pulse], times: Vector) -> Vector:
     return np.asarray(total)
 
 
-ANGLE = math.radians(0.01)
-"""Tolerance where nothing is required, rad."""
+ANGLE = math.radians(0.01)  # tolerance where nothing is required, rad
 
 
 class Deviation(NamedTuple):

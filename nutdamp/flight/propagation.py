@@ -25,11 +25,8 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 Array = NDArray[np.float64]
 
-PIECE = 20_000
-"""Rows of a track that are held at a time where many are written."""
-
-BINS = 7200
-"""Parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg."""
+PIECE = 20_000  # rows of a track that are held at a time where many are written
+BINS = 7200  # parts of a turn by which a range of right ascension is distinguished from a whole turn: 0.05 deg
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,14 +172,9 @@ class _Circle:
 
 
 IMPULSE_SUM = "impulse sum (17)"
-REAL_WIDTHS = "real pulse widths"
-"""Models of the flight of a schedule."""
-
-IDEAL_IMPULSES = "exact motion, ideal impulses"
-"""Name of the second model for people where no pulse has a width."""
-
-PLANNED_STEPS = 30_000
-"""Steps of integration to fly a planned schedule, at most: some 60,000 radians."""
+REAL_WIDTHS = "real pulse widths"  # models of the flight of a schedule
+IDEAL_IMPULSES = "exact motion, ideal impulses"  # name of the second model for people where no pulse has a width
+PLANNED_STEPS = 30_000  # steps of integration to fly a planned schedule, at most: some 60,000 radians
 
 
 def model_name(schedules: Iterable[Schedule], model: str = REAL_WIDTHS) -> str:

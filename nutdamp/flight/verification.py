@@ -26,8 +26,7 @@ from nutdamp.spacecraft.constraints import commandable
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
-EVALUATIONS = 200_000
-"""Evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds."""
+EVALUATIONS = 200_000  # evaluations of Euler's equations by DOP853, at most: a thousand turns, some 15 seconds
 
 Push = tuple[Vector, Vector | None]
 """Torque (3,) N m, principal axes, as a stretch begins, and its slope, N m/s, None for none."""
@@ -205,18 +204,12 @@ def _flow(pulse: Pulse, start: float, end: float) -> tuple[float, float]:
     return (4.0 * middle - 3.0 * before - after) / length, 4.0 * (before - 2.0 * middle + after) / length**2
 
 
-SAMPLES = 201
-"""Even times at which two flights are compared, besides the edges of the pulses."""
-
-AGREE = 1e-9
-"""rad; flights that differ by less agree, DOP853 at its tightest tolerance included."""
+SAMPLES = 201  # even times at which two flights are compared, besides the edges of the pulses
+AGREE = 1e-9  # rad; flights that differ by less agree, DOP853 at its tightest tolerance included
 
 
-IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"
-"""Rows of the budget of every schedule."""
-
-WITHOUT = "without "
-"""Prefix of the rows of the budget that omit an effect included in plans."""
+IDEAL, AS_FLOWN = "none: ideal impulses", "all: as flown"  # rows of the budget of every schedule
+WITHOUT = "without "  # prefix of the rows of the budget that omit an effect included in plans
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import Supply, shed
 from nutdamp.montecarlo.inputs import BY_VALVE, Draws, Group, groups_of, list_inputs
 from nutdamp.physics import attitude
-from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch
 from nutdamp.physics.thruster import Cold, Tank, possible, spread
@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from nutdamp.physics.thruster import Opened
 
 
-Cases = Any
-"""One number for all cases, or an array (n,): real, or complex for complex-step derivatives."""
+Cases = Any  # one number for all cases, or an array (n,): real, or complex for complex-step derivatives
 
 Triple = tuple[Cases, Cases, Cases]
 
@@ -174,14 +173,12 @@ def supplied(
     return levels, tuple(taken) if known else None, drained
 
 
-DISC = 1e-12
-"""Rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)."""
+DISC = 1e-12  # rounding allowed, relatively, where moments touch the triangle inequality (flat disc, C = 2A)
 
 NOT_NEGATIVE = ("thrust", *BY_VALVE, "cold", "cold_pulses", "inertia_per_kg", "sensor_delay")
 """Tolerances of quantities that are never negative: draws that make them so are repeated."""
 
-POSITIVE = ("sensor_scale", "sensor_noise")
-"""Tolerances of quantities that are not zero either."""
+POSITIVE = ("sensor_scale", "sensor_noise")  # tolerances of quantities that are not zero either
 
 ROUNDING = 1e-9
 """A pulse whose impulse differs by less, relatively, from its channel's torque times on-time is that channel's."""

@@ -255,11 +255,8 @@ def _feed(spacecraft: Spacecraft, requested: Dispersions, fires: bool) -> Iterat
 
 
 Array = NDArray[np.float64]
-Pair = tuple[str, str, float]
-"""Names of two inputs, and their correlation."""
-
-NODES = 96
-"""Nodes of the quadrature for the correlation of values that are not normal."""
+Pair = tuple[str, str, float]  # names of two inputs, and their correlation
+NODES = 96  # nodes of the quadrature for the correlation of values that are not normal
 
 
 class Group(NamedTuple):
@@ -408,8 +405,7 @@ def _nodes() -> tuple[Array, Array]:
     return nodes, weights / math.sqrt(2.0 * math.pi)
 
 
-Draws = Mapping[str, "Array | float"]
-"""Deviations from nominal by the name of the input, (n,) or one for all cases."""
+Draws = Mapping[str, "Array | float"]  # deviations from nominal by the name of the input, (n,) or one for all cases
 
 
 def some_of(draws: Draws, rows: Any) -> dict[str, Any]:
@@ -417,11 +413,8 @@ def some_of(draws: Draws, rows: Any) -> dict[str, Any]:
     return {name: draw if isinstance(draw, float) else draw[rows] for name, draw in draws.items()}
 
 
-BLOCK = 16_384
-"""Cases that share a substream of each input."""
-
-MOST_ATTEMPTS = 1_000
-"""Largest number of redraws of a case; beyond it the dispersions count as impossible."""
+BLOCK = 16_384  # cases that share a substream of each input
+MOST_ATTEMPTS = 1_000  # largest number of redraws of a case; beyond it the dispersions count as impossible
 
 
 class DrawSource:
@@ -480,8 +473,7 @@ class DrawSource:
                     table[self._rows[name]] = value_of(self._random[self._rows[name]], normal)
 
 
-KEPT = 128
-"""Streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws."""
+KEPT = 128  # streams of blocks that are kept, 128 KiB each: all candidates and stages of a study fly the same draws
 
 _DRAWING = threading.Lock()
 

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from nutdamp.common.numerics import gauss_legendre
+from nutdamp.common.numerics import cos_sin, gauss_legendre
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.montecarlo.cases import (
@@ -37,7 +37,7 @@ from nutdamp.montecarlo.cases import (
     watch_over,
 )
 from nutdamp.physics import attitude, batch, energy_sink, sky
-from nutdamp.physics.batch import Bodies, MotionStretch, cos_sin
+from nutdamp.physics.batch import Bodies, MotionStretch
 from nutdamp.physics.energy_sink import TINY
 from nutdamp.physics.sky import AxisWatch, SunPulseClock, TorqueRamp
 from nutdamp.physics.thruster import Opened
@@ -46,11 +46,8 @@ from nutdamp.schemes.block_model import fire, pushes
 
 Array = NDArray[np.float64]
 
-FAR = 8.0
-"""Standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly."""
-
-MOST_NODES = 128
-"""Largest number of nodes of that quadrature: enough for pulses of 20 nutation periods."""
+FAR = 8.0  # standard deviations that the quadrature of wide pulses covers to rounding; beyond, accuracy fades slowly
+MOST_NODES = 128  # largest number of nodes of that quadrature: enough for pulses of 20 nutation periods
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,17 +19,10 @@ from nutdamp.montecarlo.cases import Cases, DispersedCases, DispersedModel, Trip
 from nutdamp.montecarlo.inputs import DispersedInput, Group, mixing
 from nutdamp.montecarlo.propagated import ClosedForm, Ends
 
-STEPS = 200
-"""Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly."""
-
-ACCURACY = 4e-16
-"""Relative change of a quantile, or of a continued fraction, that is rounding."""
-
-TINY = 1e-300
-"""In place of a denominator of zero."""
-
-LARGE = 20.0
-"""Argument from which Stirling's series of the logarithm of Γ is exact to rounding."""
+STEPS = 200  # Newton steps and halvings in which a quantile is found, at most; half a dozen do mostly
+ACCURACY = 4e-16  # relative change of a quantile, or of a continued fraction, that is rounding
+TINY = 1e-300  # in place of a denominator of zero
+LARGE = 20.0  # argument from which Stirling's series of the logarithm of Γ is exact to rounding
 
 
 def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -126,8 +119,7 @@ VECTORS = {
 }
 """Rows of `vectors` by output."""
 
-ROWS = 10
-"""Rows of `vectors`."""
+ROWS = 10  # rows of `vectors`
 
 
 def measure(model: DispersedModel, ends: Ends, out: Array) -> None:
@@ -172,17 +164,13 @@ def angle(first: Triple, second: Triple) -> Cases:
     return np.arctan2(np.sqrt(i * i + j * j + k * k), a * x + b * y + c * z)
 
 
-EXACT_CASES = 1_000_000
-"""Number of cases up to which every value is kept, and percentiles are exact."""
+EXACT_CASES = 1_000_000  # number of cases up to which every value is kept, and percentiles are exact
 
 SHARPNESS = 13
 """Leading bits of the mantissa that the sketch tells apart: bins 0.012 % wide, so their middles are 0.006 % off."""
 
-OCTAVES = 64
-"""Octaves of the sketch: sizes from 2^-64 to 2^64; smaller ones count as zero."""
-
-PORTION = 16_384
-"""Values that are counted at once, so that they stay in the cache."""
+OCTAVES = 64  # octaves of the sketch: sizes from 2^-64 to 2^64; smaller ones count as zero
+PORTION = 16_384  # values that are counted at once, so that they stay in the cache
 
 _SIZES = 2 * OCTAVES << SHARPNESS
 _SHIFT = 52 - SHARPNESS
@@ -249,8 +237,7 @@ class Sketch:
         return np.histogram(_middles(), edges, weights=self.counts.astype(float))[0]
 
 
-Distribution = Exact | Sketch
-"""An output over all cases so far."""
+Distribution = Exact | Sketch  # an output over all cases so far
 
 
 def _middles() -> Array:
@@ -284,17 +271,10 @@ class Worst:
         self.cases, self.severities = cases[order], severities[order]
 
 
-STEP = 1e-30
-"""Imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost."""
-
-SHARE = 1e-3
-"""Step of central differences, as a share of an input's size."""
-
-CLASSES = 128
-"""Intervals of an input over which the cases are averaged, at most."""
-
-CLASS_SIZE = 32
-"""Cases in each of them, at least."""
+STEP = 1e-30  # imaginary step, as a share of an input's size: nothing is subtracted, so no digits are lost
+SHARE = 1e-3  # step of central differences, as a share of an input's size
+CLASSES = 128  # intervals of an input over which the cases are averaged, at most
+CLASS_SIZE = 32  # cases in each of them, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,8 +323,7 @@ class FirstOrder:
         return np.asarray(squares / total if total > 0.0 else squares)
 
 
-ALIKE = 0.01
-"""Relative difference up to which derivatives of the closed form may replace those of the flight."""
+ALIKE = 0.01  # relative difference up to which derivatives of the closed form may replace those of the flight
 
 
 def as_flown(model: DispersedModel, fly: Callable[[DispersedCases], Ends]) -> FirstOrder:

@@ -52,11 +52,8 @@ from nutdamp.spacecraft.tolerances import expect_dispersions
 
 Array = NDArray[np.float64]
 
-STRIDE = batch.BLOCK
-"""Cases that are always flown together."""
-
-PORTION = 2 * STRIDE
-"""Cases that a thread takes at once; blocks are multiples of it."""
+STRIDE = batch.BLOCK  # cases that are always flown together
+PORTION = 2 * STRIDE  # cases that a thread takes at once; blocks are multiples of it
 
 
 class Round:
@@ -147,23 +144,12 @@ class Round:
         return int(np.count_nonzero((redrawn >= begin - start) & (redrawn < end - start)))
 
 
-ROUND = 64 * BLOCK
-"""Cases between two looks at the results."""
-
-FREED = 32_000_000
-"""Bytes of the largest block that counts for that."""
-
-EARLY = 2 * BLOCK
-"""Number of first cases whose outcome is kept whole for `sampled_shares`."""
-
-KEPT_WORST = 1_000
-"""Worst cases that are kept."""
-
-CONFIDENCE = 0.95
-"""Confidence level of the interval about the fraction that complies."""
-
-WORTH_SAYING = math.radians(1e-4)
-"""rad by which cases of falling moments must err for that to be said."""
+ROUND = 64 * BLOCK  # cases between two looks at the results
+FREED = 32_000_000  # bytes of the largest block that counts for that
+EARLY = 2 * BLOCK  # number of first cases whose outcome is kept whole for `sampled_shares`
+KEPT_WORST = 1_000  # worst cases that are kept
+CONFIDENCE = 0.95  # confidence level of the interval about the fraction that complies
+WORTH_SAYING = math.radians(1e-4)  # rad by which cases of falling moments must err for that to be said
 
 
 def threads_here() -> int:
@@ -453,11 +439,8 @@ class Dispersion(Dispersed):
     scheme: str = ""
 
 
-SAMPLES = 20_000
-"""Cases that are flown where nothing else is said."""
-
-SEED = 1
-"""Default seed of the draws."""
+SAMPLES = 20_000  # cases that are flown where nothing else is said
+SEED = 1  # default seed of the draws
 
 
 def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) -> Study:
@@ -466,14 +449,9 @@ def study_of(spacecraft: Spacecraft, schedule: Schedule, *, seed: int = SEED) ->
     return Study(DispersedModel(spacecraft, schedule), seed)
 
 
-CASES = 2 * STRIDE
-"""Dispersed cases that are flown for each range: the first ones of the study."""
-
-TAILS = (0.0015, 0.9985)
-"""Quantiles of the cases between which a flight is as expected."""
-
-STEPS, HALVINGS = 16, 5
-"""Even steps in which the edge of a window is sought, and halvings of the one that holds it."""
+CASES = 2 * STRIDE  # dispersed cases that are flown for each range: the first ones of the study
+TAILS = (0.0015, 0.9985)  # quantiles of the cases between which a flight is as expected
+STEPS, HALVINGS = 16, 5  # even steps in which the edge of a window is sought, and halvings of the one that holds it
 
 
 class Range(NamedTuple):

@@ -285,8 +285,7 @@ def controlled(**given: str) -> Control:
         raise BadRequest(f"SOURCE_DATE_EPOCH = {epoch!r}: expected a number of seconds since 1970") from None
 
 
-UNCONTROLLED = Control()
-"""Configuration control of a page without any entry."""
+UNCONTROLLED = Control()  # configuration control of a page without any entry
 
 
 class Contender(NamedTuple):

@@ -32,11 +32,8 @@ if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Checkpoints, Results
 
 
-CHECKED = 24
-"""Largest number of rows with a range of the nutation; of more evenly spaced ones have one."""
-
-FINEST = 6
-"""Largest number of decimals of times."""
+CHECKED = 24  # largest number of rows with a range of the nutation; of more evenly spaced ones have one
+FINEST = 6  # largest number of decimals of times
 
 ON_HOLD = (
     "Fire none of the rows that are left: they are void. Record spin, nutation and phase with their time. Plan again "

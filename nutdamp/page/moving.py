@@ -32,26 +32,13 @@ from nutdamp.views.text import MISSING, most, quantity
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400
 """Even rows in the quickest nutation turn; least and largest number of them altogether."""
 
-COARSE = 12
-"""Rows in a turn below which a line from row to row is no picture of the path, and dots are drawn."""
-
-STEEP = 25.0
-"""Turns of the nutation from which lines are thin."""
-
-SPHERE = 10_000
-"""Length of a unit vector of the globe as whole numbers: 0.006 deg."""
-
-ANGLE_DIGITS = 4
-"""Decimals of degrees; more where the largest nutation has not so many figures."""
-
-FAR = 4.0
-"""Largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track."""
-
-NONE = -(10**8)
-"""Entry of a row for an angle that does not exist."""
-
-QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0
-"""Seconds that playing takes at the quickest, at first, and at the slowest."""
+COARSE = 12  # rows in a turn below which a line from row to row is no picture of the path, and dots are drawn
+STEEP = 25.0  # turns of the nutation from which lines are thin
+SPHERE = 10_000  # length of a unit vector of the globe as whole numbers: 0.006 deg
+ANGLE_DIGITS = 4  # decimals of degrees; more where the largest nutation has not so many figures
+FAR = 4.0  # largest distance of a target from H(0) in the panel of the axis track, as a multiple of the track
+NONE = -(10**8)  # entry of a row for an angle that does not exist
+QUICK, UNHURRIED, SLOW = 4.0, 15.0, 120.0  # seconds that playing takes at the quickest, at first, and at the slowest
 
 
 def moving_of(plan: Plan) -> Moving:
@@ -244,11 +231,8 @@ def _speeds(until: float) -> tuple[tuple[tuple[float, str], ...], float]:
     return tuple((pace, "real time" if pace == 1.0 else f"× {pace:g}") for pace in speeds), first
 
 
-EDGE = 0.03
-"""Part of a scale at either end without a number: it would touch those of the other scale."""
-
-LEAD = 0.012
-"""Part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor."""
+EDGE = 0.03  # part of a scale at either end without a number: it would touch those of the other scale
+LEAD = 0.012  # part of the axis of time before t = 0: motion at t = 0 is seen beside the cursor
 
 PREFIXES, SHORT = (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9)), 0.05
 """Prefixes of units with their factors, and the largest number of a scale that needs another one."""
@@ -329,8 +313,7 @@ def strip_of(flown: Flight, track: Track, until: float) -> tuple[Strip, list[flo
     return strip, [low, high]
 
 
-Room = tuple[Vector, float]
-"""Middle (2,) and half the side of a square panel."""
+Room = tuple[Vector, float]  # middle (2,) and half the side of a square panel
 
 
 def absence(body: Spacecraft, schedule: Schedule) -> str:

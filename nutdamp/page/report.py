@@ -76,8 +76,7 @@ if TYPE_CHECKING:
     from nutdamp.montecarlo.study import Results
 
 
-ENDINGS = (".html", ".htm")
-"""Endings of the files that a page is written to."""
+ENDINGS = (".html", ".htm")  # endings of the files that a page is written to
 
 
 def expect_html(path: str) -> None:
@@ -460,8 +459,7 @@ def _picture(name: str, figure: Figure, narrow: Figure | None = None) -> Picture
     return Picture(image.untitled_svg(figure), title, *PICTURES[name], phone)
 
 
-EQUATIONS = ("1", "17", "18", "19")
-"""Equations of Magnus that every plan and flight rest on, as the guide numbers them."""
+EQUATIONS = ("1", "17", "18", "19")  # equations of Magnus that every plan and flight rest on, as the guide numbers them
 
 
 def _method(compared: Comparison) -> Iterator[Block]:

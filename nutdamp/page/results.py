@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.robust import RobustComparison
 
 
-_TABLED = ("csv", "table", "figure")
-"""Subjects of results with rows."""
+_TABLED = ("csv", "table", "figure")  # subjects of results with rows
 
 VIEWS = {
     "object.save": "page.results:save",

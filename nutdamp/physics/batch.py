@@ -16,17 +16,15 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from nutdamp.common.numerics import cos_sin
 from nutdamp.errors import Infeasible
 from nutdamp.physics import attitude, energy_sink, taylor
 from nutdamp.physics.taylor import AT_REST, LONGEST, NOTHING, Forcing
 
 Array = NDArray[np.float64]
 
-LARGEST_ORDER = 30
-"""Largest order of a series; a step that has not converged by then is repeated in shorter steps."""
-
-REMAINDER = 1e-15
-"""Size of the last terms kept, relative to the scale of rates and quaternion."""
+LARGEST_ORDER = 30  # largest order of a series; a step that has not converged by then is repeated in shorter steps
+REMAINDER = 1e-15  # size of the last terms kept, relative to the scale of rates and quaternion
 
 
 class Series:
@@ -158,11 +156,8 @@ class _DampingSeries:
         return np.stack([-by_second[2], by_first[2], by_second[0] - by_first[1]])
 
 
-BLOCK = 2048
-"""Cases flown together: enough to hide the cost of calls, few enough that their series stay in the cache."""
-
-STRIDE = 2.5
-"""Largest step, rad; the work per radian is least there."""
+BLOCK = 2048  # cases flown together: enough to hide the cost of calls, few enough that their series stay in the cache
+STRIDE = 2.5  # largest step, rad; the work per radian is least there
 
 FEW = 256
 """Cases up to which many steps of symmetric bodies are summed at once: beyond, the sums cost more than the calls."""
@@ -452,16 +447,6 @@ def _pushed(here: MotionStretch) -> tuple[Array, Array | None]:
     bodies, torque, slope = here.bodies, here.torque, here.slope
     acceleration = (bodies.constant[:, None] + (0.0 if torque is None else torque)) / bodies.moments
     return acceleration, None if slope is None or not slope.any() else slope / bodies.moments
-
-
-def cos_sin(angle: Any) -> tuple[Any, Any]:
-    """Cosine and sine (of real or complex arrays or numbers) by the tangent of the half-angle.
-
-    As exact as numpy's and several times as fast.
-    """
-    half = np.tan(0.5 * angle)
-    scale = 1.0 / (1.0 + half * half)
-    return 2.0 * scale - 1.0, 2.0 * half * scale
 
 
 def _arc(moments: Array, forcing: Forcing, rates: Array, quaternion: Array, duration: Array) -> None:

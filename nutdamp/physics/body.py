@@ -155,8 +155,7 @@ def phase_to_oppose(omega: complex, torque: complex) -> float:
     return cmath.phase(-omega * torque.conjugate())
 
 
-DEGENERATE = 1e-9
-"""Relative difference up to which principal moments count as equal: a sphere, or a plane of free axes."""
+DEGENERATE = 1e-9  # relative difference up to which principal moments count as equal: a sphere, or a plane of free axes
 
 Moments = tuple[float, float, float]
 

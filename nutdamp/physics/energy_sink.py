@@ -39,14 +39,9 @@ from nutdamp.physics import attitude
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-FOR_EVER = 300.0
-"""Time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding."""
-
-TINY = 1e-200
-"""Offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere."""
-
-SMALLEST = 1e-150
-"""Least cosine of a nutation angle that is distinguished from zero: its square is still a number."""
+FOR_EVER = 300.0  # time constants after which the sink has finished: θ is then 0 or 90° to far beyond rounding
+TINY = 1e-200  # offset that keeps quotients like asinh x / x defined at zero and changes nothing elsewhere
+SMALLEST = 1e-150  # least cosine of a nutation angle that is distinguished from zero: its square is still a number
 
 
 class SinkEffect(NamedTuple):

@@ -21,20 +21,14 @@ from nutdamp.physics import energy_sink
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-SERIES_REACH = 2.0
-"""Largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel."""
-
-MANY_PANELS = 12
-"""Panels from which on all are summed at once."""
-
-SERIES_ORDERS = 60
-"""Orders of that power series: it has converged long before."""
+SERIES_REACH = 2.0  # largest half-phase in rad that one power series of `width_factor` spans; beyond it digits cancel
+MANY_PANELS = 12  # panels from which on all are summed at once
+SERIES_ORDERS = 60  # orders of that power series: it has converged long before
 
 OUTWARDS = 2000
 """Largest number of steps outwards by a tenth in the search for an on-time: more decades than numbers have."""
 
-MOST_PANELS = 20_000
-"""Panels beyond which a pulse keeps less than 1e-4 of its impulse; it counts as keeping none."""
+MOST_PANELS = 20_000  # panels beyond which a pulse keeps less than 1e-4 of its impulse; it counts as keeping none
 
 
 def impulse_sum(
@@ -146,8 +140,7 @@ def on_time_for(impulse: float, torque: float, rate: float, slope: float, longes
     return None
 
 
-PANEL = 2.0
-"""Phase in rad of one Gauss-Legendre panel; ten nodes then err by less than a rounding."""
+PANEL = 2.0  # phase in rad of one Gauss-Legendre panel; ten nodes then err by less than a rounding
 
 
 def phase_integral(slope: Array, bend: Array, length: Array) -> ComplexArray:

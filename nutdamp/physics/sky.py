@@ -20,11 +20,8 @@ from numpy.typing import NDArray
 
 from nutdamp.physics.batch import MotionStretch, pieces
 
-OBLIQUITY = math.radians(23.43928)
-"""Obliquity of the ecliptic at J2000.0."""
-
-ABERRATION = 20.4898 / 3600.0
-"""Mean aberration of the Sun, deg (Meeus, 25.10)."""
+OBLIQUITY = math.radians(23.43928)  # obliquity of the ecliptic at J2000.0
+ABERRATION = 20.4898 / 3600.0  # mean aberration of the Sun, deg (Meeus, 25.10)
 
 TILTING, NODE = math.radians(0.013056), math.radians(174.876)
 """Tilt of the ecliptic per century, and the longitude of its axis."""
@@ -56,8 +53,7 @@ def direction(days: float) -> NDArray[np.float64]:
 
 Array = NDArray[np.float64]
 
-ROWS = 24
-"""Steps per turn of the axis, where it is followed in steps."""
+ROWS = 24  # steps per turn of the axis, where it is followed in steps
 
 CIRCLE = 2.0 * math.pi
 
@@ -255,14 +251,9 @@ def _angles(first: Array, second: Array) -> Array:
     return np.asarray(np.arctan2(np.sqrt(np.sum(across * across, axis=0)), np.sum(first * second, axis=0)))
 
 
-ITERATIONS = 40
-"""Largest number of Newton steps to a Sun pulse; three or four are usual."""
-
-EXACT = 1e-13
-"""Tolerance of the time of a Sun pulse, in spin turns."""
-
-AHEAD = 8
-"""Largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next."""
+ITERATIONS = 40  # largest number of Newton steps to a Sun pulse; three or four are usual
+EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
+AHEAD = 8  # largest number of Sun pulses skipped between two computed ones; the mean rate predicts the next
 
 
 class TorqueRamp(NamedTuple):

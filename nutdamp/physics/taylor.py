@@ -29,20 +29,11 @@ from nutdamp.physics import attitude
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-DRIVEN_ORDER = 22
-"""Largest order of the series of symmetric bodies; a step that needs more is halved."""
-
-STRIDE = 1.7
-"""Largest step, rad of the fastest rotation: 1.7^22/22! is rounding."""
-
-REMAINDER = 2.0**-53
-"""Size of the last two terms kept, relative to the scale of rates and quaternion."""
-
-TOGETHER = 1024
-"""Steps times cases summed together: few enough that their series stay in the cache."""
-
-HALVINGS = 12
-"""Largest number of halvings of the steps where the series does not converge."""
+DRIVEN_ORDER = 22  # largest order of the series of symmetric bodies; a step that needs more is halved
+STRIDE = 1.7  # largest step, rad of the fastest rotation: 1.7^22/22! is rounding
+REMAINDER = 2.0**-53  # size of the last two terms kept, relative to the scale of rates and quaternion
+TOGETHER = 1024  # steps times cases summed together: few enough that their series stay in the cache
+HALVINGS = 12  # largest number of halvings of the steps where the series does not converge
 
 
 class NotConverged(ArithmeticError):
@@ -240,20 +231,11 @@ def whole(turns: ComplexArray) -> ComplexArray:
     return turns[:, 0]
 
 
-ORDER = 22
-"""Order of the series; near -ln(eps)/2 the work per radian is least for rounding accuracy."""
-
-AT_REST = 1e-9
-"""Share of the largest |H| of a motion below which H counts as at rest for energy dissipation."""
-
-LONGEST = 3e5
-"""Largest angle of one integration, rad: some two hundred thousand steps."""
-
-SHORT = 8.0
-"""Angle up to which sequential steps are quicker than all at once, rad."""
-
-MOST_STEPS = 400_000
-"""Largest number of steps of one integration: enough for `LONGEST` whatever the rates on the way."""
+ORDER = 22  # order of the series; near -ln(eps)/2 the work per radian is least for rounding accuracy
+AT_REST = 1e-9  # share of the largest |H| of a motion below which H counts as at rest for energy dissipation
+LONGEST = 3e5  # largest angle of one integration, rad: some two hundred thousand steps
+SHORT = 8.0  # angle up to which sequential steps are quicker than all at once, rad
+MOST_STEPS = 400_000  # largest number of steps of one integration: enough for `LONGEST` whatever the rates on the way
 
 
 class Falling(NamedTuple):

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from nutdamp.common.numerics import gauss_legendre
 
-SMALL = 1e-9
-"""Relative pressure step for the slope of a table."""
+SMALL = 1e-9  # relative pressure step for the slope of a table
 
 
 def possible(tank: Tank) -> Any:
@@ -48,8 +47,7 @@ class Cold:
         return np.exp(-before / self.pulses) if np.ndim(self.pulses) else math.exp(-before / self.pulses)
 
 
-PIECES = 16
-"""Parts of a pulse, each with the specific impulse of its middle."""
+PIECES = 16  # parts of a pulse, each with the specific impulse of its middle
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +141,7 @@ class Tank:
 
 Array = NDArray[np.float64]
 
-NODES = 16
-"""Nodes of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding."""
+NODES = 16  # nodes of Gauss-Legendre quadrature in a stretch of at most `REACH` rad: it errs by less than a rounding
 
 REACH = 2.0
 
@@ -370,8 +367,7 @@ class Measured:
         return max(leads), max(lags)
 
 
-Valve = Trapezoid | Measured
-"""Map from commands to thrust. Times of commands are on-times as they are loaded."""
+Valve = Trapezoid | Measured  # map from commands to thrust. Times of commands are on-times as they are loaded.
 
 
 def shape_factor(

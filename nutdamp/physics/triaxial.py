@@ -32,11 +32,8 @@ Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-140
 """Fraction of the largest rate below which a rate counts as zero, as does a sine: its square would underflow."""
 
-MEANS = 40
-"""Largest number of steps to an arithmetic-geometric mean; from the smallest number it takes twelve."""
-
-MODES_REACH = 40.0
-"""Exponent to which Fourier coefficients are kept: exp(-40) is less than a rounding."""
+MEANS = 40  # largest number of steps to an arithmetic-geometric mean; from the smallest number it takes twelve
+MODES_REACH = 40.0  # exponent to which Fourier coefficients are kept: exp(-40) is less than a rounding
 
 
 def free_rates(moments: ArrayLike, rates0: ArrayLike, times: ArrayLike) -> Array:

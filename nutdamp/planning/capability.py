@@ -29,8 +29,7 @@ RESONANT = 3.0  # beat period over horizon from which a disturbance counts as re
 SHORTEST, GRID = 1e-6, 600
 """Part of the longest on-time from which on, and number of on-times among which, the largest step is searched."""
 
-DIGITS = 9
-"""Digits of misses in rad that are no rounding: among equals the pair that is named first."""
+DIGITS = 9  # digits of misses in rad that are no rounding: among equals the pair that is named first
 
 
 class ChannelSteps(NamedTuple):

@@ -43,14 +43,12 @@ ROUNDING = 1e-9  # of a number of cases
 MOST_TOLERANCES, ALLOCATION_HALVINGS = 4, 6
 """Tolerances that may have to shrink together, and halvings of the sizes between too few complying cases and enough."""
 
-CASES, MOST_CASES = 8_192, 100_000
-"""Drawn cases in which each allocation is tried, and the most of one check."""
+CASES, MOST_CASES = 8_192, 100_000  # drawn cases in which each allocation is tried, and the most of one check
 
 FRESH = 20_011
 """Seed of the first draws in which what was found is checked, which nothing was chosen by; each check has its own."""
 
-CHECKS, SMALLER = 12, 0.96
-"""Checks at most, and by what the tolerances shrink after one that fails."""
+CHECKS, SMALLER = 12, 0.96  # checks at most, and by what the tolerances shrink after one that fails
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +150,7 @@ def _scaled(value: Any, factor: float) -> Any:
     return None if value is None else tuple(_scaled(item, factor) for item in value)
 
 
-STEP = 1e-30
-"""Imaginary step of derivatives."""
+STEP = 1e-30  # imaginary step of derivatives
 
 MARGINS, LESSER = (1.0, 1.3, 0.75, 0.5), (1.0, 0.8, 0.6)
 """Over the sigmas of the probability required: margins that are tried first, until enough cases comply; and multiples
@@ -162,14 +159,9 @@ of the largest feasible margin, where that is not enough."""
 CLOSE = 0.983, 0.998
 """Severities of the last case that must comply with a margin that is no larger than need be, nor by luck."""
 
-KEPT, HALVINGS = 1e-2, 6
-"""Tolerance of a limit in that search, and its number of steps."""
-
-TRIED, TRYING = 4_096, 101
-"""Cases in which a plan is tried while its margin is adapted, and their seed."""
-
-ROUNDS, REPAIRS = 4, 24
-"""Times that the margin is adapted, and that a burn which breaks a limit is moved elsewhere."""
+KEPT, HALVINGS = 1e-2, 6  # tolerance of a limit in that search, and its number of steps
+TRIED, TRYING = 4_096, 101  # cases in which a plan is tried while its margin is adapted, and their seed
+ROUNDS, REPAIRS = 4, 24  # times that the margin is adapted, and that a burn which breaks a limit is moved elsewhere
 
 TRIES, AIMED, NEAREST, FACTOR, STEEP = 4, 0.99, 0.1, 0.8, 0.15
 """Margins tried once enough cases comply with one; the level aimed at; how near the next one comes to those before, of

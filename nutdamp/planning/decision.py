@@ -395,8 +395,7 @@ class Simulation(results.Data, results.Tabled):
         return self._both[self.real].sampled(min(self.samples, PICTURED), self.drawn_to)
 
 
-TELLING = math.radians(1e-6)
-"""Remaining nutation angle in rad from which there is a note on it."""
+TELLING = math.radians(1e-6)  # remaining nutation angle in rad from which there is a note on it
 
 CUT = "the search ended at its limit of work"
 

@@ -46,8 +46,7 @@ BENDS = tuple(sign * math.radians(0.1 * 1.1**step) for step in range(72) for sig
 PLACES, PARTS = ((), (0.5,), (0.25, 0.75)), (1, 2, 4)
 """Way points without, of one and of two dog-legs, as shares of the way to the target; numbers of parts of each leg."""
 
-ROUTES, STEPS = 16, 64
-"""Routes that are tried, at most, and points of a leg at which the cones are looked at."""
+ROUTES, STEPS = 16, 64  # routes that are tried, at most, and points of a leg at which the cones are looked at
 
 Route = tuple[Vector, ...]
 

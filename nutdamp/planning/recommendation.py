@@ -10,9 +10,12 @@ from enum import Enum
 from nutdamp.planning.plan import Plan, Share, Standing
 from nutdamp.spacecraft.requirements import DAMPED_ANGLE, NEGLIGIBLE, SAME_COST, Part, missed, required
 
-STEADIER_COST = 1.1  # largest cost ratio at which that is worth a note
-FEWER_COST = 1.05  # largest cost ratio at which that is worth a note
-SOONER_COST = 1.05  # largest cost ratio at which that is worth a note
+STEADIER_SHIFT = 0.2  # share of the recommended plan's momentum shift below which another plan keeps H much better
+FEWER_PULSES = 0.5  # share of its pulses up to which another plan is much simpler
+SOONER_END = 0.5  # share of its end up to which another one, a nutation period earlier at least, is much sooner
+STEADIER_COST = 1.1  # largest cost ratio at which a smaller momentum shift is worth a note
+FEWER_COST = 1.05  # largest cost ratio at which fewer pulses are
+SOONER_COST = 1.05  # largest cost ratio at which an earlier end is
 REAL_COST = 1.1  # largest cost ratio of a plan with real widths beside one of ideal impulses that is worth a note
 
 SAME_ANGLE, SAME_SPEED = 1e-9, 1e-5
@@ -142,8 +145,11 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
     For little more; one of command blocks for whatever it costs, since the spacecraft may fire nothing else.
     """
     unit, body = _unit(plans), best.spacecraft
-    turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else 0.2 * _off(best)
-    few, soon = 0.5 * len(best.pulses), min(0.5 * best.pulses.end, best.pulses.end - body.inertial_period)
+    turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else STEADIER_SHIFT * _off(best)
+    few, soon = (
+        FEWER_PULSES * len(best.pulses),
+        min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period),
+    )
     gains_of: dict[Gain, Plan] = {}
     # With the largest cost ratio at which each is worth a note.
     for gain, ratio, gains in (

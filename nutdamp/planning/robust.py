@@ -39,11 +39,8 @@ from nutdamp.spacecraft.model import Spacecraft, required_share
 LATER = (0.25, 0.5, 0.75, 1.0, 2.0)
 WITHIN = (1.5, 2.0)  # ends by which the scheme optimal is to be done with least cost, over the earliest one
 
-ROBUST = "robust"
-"""Name of the robust plan beside those of schemes."""
-
-CHECKED = 6
-"""Plans with which just enough cases seem to comply that are tried in such cases, one after the other."""
+ROBUST = "robust"  # name of the robust plan beside those of schemes
+CHECKED = 6  # plans with which just enough cases seem to comply that are tried in such cases, one after the other
 
 
 class Cost(NamedTuple):

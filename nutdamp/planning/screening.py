@@ -36,8 +36,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import SAME_COST, Left, Part
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-STAGES = (2_048, 8_192)
-"""Numbers of cases after which plans are screened."""
+STAGES = (2_048, 8_192)  # numbers of cases after which plans are screened
 
 CERTAIN, LIKELIER = 1.0 - 1e-6, 0.01
 """Confidence of the intervals by which plans are left out; least possible gain in the complying share for a plan to be
@@ -307,8 +306,7 @@ def _as_near(candidates: list[PlanCandidate], samples: int, probability: float) 
     return [candidate for candidate in candidates if largest_share(candidate) >= probability]
 
 
-FRESH = 211
-"""Seed of cases that nothing was chosen by."""
+FRESH = 211  # seed of cases that nothing was chosen by
 
 SHORTEST, HALVINGS, FINER, FEW = 0.8, 7, 5, 8
 """Least share of on-times when they are shortened; steps in which all are shortened together, and then each alone once

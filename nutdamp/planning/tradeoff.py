@@ -35,11 +35,8 @@ from nutdamp.spacecraft.schedule import Bounds
 
 SAME = 1e-9  # relative difference up to which a bound is that of the plan
 
-ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")
-"""Subjects of the equations."""
-
-LOOKS, MOST_LOOKS = 32, 6_000
-"""Moments of the primer curve in a turn of the faster of its two parts, and of all of it."""
+ROWS = ("nutation_1", "nutation_2", "shift_1", "shift_2", "spin")  # subjects of the equations
+LOOKS, MOST_LOOKS = 32, 6_000  # moments of the primer curve in a turn of the faster of its two parts, and of all of it
 
 
 @dataclass(frozen=True, eq=False)

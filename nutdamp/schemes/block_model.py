@@ -36,11 +36,8 @@ SAMPLES = 32  # samples of the Sun's azimuth in each spin turn, between which a 
 ITERATIONS = 60  # steps by which the moment of a Sun pulse is found in a flight, at most; three or four are usual
 EXACT = 1e-13  # tolerance of the time of a Sun pulse, in spin turns
 
-BLIND = 32
-"""Spin turns in a row without a Sun pulse, after which none is waited for."""
-
-NEVER = np.iinfo(np.int64).max
-"""Number of a Sun pulse that is not waited for."""
+BLIND = 32  # spin turns in a row without a Sun pulse, after which none is waited for
+NEVER = np.iinfo(np.int64).max  # number of a Sun pulse that is not waited for
 
 FIRED, INTEGRATED = 1.0, 40.0
 """Units of `work` of a pulse that is fired, and of the motion of all flights to the next where it is integrated."""

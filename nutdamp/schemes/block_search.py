@@ -35,7 +35,6 @@ from nutdamp.spacecraft.schedule import Schedule
 GENTLE = 10  # multiple of `FLOWN`: sequences among which those with the smallest pulses are flown too
 # blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
 ALL_BLOCKS = 400
-# blocks after one wait up to which all are looked at, and the cheapest of them behind which others are
 ALL_FIRSTS = 300
 AROUND = (0, 1)  # steps of the delay that are looked at, from the one below the best delay
 MOST_WIDTHS = 24  # widths that are looked at for a second and a third block, where more can be commanded
@@ -50,37 +49,28 @@ TOGETHER = 32  # sequences behind which others are looked for at once
 
 Array = NDArray[np.float64]
 
-WAITS = 24
-"""Sun pulses that may pass before a block, so that its nutation meets the one before."""
-
-WINDOWS = 8
-"""Blackout windows after which a block is begun, or before which one ends, at most: the first ones."""
+WAITS = 24  # Sun pulses that may pass before a block, so that its nutation meets the one before
+WINDOWS = 8  # blackout windows after which a block is begun, or before which one ends, at most: the first ones
 
 FIRST = 24
 """First blocks behind which others are looked for: so many of the best, of small ones, and of parts of the way."""
 
-BLOCKS = 3
-"""Blocks of a schedule, at most."""
+BLOCKS = 3  # blocks of a schedule, at most
 
 DOUBTFUL, DOUBTS = 1.5, 100
 """Share of a bound up to which the closed form may err, and sequences flown since that would make them good."""
 
-ALIKE = 4
-"""Sequences that may come with the same blocks, over those that are wanted."""
+ALIKE = 4  # sequences that may come with the same blocks, over those that are wanted
 
 CLOSEST, FEW = 24, 4
 """Widths and numbers of later blocks that are looked at, by each of their merits, and pulses that count as few."""
 
-LOOKED = 2e-6
-"""Units of `work` of a block that is looked at."""
+LOOKED = 2e-6  # units of `work` of a block that is looked at
 
 Blocks = tuple[Block, ...]
 
-FLOWN = 12
-"""Sequences of blocks that are flown; as many more where none of them complies."""
-
-DEARER = 1.01
-"""Multiple of the cost of a sequence that complied in a flight from which on none is flown."""
+FLOWN = 12  # sequences of blocks that are flown; as many more where none of them complies
+DEARER = 1.01  # multiple of the cost of a sequence that complied in a flight from which on none is flown
 
 
 class BlockSequence(NamedTuple):
@@ -103,8 +93,7 @@ class FlownSequence(NamedTuple):
     sequence: BlockSequence
 
 
-START = BlockSequence((), (math.inf, math.inf, math.inf))
-"""No blocks, before which all others come."""
+START = BlockSequence((), (math.inf, math.inf, math.inf))  # no blocks, before which all others come
 
 
 class BlockFlights:

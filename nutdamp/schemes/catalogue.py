@@ -14,8 +14,7 @@ from typing import Any, ClassVar, Self, TypeVar
 from nutdamp.errors import BadRequest, SenselessOption, nearest
 from nutdamp.units import as_given, is_count, is_number
 
-LEAST = ("propellant", "impulse", "time", "pulses")
-"""Quantities that the scheme optimal can minimise."""
+LEAST = ("propellant", "impulse", "time", "pulses")  # quantities that the scheme optimal can minimise
 
 
 @dataclass(frozen=True)
@@ -101,8 +100,7 @@ class TwoPulseOptions(SchemeOptions):
         return self.literal
 
 
-DEFAULT_SHARE = 0.125
-"""Default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width."""
+DEFAULT_SHARE = 0.125  # default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,8 +291,7 @@ COMMAND_BLOCK = Scheme(
     slow=True,
     by_turns=True,
 )
-NONE = Scheme("none", fires=False)
-"""Free motion, for comparison."""
+NONE = Scheme("none", fires=False)  # free motion, for comparison
 
 SCHEMES = {
     scheme.name: scheme
@@ -303,8 +300,7 @@ SCHEMES = {
 NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
-COMPARED = (*CLASSIC, OPTIMAL.name)
-"""Default schemes without a target."""
+COMPARED = (*CLASSIC, OPTIMAL.name)  # default schemes without a target
 POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
 """In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)

@@ -167,14 +167,12 @@ def _searched(spacecraft: Spacecraft, most: int | None) -> FlownSequence:
     return chosen._replace(schedule=replace(chosen.schedule, notes=tuple(notes)))
 
 
-LEGS = 6
-"""Legs of a row of blocks, at most: spin and turn, and both mended twice."""
+LEGS = 6  # legs of a row of blocks, at most: spin and turn, and both mended twice
 
 MARGIN = 0.97
 """Share of a bound that the turn may use up before the spin is changed, and the inverse for what that may add."""
 
-Searched = Callable[[Spacecraft, int | None], Schedule]
-"""Blocks of one leg, of up to so many; raises Infeasible."""
+Searched = Callable[[Spacecraft, int | None], Schedule]  # blocks of one leg, of up to so many; raises Infeasible
 
 
 def spin_and_turn(spacecraft: Spacecraft, searched: Searched, most: int | None) -> FlownSequence:

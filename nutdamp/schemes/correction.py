@@ -42,15 +42,13 @@ LEFT_OVER_BY_TICKS = 0.5  # largest residual where the resolution of commands ma
 PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
 IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
 
-TAIL = 4
-"""Last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations."""
+TAIL = 4  # last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations
 
 MOVED, BEFORE, AFTER = 8, 12, 24
 """Pulses corrected at the end of a schedule of equal ones, each of which has one variable less; of given length so many
 before the equal ones, which damp the nutation, and at the end."""
 
-EXACT = 1e-11
-"""rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)."""
+EXACT = 1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
 
 
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
@@ -340,8 +338,7 @@ def bounded_step(jacobian: Vector, value: Vector, x: Vector, scale: Vector, lowe
     return step
 
 
-ROUNDING = 1e-12
-"""rad; where the spin axis is that near the target already, no pulses are needed."""
+ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no pulses are needed
 
 
 class FlownBuilder:

@@ -36,8 +36,7 @@ SAMPLES = 96  # moments looked at in each turn of the body
 LONGEST_SEARCH = 6000  # moments looked at for one pulse, at most
 PLACE = 1e-3  # units of `work` of each moment at which a channel is looked at for the first pulse of a row
 
-MOST_CONES = 60
-"""Cones tried at most where their number is not given."""
+MOST_CONES = 60  # cones tried at most where their number is not given
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:

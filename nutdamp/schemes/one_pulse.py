@@ -16,8 +16,7 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 TRAIN_SHARE = 0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
 
-LEFT_OVER = 0.01
-"""Share of A|ω0| from which a remainder counts against a channel."""
+LEFT_OVER = 0.01  # share of A|ω0| from which a remainder counts against a channel
 
 
 def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noqa: ARG001 - the signature of a scheme

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
 
 
-Choice = Options | SchemeOptions | None
-"""Options of one scheme, of several, or None for the defaults."""
+Choice = Options | SchemeOptions | None  # options of one scheme, of several, or None for the defaults
 
 
 def options_of(scheme: Scheme, chosen: Choice) -> SchemeOptions:

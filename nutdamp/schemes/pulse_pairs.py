@@ -47,14 +47,9 @@ PAIR = 5e-5  # units of `work` of each moment of each pair of channels
 ON_CONE = 1e-3  # share of its natural size below which the first jump counts as nothing
 BESIDE = 0.05  # distance beside the target, over the angles at hand, of a search that finds nothing on it
 
-SPIN_SAMPLES = 256
-"""Moments looked at in each turn of the spin axis, before the best is made exact."""
-
-COMPASS_STEPS = 2000
-"""Steps of that search, at most."""
-
-EQUAL = 1e-9
-"""Costs that differ by less, relatively, are equal: then the earlier end wins."""
+SPIN_SAMPLES = 256  # moments looked at in each turn of the spin axis, before the best is made exact
+COMPASS_STEPS = 2000  # steps of that search, at most
+EQUAL = 1e-9  # costs that differ by less, relatively, are equal: then the earlier end wins
 
 
 class SteerablePair:
@@ -240,8 +235,7 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
     return point
 
 
-DEAREST = 3.0
-"""Pairs that cost more than this times the floor are not looked at."""
+DEAREST = 3.0  # pairs that cost more than this times the floor are not looked at
 
 BODY_SAMPLES, BODY_TURNS = 96, 24
 """Moments looked at in each turn of the body, and turns within which the first pulse comes, at most."""

@@ -38,21 +38,18 @@ WIDEST_BEND = 1.3  # rad by which the heading of a train may differ from the cou
 SHORT = 60  # pulses up to which their size is corrected on the flown motion too: a longer train has little to spare
 OTHERS = 4  # other lengths of the pulses that are tried where the one requested does not do
 
-STEP = math.radians(2.0)
-"""Angle that one ideal impulse turns H by, at most."""
+STEP = math.radians(2.0)  # angle that one ideal impulse turns H by, at most
 
 CLOSED, OPEN = 0.3, 1.2
 """Sums of the phasors, in pulses: below they count as closed, as the rest is corrected; beyond that has no hope."""
 
 MOST_PULSES = 600
 
-LAST = 20
-"""Largest number of last pulses that are moved."""
+LAST = 20  # largest number of last pulses that are moved
 
 MOVED = (6, 12, LAST)  # numbers of last pulses that are moved, one after the other until nothing is left
 
-TRIES = 4
-"""Counts that are flown, at most."""
+TRIES = 4  # counts that are flown, at most
 
 
 class Attempt(NamedTuple):

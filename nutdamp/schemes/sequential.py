@@ -26,8 +26,7 @@ MISSED = 50  # alignments in a row that rounding to ticks or a disturbance may m
 # share of A|ω0| left to correction under dissipation: `response.width_factor` holds at small angles only
 CORRECTED = 1e-4
 
-ALIGNED = 1e-9
-"""Angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)."""
+ALIGNED = 1e-9  # angle in rad below which a standing ω counts as opposed to a torque (a sphere, where nothing turns)
 
 MOST_PULSES = 2000
 """Pulses that are laid one by one, at most: nobody commands more, and each takes its time to be planned and flown."""
@@ -227,8 +226,7 @@ class ImpulseBuilder:
         return steerable_pulse(steerable, centre, cmath.phase(-self.omega_at(centre)), **given)
 
 
-FADED = 1e-6
-"""Fraction of the nutation below which pulses have nothing to do: dissipation has removed it."""
+FADED = 1e-6  # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
 
 
 def no_channels(spacecraft: Spacecraft) -> str:

@@ -31,11 +31,8 @@ from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse
 # pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first
 DEAREST = 2.0
 
-MANY = 2000
-"""Closings of H looked at for each pair one by one."""
-
-SHORTLIST = 6
-"""Candidates that are flown and corrected, at most."""
+MANY = 2000  # closings of H looked at for each pair one by one
+SHORTLIST = 6  # candidates that are flown and corrected, at most
 
 
 def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:

@@ -33,8 +33,8 @@ from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse
 ROUNDING = 1e-12  # share by which an on-time may pass its bounds
 # share of the longest pulse that the next plan leaves at either end of all, where there was too little room
 ROOM = 0.02
-NEARLY = 1.1  # times what the plan leaves on the plain body, and rad, that commands may leave without another plan
-EXACT = 1e-10  # times what the plan leaves on the plain body, and rad, that commands may leave without another plan
+NEARLY = 1.1  # times what the plan leaves on the plain body, that commands may leave without another plan
+EXACT = 1e-10  # rad, the same
 PLANS = 6  # plans, at most, each with on-times that leave room for the weakest pulse of the one before
 
 EFFECTIVE = " (on-times and gaps here are those of the thrust, with room for the delays of the valves)"

@@ -22,8 +22,7 @@ from nutdamp.spacecraft.equipment import Channel, Commands
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import RESOLUTION, TOUCHING, Pulse, Schedule, channel_pulse, on_command, touching
 
-OFF_TICK = 1e-6
-"""Share of a tick by which starts and on-times may be off their ticks: the rounding of files."""
+OFF_TICK = 1e-6  # share of a tick by which starts and on-times may be off their ticks: the rounding of files
 
 
 class Windows:
@@ -211,8 +210,7 @@ def longest_useful(max_on_time: float, period: float) -> float:
     return min(max_on_time, 0.5 * period)
 
 
-PAIRED = 24
-"""Directions about which channels are looked at in pairs."""
+PAIRED = 24  # directions about which channels are looked at in pairs
 
 
 def for_pairs(spacecraft: Spacecraft) -> list[Channel]:

@@ -184,8 +184,7 @@ class Thruster:
         return self.thrust / (self.isp * STANDARD_GRAVITY)
 
 
-CANCELLED = 1e-12
-"""Share of the largest torque of its thrusters below which that of a channel is rounding."""
+CANCELLED = 1e-12  # share of the largest torque of its thrusters below which that of a channel is rounding
 
 
 @dataclass(frozen=True, slots=True)

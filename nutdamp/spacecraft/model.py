@@ -36,8 +36,7 @@ from nutdamp.spacecraft.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
 
-SLACK = 1e-9
-"""rad by which a bound of `Keep` may be passed: rounding."""
+SLACK = 1e-9  # rad by which a bound of `Keep` may be passed: rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +51,7 @@ class Requirement:
     probability: float | None = None
 
 
-PROBABILITY = 0.997
-"""Share of cases that must comply where the requirement gives none."""
+PROBABILITY = 0.997  # share of cases that must comply where the requirement gives none
 
 
 def required_share(requirement: Requirement | None) -> float:
@@ -113,8 +111,7 @@ class Keep:
 
 
 VALVES, COLD, BLOWDOWN, LIGHTER = "valves", "cold pulses", "blowdown", "falling moments"
-TRAVEL = "moving center of mass"
-"""Values of `Spacecraft.thrust_laws`."""
+TRAVEL = "moving center of mass"  # values of `Spacecraft.thrust_laws`
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,17 +19,10 @@ from nutdamp.spacecraft.model import Spacecraft
 DAMPED_SHARE = 0.01
 """Fraction of the initial nutation (of the turn to a target axis) below which it counts as damped (reached)."""
 
-DAMPED_ANGLE = math.radians(1e-3)
-"""rad that may be left in any case."""
-
-SAME_COST = 1e-3
-"""Costs that differ by less, relatively, are equal: then other things decide."""
-
-NEGLIGIBLE = math.radians(1e-9)
-"""rad below which angles are rounding, and shown as nothing."""
-
-SPIN_TOLERANCE = 1e-3
-"""Relative tolerance of the spin at the end against the goal."""
+DAMPED_ANGLE = math.radians(1e-3)  # rad that may be left in any case
+SAME_COST = 1e-3  # costs that differ by less, relatively, are equal: then other things decide
+NEGLIGIBLE = math.radians(1e-9)  # rad below which angles are rounding, and shown as nothing
+SPIN_TOLERANCE = 1e-3  # relative tolerance of the spin at the end against the goal
 
 
 class Part(Enum):

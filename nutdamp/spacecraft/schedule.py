@@ -17,12 +17,10 @@ if TYPE_CHECKING:
     from nutdamp.physics.thruster import Ramp
 
 
-STEERABLE = "steerable"
-"""Channel name of the pulses of a steerable torquer."""
+STEERABLE = "steerable"  # channel name of the pulses of a steerable torquer
 
 
-RESOLUTION = 1e-4
-"""Part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more."""
+RESOLUTION = 1e-4  # part of its on-time to which a pulse must be resolved at its time: its impulse then errs by no more
 
 TOUCHING = 1e-9
 """s; pulses that overlap by less only touch, as do those that overlap by less than times can be distinguished."""

@@ -189,14 +189,12 @@ def by_other_schemes(spacecraft: Spacecraft, *, shift: bool) -> Iterator[Schedul
         yield from (schedule for schedule in every if keeps_limits(spacecraft, schedule))
 
 
-SLOTS, MOST_SLOTS = 40, 320
-"""Slots in the faster of the two turns, at ω3 and at aω3, and in all."""
+SLOTS, MOST_SLOTS = 40, 320  # slots in the faster of the two turns, at ω3 and at aω3, and in all
 
 NEWTON_STEPS, CONVERGED = 25, 1e-12
 """Newton steps for the lengths of the burns, and the end error, over |H|, at which they end."""
 
-SHORTEST = 0.02
-"""Share of a slot below which a burn is left out before the lengths are found."""
+SHORTEST = 0.02  # share of a slot below which a burn is left out before the lengths are found
 
 HALVINGS, LONGER = 10, (0.0, 0.01, 0.03, 0.08, 0.2, 0.4, 0.8)
 """Steps in which the earliest end by small angles is found, and shares added to it that are tried in turn."""

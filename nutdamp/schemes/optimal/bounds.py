@@ -148,8 +148,7 @@ def _positive_mean(before: Vector, after: Vector) -> Vector:
     return np.asarray(np.where(most <= 0.0, 0.0, np.where(least >= 0.0, 0.5 * (most + least), crossing)))
 
 
-LOOKS, NARROWINGS = 33, 9
-"""Directions looked at at once, and narrowings of the search to a sixteenth: to 1e-11 rad."""
+LOOKS, NARROWINGS = 33, 9  # directions looked at at once, and narrowings of the search to a sixteenth: to 1e-11 rad
 
 
 class Allowed(NamedTuple):

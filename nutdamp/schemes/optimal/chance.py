@@ -26,8 +26,7 @@ SOME = 1e-9  # share of what is needed below which an on-time is rounding
 
 Complex = NDArray[np.complex128]
 
-TURNS = 100_000
-"""More than there are turns in a horizon: pulses are numbered by channel and turn."""
+TURNS = 100_000  # more than there are turns in a horizon: pulses are numbered by channel and turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +87,7 @@ DIRECTIONS, BEGUN = 72, 16
 WORST, ROUNDS = 3, 40
 """Tangents added to a cone at a time, and rounds of the linear program, each with more tangents or columns."""
 
-BEST, PRICE = 200, 1e-6
-"""Columns taken in at a time, and the relative reduced cost below which none enters."""
+BEST, PRICE = 200, 1e-6  # columns taken in at a time, and the relative reduced cost below which none enters
 
 
 class Sure(NamedTuple):

@@ -28,14 +28,9 @@ LEAST_ROOM = 1e-10  # share of the room to a bound that a step must leave
 Indices = NDArray[np.int_]
 Complex = NDArray[np.complex128]
 
-SIDES = 32
-"""Sides of the polygon within which H may end off its target, where it may."""
-
-DIFFERENCE = 1e-6
-"""Step of the difference quotients, in scaled unknowns."""
-
-FLIGHT, CASE = 0.05, 0.0003
-"""Units of `work` of a stretch of a flight of many sequences, and of each of them."""
+SIDES = 32  # sides of the polygon within which H may end off its target, where it may
+DIFFERENCE = 1e-6  # step of the difference quotients, in scaled unknowns
+FLIGHT, CASE = 0.05, 0.0003  # units of `work` of a stretch of a flight of many sequences, and of each of them
 
 
 class Sequences(NamedTuple):
@@ -236,8 +231,7 @@ def _product(first: Complex, second: Complex) -> tuple[Complex, Complex]:
     return first[:, 0], second[:, 0]
 
 
-SHARES = np.array([0.5, 0.2, 0.05, 0.01])
-"""Shares of a step that are tried where the whole does not help."""
+SHARES = np.array([0.5, 0.2, 0.05, 0.01])  # shares of a step that are tried where the whole does not help
 
 BARRIER, SETTLED = 1e-9, 1e-7
 """Share of the cost at which the barrier of the bounds ends, and the largest relative error of the conditions for an

@@ -94,11 +94,8 @@ BEST, MANY = 250, 4
 """Columns taken in per round, the best priced first, and over one the share of all worth taking in that is taken in
 while they do not supply what is needed."""
 
-FIRST, ROUNDS = 400, 60
-"""Columns to begin with, and rounds in which more are taken in."""
-
-SIDES = 32
-"""Directions in which H may end off the target, where it may."""
+FIRST, ROUNDS = 400, 60  # columns to begin with, and rounds in which more are taken in
+SIDES = 32  # directions in which H may end off the target, where it may
 
 TINIEST, SOME = 1e-6, 1e-12
 """Coefficient below which an equation is not scaled up any more; share of what is needed below which an on-time is
@@ -413,8 +410,7 @@ WAYS: tuple[tuple[Literal["simplex", "ipm"], bool, float], ...] = (
 """Method, presolving, and factor of the costs, tried in turn: where the dual simplex loses its way at one scale of the
 costs, against which its tolerances count, it mostly does not at another; interior points do not know the trouble."""
 
-MOST_STEPS = 100_000
-"""Steps of the simplex or of the interior points, in one way of solving."""
+MOST_STEPS = 100_000  # steps of the simplex or of the interior points, in one way of solving
 
 SMALL, NONZERO = 10_000, 1e-2
 """Coefficients other than zero up to which a solution counts for nothing here, and units of `work` of each above it."""

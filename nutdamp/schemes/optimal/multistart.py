@@ -24,20 +24,14 @@ UNMET_COST = 100.0  # cost of a miss beside the propellant when the better part 
 NEAR = 1.03  # schedules of ideal impulses so much dearer than the best go on to the true motion
 HALF = 0.5  # share of the least on-time from which a pulse is lengthened to it; shorter ones are left out
 
-STARTS, BEST = 512, 8
-"""Random sequences to begin with, and schedules that go on to the next stage."""
-
-ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))
-"""Steps of descent, and share of the sequences that goes on after them."""
+STARTS, BEST = 512, 8  # random sequences to begin with, and schedules that go on to the next stage
+ROUNDS = ((12, 1 / 2), (12, 1 / 3), (40, 1.0))  # steps of descent, and share of the sequences that goes on after them
 
 SPARE, ADDITIONS = 2, 2
 """Pulses more than equations when some are added: what they make needless goes back to nothing; rounds of that."""
 
-MOMENTS, SMALL = 97, 1e-6
-"""Moments at which each channel is priced, by an impulse of that share of all there is to do."""
-
-GAIN = 1e-4
-"""Share of the cost that is worth another round, and by which two schedules differ."""
+MOMENTS, SMALL = 97, 1e-6  # moments at which each channel is priced, by an impulse of that share of all there is to do
+GAIN = 1e-4  # share of the cost that is worth another round, and by which two schedules differ
 
 FOUND, EXACT = 1e-6, 1e-10
 """Largest miss, over |H|, of a schedule of ideal impulses, and of one flown through real widths."""

@@ -28,11 +28,8 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import TOUCHING, Bounds, Schedule, channel_pulse
 
-UNMET = 1e-7
-"""Share of what there is to do that columns may fail to supply: the program's own tolerance."""
-
-REPAIRS = 60
-"""Rounds in which burns that break a limit are moved elsewhere."""
+UNMET = 1e-7  # share of what there is to do that columns may fail to supply: the program's own tolerance
+REPAIRS = 60  # rounds in which burns that break a limit are moved elsewhere
 
 THRIFT, GAIN = 0.004, 0.0005
 """Shares of the least cost that are given away for fewer pulses, where there are many and where few: so little is not
@@ -153,8 +150,7 @@ def as_pulses(spacecraft: Spacecraft, burns: tuple[Burn, ...]) -> Schedule:
     return Schedule(tuple(pulses))
 
 
-LEFT = math.radians(1e-6)
-"""Largest nutation and distance from the target, rad, and spin error, as a share, of a plan."""
+LEFT = math.radians(1e-6)  # largest nutation and distance from the target, rad, and spin error, as a share, of a plan
 
 SHARPEST, DEARER = 1e-3, 0.03
 """Relative accuracy of a least time by the program of small angles, and the share above its least cost from which

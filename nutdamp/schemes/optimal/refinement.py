@@ -193,8 +193,7 @@ REACH, TICK_STEPS, MODELS = 2.0, 300, 4
 """Ticks that a start or on-time may lie from what it was before; steps of one tick, two pulses at a time, by one linear
 model; and linear models, each about the best ticks so far."""
 
-WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-"""A step: of the start, of the on-time."""
+WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])  # a step: of the start, of the on-time
 
 
 CONVERGED, NEWTON_STEPS = 1e-13, 25

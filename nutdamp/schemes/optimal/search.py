@@ -44,8 +44,7 @@ which others are chosen."""
 FEW, SAVED = 2, 0.001
 """Pulses for each equation that are few, and share of the cost that so many must save over still fewer."""
 
-WAYS = 3
-"""Schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks."""
+WAYS = 3  # schedules of other schemes that are corrected to cost less, and exact ones that are put on ticks
 
 SHORT, STRONG = 4.0, 0.3
 """Inertial nutation periods up to which very many starts are tried, and within which a strong channel does all."""
@@ -53,8 +52,7 @@ SHORT, STRONG = 4.0, 0.3
 PROVED, EQUAL = 0.002, 1e-6
 """Shares above the rigorous bound below which very many starts, and schedules that keep H, are not tried."""
 
-HALVINGS = 3
-"""Shorter horizons that are looked at where there is a schedule already."""
+HALVINGS = 3  # shorter horizons that are looked at where there is a schedule already
 
 HASTE = 0.0008
 """Share by which the end of the horizon is dearer than its beginning, so that of equals early burns are taken."""
@@ -63,11 +61,8 @@ NEAR, NEARLY = 0.05, 0.05
 """End error, rad, below which a flight is refined; share of the tightest bound that a schedule may leave where none
 leaves nothing."""
 
-SHARP = 0.02
-"""Relative accuracy of a least time by schedules found."""
-
-MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-"""Shares added to the program's least time, tried in turn."""
+SHARP = 0.02  # relative accuracy of a least time by schedules found
+MARGINS = (0.002, 0.03, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # shares added to the program's least time, tried in turn
 
 TRIED, LATER = 6, 4.0
 """Margins tried to name a horizon that is long enough, and the longest one, over the default: looking takes long."""
