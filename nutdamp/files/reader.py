@@ -153,8 +153,7 @@ def _holds_names(annotation: Any) -> bool:
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
-POLE = 1e-9
-"""rad from a pole of the frame, up to which a spin axis has no ascending node."""
+POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:

@@ -46,14 +46,9 @@ BLOCKS_HEADER = (
     *("impulse_Nms", "nutation_after_deg"),
 )
 
-COUNTS = 1e-6
-"""Share of a step by which a time may be off the commands that there are: the rounding of files."""
-
-MOST_FIRED = 5_000
-"""Pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds."""
-
-LATEST = 100_000
-"""Number of the last Sun pulse that may fire a block."""
+COUNTS = 1e-6  # share of a step by which a time may be off the commands that there are: the rounding of files
+MOST_FIRED = 5_000  # pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
+LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
 
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
@@ -198,8 +193,7 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
             row.warn(f"{name}_counts", text)
 
 
-AGREES = 1e-6
-"""Relative difference up to which columns of a schedule agree."""
+AGREES = 1e-6  # relative difference up to which columns of a schedule agree
 
 STARTS = ("start_s", "t_s")
 

@@ -39,8 +39,7 @@ RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
 
-ALL = ""
-"""Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
+ALL = ""  # name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:

@@ -57,8 +57,7 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import shown
 
-AEM_VERSION = "CCSDS_AEM_VERS"
-"""Keyword of the first line."""
+AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
 
 COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}
 """Numbers in a record of each ATTITUDE_TYPE that is read, besides its time."""
@@ -220,13 +219,11 @@ LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-36
           TOWARDS[0]: (-360.0, 360.0), TOWARDS[1]: (-90.0, 90.0), ASPECTS: (0.0, 180.0)}  # fmt: skip
 """Least and largest angles of columns, deg."""
 
-UNIT_LENGTH = 0.01
-"""Deviation from length one that a measured axis or quaternion may have."""
+UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
 UNKNOWN = re.compile(r"omega|axis|accel|sun|rate|gyro|cross|q[_0-9]|(ra|dec)(_|$)", re.IGNORECASE)
 """Names of columns that are meant to be measured."""
 
-SAME = 0.03
-"""Part by which a ratio of rates may differ from that of two units."""
+SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
 def read_telemetry(

@@ -29,11 +29,8 @@ VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
 
 BODY_FRAME = "SC_BODY_1"
 
-LONGEST_LINE = 254
-"""ASCII characters that a line may have."""
-
-SIGNIFICANT = 16
-"""Most digits that a number may have."""
+LONGEST_LINE = 254  # ASCII characters that a line may have
+SIGNIFICANT = 16  # most digits that a number may have
 
 
 class Keyword(NamedTuple):
@@ -361,18 +358,14 @@ def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
 
 
-LARGEST = 1e15
-"""Larger magnitudes are nothing physical."""
-
-MOST_BYTES = 16 << 20
-"""Size of a message, many times more than its most manoeuvres take."""
+LARGEST = 1e15  # larger magnitudes are nothing physical
+MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeuvres take
 
 
 BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 """Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
 
-VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")
-"""First keywords of messages."""
+VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
 
 
 def kvn_text(path: str) -> str:
@@ -488,14 +481,9 @@ def unit_length(parts: list[float], tolerance: float) -> bool:
     return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
 
 
-UNIT = 1e-4
-"""Deviation from length one up to which a quaternion counts as rounded."""
-
-SAME_AXES = {"ICRF": "GCRF"}
-"""Frames whose axes are those of another that a spacecraft file knows."""
-
-BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
-"""Frames fixed in the body."""
+UNIT = 1e-4  # deviation from length one up to which a quaternion counts as rounded
+SAME_AXES = {"ICRF": "GCRF"}  # frames whose axes are those of another that a spacecraft file knows
+BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
 
 class Frames:
