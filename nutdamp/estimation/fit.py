@@ -236,16 +236,10 @@ STILL = 1e-3  # relative change of the noise from which on they are
 ADJUSTED = 3  # rounds in which the noise is corrected for what the fit takes of it
 POOR = 0.3  # share of a signal's own size that residuals may have before a fit begins again with a part of the record
 STARTS = 3  # starts that are searched from at most
-
-UNLIKELY = 4.0
-"""Standard deviations of the file by which a parameter may be off before the starts are searched in shorter steps."""
-
+UNLIKELY = 4.0  # sigmas of the file by which a parameter may be off before the starts are searched in shorter steps
 PARTS = (0.5, 0.25, 0.1, 0.04)  # parts of the record that it then begins with
 SEEN = 4.5  # standard deviations of |ω| from which on there is a nutation
-
-UNEQUAL = 5.0
-"""Standard deviations from which on the transverse moments count as different, or such a body as dissipating."""
-
+UNEQUAL = 5.0  # sigmas from which on the transverse moments count as different, or such a body as dissipating
 UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse moments
 
 
@@ -283,13 +277,13 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
             return _widened(fitted, Model(spacecraft, record), ("growth",))
         return _grown_a_little(fitted)
     three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
-    if not _shown(fitted, three, _begun(fitted, three), _places(three, UNEQUAL_BY)):
+    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
+    if not _shown(fitted, three, begin, of_moments):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
     unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
     if not fitted.grows or not _shows_growth(unequal):
         return _grown_a_little(unequal)
-    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 

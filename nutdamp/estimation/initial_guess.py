@@ -45,10 +45,7 @@ LONGEST_SPECTRUM = 1 << 16  # samples of a spectrum at most; of longer records t
 SMALL = 1e-3  # share of the spin that trial transverse rates have: the motion is linear there
 OTHER = 0.05  # part by which a spin by Sun pulses may differ from that of the file before both are tried
 MOST_TURNED = 2.1  # C/A at most, and a little more: 2 for a thin disc
-
-NARROW = 0.966
-"""Cosine of the nutation angle, 15 deg, from which on noise may decide in which plane a cone is, not its motion."""
-
+NARROW = 0.966  # cosine of a nutation angle, 15 deg, from which on noise may decide in which plane a cone is
 FLAT = 0.1  # cosine of the nutation angle from which on its rate is sought
 TURNS = 8  # starting values of the angle by which the body is turned about its axis
 TRIED = 60  # values of C/A tried at most where no spectrum shows the nutation

@@ -302,13 +302,8 @@ KIND = {kind.name: kind for kind in KINDS}  # measurement models by name
 
 
 RATIO = "C/A"  # name of the parameter that a coast fixes
-
-BIAS = math.radians(0.02)
-"""Standard deviation of the bias of a gyro, rad/s, where the file names none (dispersions.sensor_bias)."""
-
-TILT = math.radians(1.0)
-"""Standard deviation of each tilt of the gyros, and of the attitude sensors, from the principal axes, rad."""
-
+BIAS = math.radians(0.02)  # one sigma of the bias of a gyro, rad/s, where the file has no dispersions.sensor_bias
+TILT = math.radians(1.0)  # one sigma of each tilt of gyros and attitude sensors from the principal axes, rad
 THRUST = 0.5  # standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise
 DELAY = 0.05  # standard deviation of what a channel's thrust is late, s
 TINY = 1e-7  # step of derivatives, rad, or as a share of a value

@@ -33,10 +33,7 @@ FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell 
 FROM_FILE = KEPT  # share above which they do not
 CORRELATED = 1e-3  # correlations below are left out of files
 DIGITS = 9  # decimals of correlations in files
-
-LEAST_THRUST = 0.05
-"""Thrust factor down to which a channel counts as one that did not fire: it is not calibrated by that."""
-
+LEAST_THRUST = 0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
 WORTH_NAMING = 0.9  # correlation from which on it is named
 
 

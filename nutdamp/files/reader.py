@@ -46,8 +46,7 @@ Part = TypeVar("Part")
 Warn = Callable[[Fault], None]
 """Receiver of each number that is hardly meant."""
 
-BUILT_IN = "example"
-"""Name of the built-in example, which commands plan where no file is named, and which `init` writes by default."""
+BUILT_IN = "example"  # name of the built-in example, planned where no file is named, and written by `init`
 
 
 @cache

@@ -25,8 +25,7 @@ from nutdamp.units import parse, shown
 Vector = NDArray[np.float64]
 
 
-MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
-"""Keys for single parts of an inertia tensor, which a file gives as a whole."""
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
 
 
 class Finding(NamedTuple):

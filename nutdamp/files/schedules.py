@@ -34,8 +34,7 @@ PULSES_HEADER = (
     *IMPULSE,
     *("propellant_kg", "nutation_before_deg", "nutation_after_deg"),
 )
-EFFECTIVE = ("effective_start_s", "effective_on_time_s")
-"""Behind those, where pulses go through valves: start and on-time are those of the command then."""
+EFFECTIVE = ("effective_start_s", "effective_on_time_s")  # behind those, with valves
 
 UTC = "utc"
 

@@ -34,7 +34,7 @@ from nutdamp.estimation.parameters import (
     of_quaternions,
 )
 from nutdamp.files.ccsds.message import (
-    AEM_TABLE,
+    AEM_METADATA,
     BEFORE,
     BODY,
     QUATERNION_ANGVEL,
@@ -58,9 +58,7 @@ from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import shown
 
 AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
-
-COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}
-"""Numbers in a record of each ATTITUDE_TYPE that is read, besides its time."""
+COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +142,7 @@ class _HistoryReader(Frames):
 
     def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
         """Read a segment."""
-        block = Checked(self.path, metadata, AEM_TABLE, self.faults)
+        block = Checked(self.path, metadata, AEM_METADATA, self.faults)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")

@@ -22,8 +22,7 @@ from nutdamp.errors import Fault, FaultyFile, listed, nearest
 from nutdamp.files.export import FRAMES
 from nutdamp.files.yaml import read_limited, utf8_text
 
-VERSION = "2.0"
-"""Version of APM and AEM in issue 2 of their standard. Version 1 has other keywords."""
+VERSION = "2.0"  # of APM and AEM in issue 2 of their standard; version 1 has other keywords
 
 VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
 
@@ -63,8 +62,7 @@ _QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
 ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
 _SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
-MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
-"""Keywords of the direction of H, and of the rate of the spin axis about it."""
+MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")  # direction of H, rate of the spin axis about it
 
 HEADER = (
     *_text("CLASSIFICATION", required=False),
@@ -144,13 +142,8 @@ OPM_BLOCKS: dict[str, Layout] = {
 
 LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
 
-AEM_METADATA = _text(
-    *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
-    *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
-)
-"""Keywords of table 4-3 that are written."""
 
-AEM_TABLE = (
+AEM_METADATA = (
     *_text("OBJECT_NAME", "OBJECT_ID"),
     *_text("CENTER_NAME", required=False),
     *_text("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
