@@ -37,9 +37,9 @@ from nutdamp.estimation.search import (
 from nutdamp.physics import body as rigid_body
 from nutdamp.spacecraft.model import Spacecraft
 
-STUCK, FEWEST, COARSE = 0.2, 20, 10
-"""Part of the samples of a sensor, and number of them, that are alike in a row where it is stuck; a record that has
-so few different values is one of coarse steps."""
+STUCK = 0.2  # part of the samples of a sensor that are alike in a row where it is stuck
+FEWEST = 20  # number of them, at least
+COARSE = 10  # a record that has so few different values is one of coarse steps
 
 
 def expect_alive(model: Model) -> None:
@@ -97,22 +97,15 @@ def expect_enough(model: Model) -> None:
         )
 
 
-FAR, PART = 2.0, 1e-3
-"""Residuals are no noise from so many times that of neighbouring samples on, and such a part of what varies in a
-signal: records without noise show smaller ones."""
-
-WINDOWS, CHANCE = (4, 8, 16, 32, 64), 1e-6
-"""Samples in a row among which those left out are counted; probability by which they may be scattered so unevenly."""
-
-FEWEST_JUDGED = 20
-"""Samples of a signal that are judged at least."""
-
-SPLITS, SAMPLES = 120, 2000
-"""Times at which a step is looked for, and samples of a signal used for that, at most."""
-
-STEP, SHOWN = 0.7, 50.0
-"""A step counts as found where it leaves such a part of residuals that are no noise, at most; in those that are nearly
-noise, where it lowers the sum of squares by so much, in units of the noise."""
+FAR = 2.0  # times the noise of neighbouring samples from which on residuals are no noise
+PART = 1e-3  # part of what varies in a signal that they have then at least: records without noise show smaller ones
+WINDOWS = (4, 8, 16, 32, 64)  # samples in a row among which those left out are counted
+CHANCE = 1e-6  # probability by which they may be scattered so unevenly
+FEWEST_JUDGED = 20  # samples of a signal that are judged at least
+SPLITS = 120  # times at which a step is looked for
+SAMPLES = 2000  # samples of a signal used for that, at most
+STEP = 0.7  # part of residuals that are no noise which a step leaves, at most, to count as shown
+SHOWN = 50.0  # decrease of the sum of squares, in units of the noise, by which it shows in those that are nearly noise
 
 
 def expect_explained(fitted: Fit) -> None:
@@ -237,35 +230,17 @@ def _remains(columns: Vector, values: Vector) -> float:
     return float(np.sum((values - columns @ solved) ** 2))
 
 
-OUTLIER = 5.0
-"""Standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03."""
-
-ROUNDS, STILL = 8, 1e-3
-"""Fits in which noise and outliers are found anew, at most, and relative change of the noise from which on they are."""
-
-ADJUSTED = 3
-"""Rounds in which the noise is corrected for what the fit takes of it."""
-
-POOR = 0.3
-"""Share of a signal's own size that residuals may have before a fit begins again with a part of the record."""
-
-STARTS = 3
-"""Starts that are searched from at most."""
-
-UNLIKELY = 4.0
-"""Standard deviations of the file by which a parameter may be off before the starts are searched in shorter steps."""
-
-PARTS = (0.5, 0.25, 0.1, 0.04)
-"""Parts of the record that it then begins with."""
-
-SEEN = 4.5
-"""Standard deviations of |ω| from which on there is a nutation."""
-
-UNEQUAL = 5.0
-"""Standard deviations from which on the transverse moments count as different, or such a body as dissipating."""
-
-UNEQUAL_BY = ("unequal_1", "unequal_2")
-"""The parameters of unequal transverse moments."""
+OUTLIER = 5.0  # standard deviations beyond which a sample is left out: of 60,000 normal ones not one, on average 0.03
+ROUNDS = 8  # fits in which noise and outliers are found anew, at most
+STILL = 1e-3  # relative change of the noise from which on they are
+ADJUSTED = 3  # rounds in which the noise is corrected for what the fit takes of it
+POOR = 0.3  # share of a signal's own size that residuals may have before a fit begins again with a part of the record
+STARTS = 3  # starts that are searched from at most
+UNLIKELY = 4.0  # sigmas of the file by which a parameter may be off before the starts are searched in shorter steps
+PARTS = (0.5, 0.25, 0.1, 0.04)  # parts of the record that it then begins with
+SEEN = 4.5  # standard deviations of |ω| from which on there is a nutation
+UNEQUAL = 5.0  # sigmas from which on the transverse moments count as different, or such a body as dissipating
+UNEQUAL_BY = ("unequal_1", "unequal_2")  # the parameters of unequal transverse moments
 
 
 def fit(spacecraft: Spacecraft, record: Record) -> Fit:
@@ -302,13 +277,13 @@ def _fitted(spacecraft: Spacecraft, record: Record) -> Fit:
             return _widened(fitted, Model(spacecraft, record), ("growth",))
         return _grown_a_little(fitted)
     three = Model(spacecraft, record, unequal=True, growing=fitted.grows)
-    if not _shown(fitted, three, _begun(fitted, three), _places(three, UNEQUAL_BY)):
+    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
+    if not _shown(fitted, three, begin, of_moments):
         return fitted
     # What unequal moments do may look like growth of equal ones, which then is none.
     unequal = _widened(fitted, Model(spacecraft, record, unequal=True, growing=False), UNEQUAL_BY)
     if not fitted.grows or not _shows_growth(unequal):
         return _grown_a_little(unequal)
-    begin, of_moments = _begun(fitted, three), _places(three, UNEQUAL_BY)
     begin[of_moments] = _begun(unequal, three)[of_moments]
     return _settled(three, begin)
 

@@ -48,22 +48,12 @@ from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
 
-LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Coasts that are looked at, over the one there is."""
-
-CASES = 4000
-"""Dispersed cases flown for each."""
-
-NEAREST, DOUBTED = 64, 4.0
-"""Cases nearest to a bound by which it is told how the closed form errs, and the multiple of that within which others
-are flown too.
-"""
-
-PAYS = 0.9
-"""Share of that nutation, and less, down to which it must fall for another coast or a probe pulse to pay."""
-
-MOST_SAMPLES = 20_000
-"""Of a record that is looked at; longer ones are taken to be sampled less often, with less noise."""
+LENGTHS = (0.25, 0.5, 1.0, 2.0, 4.0)  # coasts that are looked at, over the one there is
+CASES = 4000  # dispersed cases flown for each
+NEAREST = 64  # cases nearest to a bound by which it is told how the closed form errs
+DOUBTED = 4.0  # multiple of that error within which others are flown too
+PAYS = 0.9  # share of that nutation, and less, down to which it must fall for another coast or a probe pulse to pay
+MOST_SAMPLES = 20_000  # of a record that is looked at; longer ones are taken to be sampled less often, with less noise
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,29 +40,16 @@ if TYPE_CHECKING:
     from nutdamp.estimation.search import Fit
 
 
-FINER, LONGEST_SPECTRUM = 8, 1 << 16
-"""Frequencies of a spectrum for each of its samples, and largest number of these; of longer records the first."""
-
-SMALL = 1e-3
-"""Share of the spin that trial transverse rates have: the motion is linear there."""
-
-OTHER = 0.05
-"""Part by which a spin by Sun pulses may differ from that of the file before both are tried."""
-
-MOST_TURNED = 2.1
-"""C/A at most, and a little more: 2 for a thin disc."""
-
-NARROW = 0.966
-"""Cosine of the nutation angle, 15 deg, from which on noise may decide in which plane a cone is, not its motion."""
-
-FLAT = 0.1
-"""Cosine of the nutation angle from which on its rate is sought."""
-
-TURNS = 8
-"""Starting values of the angle by which the body is turned about its axis."""
-
-TRIED, SLIP = 60, 1.5
-"""Values of C/A tried at most where no spectrum shows the nutation, and phase, rad, by which two differ at the end."""
+FINER = 8  # frequencies of a spectrum for each of its samples
+LONGEST_SPECTRUM = 1 << 16  # samples of a spectrum at most; of longer records the first
+SMALL = 1e-3  # share of the spin that trial transverse rates have: the motion is linear there
+OTHER = 0.05  # part by which a spin by Sun pulses may differ from that of the file before both are tried
+MOST_TURNED = 2.1  # C/A at most, and a little more: 2 for a thin disc
+NARROW = 0.966  # cosine of a nutation angle, 15 deg, from which on noise may decide in which plane a cone is
+FLAT = 0.1  # cosine of the nutation angle from which on its rate is sought
+TURNS = 8  # starting values of the angle by which the body is turned about its axis
+TRIED = 60  # values of C/A tried at most where no spectrum shows the nutation
+SLIP = 1.5  # phase, rad, by which the nutation of two of them differs at the end of a record
 
 
 def starts(model: Model, share: float = 1.0) -> Iterator[dict[str, float]]:
@@ -348,17 +335,10 @@ def _linear(model: Model, values: dict[str, float]) -> dict[str, float]:
     return values | {name: base[name] + float(part) for name, part in zip(names, solved, strict=True)}
 
 
-WITHIN = 3.0
-"""Sigmas of the file within which another C/A is considered."""
-
-ALIKE = 25.0
-"""Difference of -2 ln(likelihood) below which two fits count as equally good."""
-
-MOST_ALIASES = 6
-"""Other values of C/A that are fitted at most, the nearest to the file first."""
-
-POSSIBLE = (0.01, 1.999)
-"""Range of C/A of a symmetric body."""
+WITHIN = 3.0  # sigmas of the file within which another C/A is considered
+ALIKE = 25.0  # difference of -2 ln(likelihood) below which two fits count as equally good
+MOST_ALIASES = 6  # other values of C/A that are fitted at most, the nearest to the file first
+POSSIBLE = (0.01, 1.999)  # range of C/A of a symmetric body
 
 
 def neighbours(model: Model, values: Vector) -> list[Vector]:

@@ -41,14 +41,11 @@ from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState
 from nutdamp.spacecraft.schedule import Schedule
 
-PREDICTION, SHOWN, SAMPLE = 0.1, 2e-4, 1e-3
-"""Units of `work` of a prediction, of each sample, and of each time of a motion that is new, besides steps."""
-
-POLHODE = 0.8
-"""Units of a coast of three moments between pulses."""
-
-OF_SENSORS = ("bias", "misalignment", "wobble")
-"""Beginnings of the names of parameters that change nothing of the motion."""
+PREDICTION = 0.1  # units of `work` of a prediction, besides steps
+SHOWN = 2e-4  # of each of its samples
+SAMPLE = 1e-3  # of each time of a motion that is new
+POLHODE = 0.8  # units of a coast of three moments between pulses
+OF_SENSORS = ("bias", "misalignment", "wobble")  # first words of parameters that leave the motion as it is
 
 
 @dataclass(frozen=True, eq=False)

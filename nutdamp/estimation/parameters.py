@@ -38,11 +38,9 @@ SUN_PULSE = "sun_pulse"
 BODY, SPACE = "body", "space"
 """Where a signal shows the nutation: at its rate in the body, or at that of the axis about H."""
 
-APART = math.sin(math.radians(1.0))
-"""Sine of the angle from which on two directions are two."""
-
-STEPS, MULTIPLES = 4000, 0.9
-"""Values of a signal from which its steps are found, at most, and share of their differences that are multiples."""
+APART = math.sin(math.radians(1.0))  # sine of the angle from which on two directions are two
+STEPS = 4000  # values of a signal from which its steps are found, at most
+MULTIPLES = 0.9  # share of their differences that are multiples of a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,27 +298,15 @@ KINDS = (
 )  # fmt: skip
 """Measurement models, in the order of a fit."""
 
-KIND = {kind.name: kind for kind in KINDS}
-"""Measurement models by name."""
+KIND = {kind.name: kind for kind in KINDS}  # measurement models by name
 
 
-RATIO = "C/A"
-"""Name of the parameter that a coast fixes."""
-
-BIAS = math.radians(0.02)
-"""Standard deviation of the bias of a gyro, rad/s, where the file names none (dispersions.sensor_bias)."""
-
-TILT = math.radians(1.0)
-"""Standard deviation of each tilt of the gyros, and of the attitude sensors, from the principal axes, rad."""
-
-THRUST = 0.5
-"""Standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise."""
-
-DELAY = 0.05
-"""Standard deviation of what a channel's thrust is late, s."""
-
-TINY = 1e-7
-"""Step of derivatives, rad, or as a share of a value."""
+RATIO = "C/A"  # name of the parameter that a coast fixes
+BIAS = math.radians(0.02)  # one sigma of the bias of a gyro, rad/s, where the file has no dispersions.sensor_bias
+TILT = math.radians(1.0)  # one sigma of each tilt of gyros and attitude sensors from the principal axes, rad
+THRUST = 0.5  # standard deviation of a thrust factor in a fit at least: a valve that stays shut must not pass for noise
+DELAY = 0.05  # standard deviation of what a channel's thrust is late, s
+TINY = 1e-7  # step of derivatives, rad, or as a share of a value
 
 
 class Parameter(NamedTuple):
@@ -384,8 +370,7 @@ def prior(spacecraft: Spacecraft, chosen: Sequence[Parameter]) -> tuple[Matrix, 
     return np.array(rows).reshape(-1, len(chosen)), np.array(values)
 
 
-EXACT = Dispersions()
-"""The dispersions of a file that has none."""
+EXACT = Dispersions()  # the dispersions of a file that has none
 
 
 def _together(spacecraft: Spacecraft) -> float:

@@ -22,28 +22,19 @@ from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.model import Spacecraft, SpinState
 from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
-WHEEL = "wheel momentum"
-"""Input of a wheel that is estimated."""
+WHEEL = "wheel momentum"  # input of a wheel that is estimated
 
 DEG = math.pi / 180.0
 
 UNTOLD, SHARED, TOLD = "file", "both", "data"
 """Sources of an estimate: the file's tolerances, both, or the data."""
 
-FROM_DATA, FROM_FILE = 0.5, KEPT
-"""Share of its prior that a sigma is below where the data tell a value, and above where they do not."""
-
-CORRELATED = 1e-3
-"""Correlations below are left out of files."""
-
-DIGITS = 9
-"""Decimals of correlations in files."""
-
-LEAST_THRUST = 0.05
-"""Thrust factor down to which a channel counts as one that did not fire: it is not calibrated by that."""
-
-WORTH_NAMING = 0.9
-"""Correlation from which on it is named."""
+FROM_DATA = 0.5  # share of its prior that a sigma is below where the data tell a value
+FROM_FILE = KEPT  # share above which they do not
+CORRELATED = 1e-3  # correlations below are left out of files
+DIGITS = 9  # decimals of correlations in files
+LEAST_THRUST = 0.05  # thrust factor down to which a channel did not fire: it is not calibrated by that
+WORTH_NAMING = 0.9  # correlation from which on it is named
 
 
 class Estimate(NamedTuple):
@@ -345,11 +336,8 @@ def correlated(fitted: Fit) -> tuple[tuple[str, str, float], ...]:
     return tuple(sorted((pair for pair in pairs if abs(pair[2]) > WORTH_NAMING), key=lambda pair: -abs(pair[2])))
 
 
-LATE = 0.1
-"""Delay of a channel from which on the times of the schedule are doubted, s: valves are faster."""
-
-SURE = 3.0
-"""Standard deviations from which on a doubt is said."""
+LATE = 0.1  # delay of a channel from which on the times of the schedule are doubted, s: valves are faster
+SURE = 3.0  # standard deviations from which on a doubt is said
 
 
 def doubts(fitted: Fit) -> Iterator[str]:

@@ -24,20 +24,13 @@ from nutdamp.errors import Infeasible
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import KIND, SUN_PULSE, Matrix, Vector, quantisation
 
-NORMAL_MAD = 1.4826
-"""Standard deviation of normal numbers over their median magnitude."""
-
-ROUNDING = 1e-7
-"""Noise that a signal has at least, as a share of its largest value: no telemetry has more digits."""
-
-EVALUATIONS, TRIAL = 60, 40
-"""Trials of one least-squares search, at most: of the last ones, and of one from a start, which may lead nowhere."""
-
-GRADIENT, STEP = 1e-8, 1e-10
-"""Slope of a cost that is least, and relative change of it, and of the values, from which on a search is over."""
-
-DAMPINGS = 10
-"""Steps, at most, in which the length of a step is found."""
+NORMAL_MAD = 1.4826  # standard deviation of normal numbers over their median magnitude
+ROUNDING = 1e-7  # noise that a signal has at least, as a share of its largest value: no telemetry has more digits
+EVALUATIONS = 60  # trials of one of the last least-squares searches, at most
+TRIAL = 40  # trials of one from a start, at most, which may lead nowhere
+GRADIENT = 1e-8  # slope of a cost that is least
+STEP = 1e-10  # relative change of it, and of the values, from which on a search is over
+DAMPINGS = 10  # steps, at most, in which the length of a step is found
 
 
 def least(model: Model) -> Vector:
@@ -263,11 +256,8 @@ CURVED = 7.0
 """By which the square of a shift across a curved region counts: (t², s t²) is then in the ellipsoid in 95 % of cases,
 for 2 to 10 parameters, whether s is small or large."""
 
-GROWS = 3.0
-"""Standard deviations of κ from which on it shows."""
-
-KEPT = 0.9
-"""Share of its prior above which a parameter's sigma is where the data do not tell it."""
+GROWS = 3.0  # standard deviations of κ from which on it shows
+KEPT = 0.9  # share of its prior above which a parameter's sigma is where the data do not tell it
 
 
 @dataclass(frozen=True, eq=False)

@@ -144,8 +144,7 @@ def _edits(tree: Node, moved_on: Later) -> Edits:
             yield path, as_before(tree.get(*path), float(torque[axis]), "torque", "N m")
 
 
-SEEN = 3.0
-"""Standard deviations from which on a growth of the nutation, or a delay, counts as seen."""
+SEEN = 3.0  # standard deviations from which on a growth of the nutation, or a delay, counts as seen
 
 UNWRITTEN = {
     "bias": ("bias of {}", "deg/s"),

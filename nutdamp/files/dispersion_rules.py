@@ -25,8 +25,7 @@ PARTS = {
 }
 """Tolerances of which several inputs are drawn: their first word and their last letters."""
 
-EACH_PULSE = ("thrust_per_pulse", "timing")
-"""Tolerances that each pulse draws anew."""
+EACH_PULSE = ("thrust_per_pulse", "timing")  # tolerances that each pulse draws anew
 
 
 def _correlations(facts: Facts) -> Iterator[Finding]:

@@ -297,8 +297,7 @@ def _key(step: str | int) -> str:
     return word if re.fullmatch(r"[A-Za-z_][\w+-]*|[+-][A-Za-z]\w*", word) else "'" + word.replace("'", "''") + "'"
 
 
-NOISE = 1e-13
-"""Nutation, rad, that is rounding."""
+NOISE = 1e-13  # nutation, rad, that is rounding
 
 Edits = Iterator[tuple[KeyPath, str]]
 """Values by their paths."""

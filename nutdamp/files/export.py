@@ -29,8 +29,7 @@ from nutdamp.montecarlo.study import Study
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Spacecraft, Vector
 
-LONGEST_STEP = 0.1
-"""rad; the body turns by no more in one step of the script."""
+LONGEST_STEP = 0.1  # rad; the body turns by no more in one step of the script
 
 
 def basilisk_script(plan: Plan) -> str:
@@ -202,11 +201,8 @@ if __name__ == "__main__":
 '''
 
 
-FRAMES = ("EME2000", "J2000", "GCRF")
-"""Inertial frames that the formats have a name for."""
-
-AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}
-"""Their names in the format of the Systems Tool Kit."""
+FRAMES = ("EME2000", "J2000", "GCRF")  # inertial frames that the formats have a name for
+AXES = {"EME2000": "J2000", "J2000": "J2000", "GCRF": "ICRF"}  # their names in the format of the Systems Tool Kit
 
 EXAMPLE = {
     "epoch": "2026-03-01T12:00:00Z           # of t = 0, UTC",
@@ -218,14 +214,9 @@ TURN = math.radians(6.0)
 """rad; the body turns by no more between two records. Interpolation with the rates then errs by less than 1e-5 deg, and
 even a plain turn from one attitude to the next by less than 0.01 deg at 5 deg of nutation."""
 
-LEAST_RECORDS = 4
-"""Records of a stretch, however short: enough for interpolation of degree 3."""
-
-MOST_RECORDS = 1_000_000
-"""More make no file that anyone reads."""
-
-NANOSECONDS = 1e9
-"""Nanoseconds in a second; to divide by them gives the number nearest to the decimal one."""
+LEAST_RECORDS = 4  # records of a stretch, however short: enough for interpolation of degree 3
+MOST_RECORDS = 1_000_000  # more make no file that anyone reads
+NANOSECONDS = 1e9  # nanoseconds in a second; to divide by them gives the number nearest to the decimal one
 
 
 class Reference(NamedTuple):
@@ -340,8 +331,7 @@ SUFFIXES = {"kg m²": "kgm2", "rad/s": "rad_s", "m/s²": "m_s2", "rad": "deg", "
 OUTPUT_COLUMNS = ("nutation_deg", "momentum_shift_deg", "axis_error_deg", "spin_change_rad_s", "propellant_kg")
 """Columns of `OUTPUTS`, in their order."""
 
-SHORTEST = 12
-"""Bytes that a number takes at least, on average, with its comma."""
+SHORTEST = 12  # bytes that a number takes at least, on average, with its comma
 
 
 def cone_columns(spacecraft: Spacecraft) -> list[str]:

@@ -231,8 +231,7 @@ def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyP
     return None
 
 
-SMALLEST = 1e-15
-"""Smaller values that must be above zero count as zero, in SI: a division by them could overflow."""
+SMALLEST = 1e-15  # smaller values that must be above zero count as zero, in SI: a division by them could overflow
 
 _BOUNDS = {
     "minimum": (operator.ge, "of at least"),

@@ -25,23 +25,15 @@ from nutdamp.spacecraft.tolerances import KINDS
 from nutdamp.units import KINDS as UNITS
 from nutdamp.units import shown
 
-SAMPLES = 4.0
-"""Samples a nutation period without which the phase of the nutation is hardly seen."""
-
-MOST_SAMPLES = 1e6
-"""Samples a nutation period, more than which tell no more and take for ever to fly."""
-
-LATE = 20.0
-"""Nutation periods after which a sample tells nothing: how long delay, filter and settling may be."""
-
-LONGEST_WAIT = 1e4
-"""Nutation periods, more than which from firing to firing damp nothing."""
+SAMPLES = 4.0  # samples a nutation period without which the phase of the nutation is hardly seen
+MOST_SAMPLES = 1e6  # samples a nutation period, more than which tell no more and take for ever to fly
+LATE = 20.0  # nutation periods after which a sample tells nothing: how long delay, filter and settling may be
+LONGEST_WAIT = 1e4  # nutation periods, more than which from firing to firing damp nothing
 
 LARGEST_BIAS, FARTHEST = 1e3, 1e3
 """m/s² and m of an accelerometer beyond which it is none of a spacecraft: its nutation would be lost in rounding."""
 
-SCALES = (0.1, 10.0)
-"""Sizes of scales between which a sensor still measures."""
+SCALES = (0.1, 10.0)  # sizes of scales between which a sensor still measures
 
 SENSOR: KeyPath = ("loop", "sensor")
 UNITS_OF = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelerometer: m/s^2"}

@@ -16,8 +16,7 @@ from nutdamp.files.yaml import Node
 from nutdamp.physics.body import momentary
 from nutdamp.units import KINDS
 
-LOOKED_AT = 4000
-"""Characters from the beginning that are looked at."""
+LOOKED_AT = 4000  # characters from the beginning that are looked at
 
 
 _MADE_FROM = "name the spacecraft file that it was made from"
@@ -44,32 +43,18 @@ def foreign(text: str) -> str | None:
     return next((f"expected a spacecraft file, got {kind}" for kind in kinds), None)
 
 
-FAR = 50.0
-"""m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm."""
+FAR = 50.0  # m; few spacecraft reach further from their centre of mass, and many a drawing counts in mm
 
 NEAR, SLOW = 1e6, 50.0
 """m, m/s; no orbit about a planet is as near to its centre or as slow, and most tables count in km."""
 
-FAST = 100.0
-"""rad/s; no spacecraft spins faster."""
-
-FAST_AND_WHOLE = 20.0
-"""rad/s; from here on (191 rpm) a whole number is more likely one of rpm."""
-
-LOOSE = 0.1
-"""rad; few requirements on an angle are looser than this 5.7 deg, and many a file counts in deg."""
-
-LASTING = 50.0
-"""Spin turns; no pulse against a nutation lasts longer."""
-
-SLUGGISH = 1.0
-"""s; few valves take so long, and many a data sheet counts in ms."""
-
-THIN = 1e3
-"""Pa; no tank feeds thrusters with less, and most data sheets count in bar."""
-
-STRONG = 2.0
-"""Times the thrust of a warm nozzle; none gives as much when it is cold."""
+FAST = 100.0  # rad/s; no spacecraft spins faster
+FAST_AND_WHOLE = 20.0  # rad/s; from here on (191 rpm) a whole number is more likely one of rpm
+LOOSE = 0.1  # rad; few requirements on an angle are looser than this 5.7 deg, and many a file counts in deg
+LASTING = 50.0  # spin turns; no pulse against a nutation lasts longer
+SLUGGISH = 1.0  # s; few valves take so long, and many a data sheet counts in ms
+THIN = 1e3  # Pa; no tank feeds thrusters with less, and most data sheets count in bar
+STRONG = 2.0  # times the thrust of a warm nozzle; none gives as much when it is cold
 
 
 def doubts(root: Node) -> Iterator[Finding]:

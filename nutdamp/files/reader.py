@@ -46,8 +46,7 @@ Part = TypeVar("Part")
 Warn = Callable[[Fault], None]
 """Receiver of each number that is hardly meant."""
 
-BUILT_IN = "example"
-"""Name of the built-in example, which commands plan where no file is named, and which `init` writes by default."""
+BUILT_IN = "example"  # name of the built-in example, planned where no file is named, and written by `init`
 
 
 @cache
@@ -153,8 +152,7 @@ def _holds_names(annotation: Any) -> bool:
     return get_origin(annotation) is dict or any(map(_holds_names, get_args(annotation)))
 
 
-POLE = 1e-9
-"""rad from a pole of the frame, up to which a spin axis has no ascending node."""
+POLE = 1e-9  # rad from a pole of the frame, up to which a spin axis has no ascending node
 
 
 def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:

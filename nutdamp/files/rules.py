@@ -25,8 +25,7 @@ from nutdamp.units import parse, shown
 Vector = NDArray[np.float64]
 
 
-MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)
-"""Keys for single parts of an inertia tensor, which a file gives as a whole."""
+MOMENT = re.compile(r"[IJ]_?([xyz]{1,2}|[123]{1,2})", re.IGNORECASE)  # keys for parts of a tensor
 
 
 class Finding(NamedTuple):
@@ -78,8 +77,7 @@ class Facts:
         return [] if node is None else list(node.children())
 
 
-ALONG = 1e-3
-"""rad from the spin axis, up to which the Sun counts as along it."""
+ALONG = 1e-3  # rad from the spin axis, up to which the Sun counts as along it
 
 
 def _command_blocks(facts: Facts) -> Iterator[Finding]:
@@ -194,8 +192,7 @@ def _direction(facts: Facts, path: KeyPath) -> Iterator[Finding]:
         yield Finding((*path, 1), f"{angle} is no declination; expected an angle from -90 deg to 90 deg")
 
 
-CANCELLED = 1e-12
-"""A sum that is smaller than its terms by this factor is rounding; it counts as zero."""
+CANCELLED = 1e-12  # a sum that is smaller than its terms by this factor is rounding; it counts as zero
 
 
 def norm(vector: Vector) -> float:
@@ -209,8 +206,7 @@ def force_vector(direction: Iterable[float], force: float) -> Vector:
     return np.array([part / math.hypot(*components) * force for part in components])
 
 
-SYMMETRIC = 1e-9
-"""Asymmetry of an inertia tensor that passes for rounding, relative to its largest entry."""
+SYMMETRIC = 1e-9  # asymmetry of an inertia tensor that passes for rounding, relative to its largest entry
 
 
 def findings(root: Node) -> Iterator[Finding]:

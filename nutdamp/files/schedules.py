@@ -34,8 +34,7 @@ PULSES_HEADER = (
     *IMPULSE,
     *("propellant_kg", "nutation_before_deg", "nutation_after_deg"),
 )
-EFFECTIVE = ("effective_start_s", "effective_on_time_s")
-"""Behind those, where pulses go through valves: start and on-time are those of the command then."""
+EFFECTIVE = ("effective_start_s", "effective_on_time_s")  # behind those, with valves
 
 UTC = "utc"
 
@@ -46,14 +45,9 @@ BLOCKS_HEADER = (
     *("impulse_Nms", "nutation_after_deg"),
 )
 
-COUNTS = 1e-6
-"""Share of a step by which a time may be off the commands that there are: the rounding of files."""
-
-MOST_FIRED = 5_000
-"""Pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds."""
-
-LATEST = 100_000
-"""Number of the last Sun pulse that may fire a block."""
+COUNTS = 1e-6  # share of a step by which a time may be off the commands that there are: the rounding of files
+MOST_FIRED = 5_000  # pulses that the blocks of a file may fire: many more than any campaign, and flown within seconds
+LATEST = 100_000  # number of the last Sun pulse that may fire a block
 
 
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
@@ -198,8 +192,7 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
             row.warn(f"{name}_counts", text)
 
 
-AGREES = 1e-6
-"""Relative difference up to which columns of a schedule agree."""
+AGREES = 1e-6  # relative difference up to which columns of a schedule agree
 
 STARTS = ("start_s", "t_s")
 

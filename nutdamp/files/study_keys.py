@@ -30,16 +30,14 @@ from nutdamp.units import parse, pattern, shown
 if TYPE_CHECKING:
     from nutdamp.spacecraft.equipment import Steerable, Thruster
 
-READING = "reading"
-"""The kind of the signal of a sensor: an angular rate of a gyro, an acceleration of an accelerometer."""
+READING = "reading"  # kind of the signal of a sensor: angular rate of a gyro, acceleration of an accelerometer
 
 RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
 
 VALVE_TIMES = ("open_delay", "close_delay", "rise_time", "fall_time")
 
-ALL = ""
-"""Name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name."""
+ALL = ""  # name of all thrusters together, where the file gives one tolerance for them; no thruster has such a name
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
@@ -212,11 +210,8 @@ _TOLERANCES = {
     for rule in get_args(get_args(field.type)[0])
     if isinstance(rule, _Tolerance)
 }
-QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}
-"""The keys of dispersions with the kind of quantity that they hold."""
-
-BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")
-"""The keys that hold one tolerance for all thrusters, or one by name."""
+QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}  # kinds of quantity by key
+BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")  # of all or by name
 
 
 def dispersions(

@@ -32,14 +32,12 @@ from nutdamp.units import shown
 if sys.platform != "win32":
     import fcntl
 
-STDOUT = "-"
-"""File name that means standard output."""
+STDOUT = "-"  # file name that means standard output
 
 PREFIX, SUFFIX = ".nutdamp-", ".part"
 """Begin and end of the names of temporary files."""
 
-ATTEMPTS = 10
-"""Temporary files that are made before giving up, where others remove them."""
+ATTEMPTS = 10  # temporary files that are made before giving up, where others remove them
 
 
 def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object]) -> None:
@@ -209,8 +207,7 @@ HEADER = (
 )
 
 
-ROW = np.dtype([(name, np.int64 if name == "pulse" else np.float64) for name in HEADER])
-"""One row of the track."""
+ROW = np.dtype([(name, np.int64 if name == "pulse" else np.float64) for name in HEADER])  # one row of the track
 
 
 def track_array(track: Track, inertia: Inertia) -> NDArray[np.void]:
@@ -236,17 +233,10 @@ def write_track(pieces: Iterable[Track], inertia: Inertia, stream: IO[bytes]) ->
             stream.write(rows.replace("), (", "\r\n").replace(", ", ",").encode() + b"\r\n")
 
 
-LARGEST = 1e15
-"""Larger magnitudes are nothing of a spacecraft, and would overflow later."""
-
-MOST_BYTES = 32 << 20
-"""Size of a file, many times more than its most rows take."""
-
-MOST_ROWS = 100_000
-"""Rows of a file."""
-
-MOST_FAULTS = 5
-"""Faults of one column that are listed."""
+LARGEST = 1e15  # larger magnitudes are nothing of a spacecraft, and would overflow later
+MOST_BYTES = 32 << 20  # size of a file, many times more than its most rows take
+MOST_ROWS = 100_000  # rows of a file
+MOST_FAULTS = 5  # faults of one column that are listed
 
 
 class Row(dict[str, str]):

@@ -34,7 +34,7 @@ from nutdamp.estimation.parameters import (
     of_quaternions,
 )
 from nutdamp.files.ccsds.message import (
-    AEM_TABLE,
+    AEM_METADATA,
     BEFORE,
     BODY,
     QUATERNION_ANGVEL,
@@ -57,11 +57,8 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import shown
 
-AEM_VERSION = "CCSDS_AEM_VERS"
-"""Keyword of the first line."""
-
-COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}
-"""Numbers in a record of each ATTITUDE_TYPE that is read, besides its time."""
+AEM_VERSION = "CCSDS_AEM_VERS"  # keyword of the first line
+COLUMNS = {"QUATERNION": 4, QUATERNION_ANGVEL: 7}  # numbers in a record of each ATTITUDE_TYPE read, besides its time
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +142,7 @@ class _HistoryReader(Frames):
 
     def take(self, metadata: MessageBlock, rows: list[tuple[int, str]]) -> None:
         """Read a segment."""
-        block = Checked(self.path, metadata, AEM_TABLE, self.faults)
+        block = Checked(self.path, metadata, AEM_METADATA, self.faults)
         self.name = block.text("OBJECT_NAME") or self.name
         self.take_system(block)
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
@@ -220,13 +217,11 @@ LIMITS = {ANGLES[0]: (-360.0, 360.0), ANGLES[1]: (-90.0, 90.0), CROSSED[0]: (-36
           TOWARDS[0]: (-360.0, 360.0), TOWARDS[1]: (-90.0, 90.0), ASPECTS: (0.0, 180.0)}  # fmt: skip
 """Least and largest angles of columns, deg."""
 
-UNIT_LENGTH = 0.01
-"""Deviation from length one that a measured axis or quaternion may have."""
+UNIT_LENGTH = 0.01  # deviation from length one that a measured axis or quaternion may have
 UNKNOWN = re.compile(r"omega|axis|accel|sun|rate|gyro|cross|q[_0-9]|(ra|dec)(_|$)", re.IGNORECASE)
 """Names of columns that are meant to be measured."""
 
-SAME = 0.03
-"""Part by which a ratio of rates may differ from that of two units."""
+SAME = 0.03  # part by which a ratio of rates may differ from that of two units
 
 
 def read_telemetry(

@@ -24,8 +24,7 @@ from nutdamp.errors import CannotRead, Fault, FaultyFile
 from nutdamp.files.fields import KeyPath as KeyPath
 from nutdamp.units import shown
 
-STDIN = "-"
-"""File name that means standard input."""
+STDIN = "-"  # file name that means standard input
 
 
 def read_bytes(path: str, most: int = -1) -> bytes:
@@ -70,8 +69,7 @@ def utf8_text(data: bytes, name: str) -> str:
 
 
 MAX_BYTES = 1 << 20
-MAX_NODES = 10_000
-"""Values in a file, those that aliases repeat counted each time."""
+MAX_NODES = 10_000  # values in a file, those that aliases repeat counted each time
 MAX_DEPTH = 32
 
 

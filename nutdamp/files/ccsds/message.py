@@ -22,18 +22,14 @@ from nutdamp.errors import Fault, FaultyFile, listed, nearest
 from nutdamp.files.export import FRAMES
 from nutdamp.files.yaml import read_limited, utf8_text
 
-VERSION = "2.0"
-"""Version of APM and AEM in issue 2 of their standard. Version 1 has other keywords."""
+VERSION = "2.0"  # of APM and AEM in issue 2 of their standard; version 1 has other keywords
 
 VERSION_OF = {"APM": VERSION, "AEM": VERSION, "OPM": "3.0"}
 
 BODY_FRAME = "SC_BODY_1"
 
-LONGEST_LINE = 254
-"""ASCII characters that a line may have."""
-
-SIGNIFICANT = 16
-"""Most digits that a number may have."""
+LONGEST_LINE = 254  # ASCII characters that a line may have
+SIGNIFICANT = 16  # most digits that a number may have
 
 
 class Keyword(NamedTuple):
@@ -66,8 +62,7 @@ _QUATERNION = _numbers("Q1", "Q2", "Q3", "QC", tag="quaternion")
 ANGVEL = ("ANGVEL_X", "ANGVEL_Y", "ANGVEL_Z")
 
 _SPIN = (*_numbers("SPIN_ALPHA", "SPIN_DELTA", "SPIN_ANGLE", unit="deg"), *_numbers("SPIN_ANGLE_VEL", unit="deg/s"))
-MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")
-"""Keywords of the direction of H, and of the rate of the spin axis about it."""
+MOMENTUM = ("MOMENTUM_ALPHA", "MOMENTUM_DELTA", "NUTATION_VEL")  # direction of H, rate of the spin axis about it
 
 HEADER = (
     *_text("CLASSIFICATION", required=False),
@@ -147,13 +142,8 @@ OPM_BLOCKS: dict[str, Layout] = {
 
 LAYOUTS = {**APM_BLOCKS, **OPM_BLOCKS}
 
-AEM_METADATA = _text(
-    *("OBJECT_NAME", "OBJECT_ID", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME", "STOP_TIME"),
-    *("ATTITUDE_TYPE", "ANGVEL_FRAME", "INTERPOLATION_METHOD", "INTERPOLATION_DEGREE"),
-)
-"""Keywords of table 4-3 that are written."""
 
-AEM_TABLE = (
+AEM_METADATA = (
     *_text("OBJECT_NAME", "OBJECT_ID"),
     *_text("CENTER_NAME", required=False),
     *_text("REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "START_TIME"),
@@ -361,18 +351,14 @@ def from_kvn(text: str, name: str) -> tuple[list[MessageBlock], list[Fault]]:
     return [MessageBlock(word, tuple(entries), line=line) for word, line, entries in begun], faults
 
 
-LARGEST = 1e15
-"""Larger magnitudes are nothing physical."""
-
-MOST_BYTES = 16 << 20
-"""Size of a message, many times more than its most manoeuvres take."""
+LARGEST = 1e15  # larger magnitudes are nothing physical
+MOST_BYTES = 16 << 20  # size of a message, many times more than its most manoeuvres take
 
 
 BEFORE = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"
 """Bytes that may come before the first character of a text, in UTF-8 and UTF-16."""
 
-VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")
-"""First keywords of messages."""
+VERSIONS = re.compile("CCSDS_[A-Z]+_VERS")  # first keywords of messages
 
 
 def kvn_text(path: str) -> str:
@@ -488,14 +474,9 @@ def unit_length(parts: list[float], tolerance: float) -> bool:
     return math.isclose(math.hypot(*parts), 1.0, abs_tol=tolerance)
 
 
-UNIT = 1e-4
-"""Deviation from length one up to which a quaternion counts as rounded."""
-
-SAME_AXES = {"ICRF": "GCRF"}
-"""Frames whose axes are those of another that a spacecraft file knows."""
-
-BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")
-"""Frames fixed in the body."""
+UNIT = 1e-4  # deviation from length one up to which a quaternion counts as rounded
+SAME_AXES = {"ICRF": "GCRF"}  # frames whose axes are those of another that a spacecraft file knows
+BODY = re.compile(r"SC_BODY(_[A-Z0-9]+)?")  # frames fixed in the body
 
 
 class Frames:

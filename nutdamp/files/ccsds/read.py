@@ -43,8 +43,7 @@ from nutdamp.physics.body import principal_axes
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 
-AGREES = 1e-4
-"""Difference up to which SPIN agrees with the other blocks: rad, and relative for rates."""
+AGREES = 1e-4  # difference up to which SPIN agrees with the other blocks: rad, and relative for rates
 
 _VERSION = "CCSDS_APM_VERS"
 _OUTSIDE = (Keyword(_VERSION, text=True), *HEADER, *APM_METADATA, Keyword("EPOCH", text=True))
@@ -274,8 +273,7 @@ def euler(sequence: str, *angles: float) -> Vector:
     return turn
 
 
-ALIKE = 1e-9
-"""Relative difference up to which torques count as transverse, and as of one magnitude."""
+ALIKE = 1e-9  # relative difference up to which torques count as transverse, and as of one magnitude
 
 _BLOCKS = {"inertia": "INERTIA", "omega0": "ANGVEL", "attitude": "EPOCH", "steerable": "MAN"}
 """Block of the message behind each part of the spacecraft file."""

@@ -45,8 +45,7 @@ from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
-AXIS = 1e-12
-"""Tilt in rad up to which the symmetry axis counts as the third axis of the file."""
+AXIS = 1e-12  # tilt in rad up to which the symmetry axis counts as the third axis of the file
 
 FULL = 2.0 * math.pi
 
