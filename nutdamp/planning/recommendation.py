@@ -146,10 +146,8 @@ def _alternatives(best: Plan, plans: Sequence[Plan]) -> dict[Gain, Plan]:
     """
     unit, body = _unit(plans), best.spacecraft
     turned = 0.0 if body.goal.axis is not None or _off(best) <= DAMPED_ANGLE else STEADIER_SHIFT * _off(best)
-    few, soon = (
-        FEWER_PULSES * len(best.pulses),
-        min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period),
-    )
+    few = FEWER_PULSES * len(best.pulses)
+    soon = min(SOONER_END * best.pulses.end, best.pulses.end - body.inertial_period)
     gains_of: dict[Gain, Plan] = {}
     # With the largest cost ratio at which each is worth a note.
     for gain, ratio, gains in (

@@ -243,7 +243,7 @@ class Scheme:
     of schedules about as good. ``body_fixed``: fires channels of the file only, no steerable torquer.
     ``reads_commands``: makes blocks of the ``commands`` of the file, and is planned where there are some.
     ``on_true_body``: needs no symmetric model. ``slow``: may take seconds. ``by_turns``: fires at one phase of each
-    spin turn, so that the body has to spin.
+    spin turn, so that the body has to spin. ``home``: its module, where that has another name.
     """
 
     name: str
@@ -260,17 +260,20 @@ class Scheme:
     on_true_body: bool = False
     slow: bool = False
     by_turns: bool = False
+    home: str = ""
 
     @property
     def module(self) -> str:
         """Module with its function ``schedule``, where it fires."""
-        return f"nutdamp.schemes.{'optimal.search' if self.name == 'optimal' else self.name.replace('-', '_')}"
+        return f"nutdamp.schemes.{self.home or self.name.replace('-', '_')}"
 
 
 ONE_PULSE = Scheme("one-pulse", classic=True)
 TWO_PULSE = Scheme("two-pulse", TwoPulseOptions, classic=True, points=True, weighs_alternatives=True)
 FOUR_PULSE = Scheme("four-pulse", FourPulseOptions, classic=True, body_fixed=True)
-OPTIMAL = Scheme("optimal", OptimalOptions, points=True, sets_spin=True, body_fixed=True, slow=True)
+OPTIMAL = Scheme(
+    "optimal", OptimalOptions, points=True, sets_spin=True, body_fixed=True, slow=True, home="optimal.search"
+)
 HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(
     "rhumb-line",

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nutdamp.common import work
+from nutdamp.common.numerics import cos_sin
 from nutdamp.flight.dynamics import make_dynamics
 from nutdamp.physics import attitude, batch
 from nutdamp.schemes.optimal import refinement
@@ -156,7 +157,7 @@ class Task:
         after = A * complex(rates[0], rates[1]) + np.cumsum(added * begun, axis=1)
         across = (after - added * begun) / begun  # in body axes as each pulse begins: H turns back in a coast
         size = np.sqrt(across.real**2 + across.imag**2 + before**2)
-        cosine, sine = batch.cos_sin(0.5 / A * size * coasts)
+        cosine, sine = cos_sin(0.5 / A * size * coasts)
         sine /= np.where(size > 0.0, size, 1.0)
         half = np.exp(0.5j * turned)
         first, second = (cosine + 1j * (sine * before)) * half, sine * across * half
