@@ -145,11 +145,8 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
         job.remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")
 
 
-POINTS = 6
-"""Horizons tried for each front where no number follows ``--trade``."""
-
-COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
-"""Options that may come without a number, and their values then."""
+POINTS = 6  # horizons tried for each front where no number follows ``--trade``
+COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}  # options that may come without a number, and their values then
 
 
 class ReportCommand(SessionCommand):
@@ -175,8 +172,7 @@ CONTROL = (
 )
 """Options of configuration control on a page, and their subjects."""
 
-CONTROLLED = "Configuration control"
-"""Their heading."""
+CONTROLLED = "Configuration control"  # their heading
 
 
 def control_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -51,8 +51,7 @@ if TYPE_CHECKING:
 
 DEFAULT_FILE = "spacecraft.yaml"
 
-FIGURES = ("overview", "motion", "sphere", "history")
-"""Pictures that ``--plot`` can draw, the default first."""
+FIGURES = ("overview", "motion", "sphere", "history")  # pictures that ``--plot`` can draw, the default first
 
 
 def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
@@ -148,8 +147,7 @@ def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     return lambda command: where(which(command))
 
 
-STANDARD = "-"
-"""File name that means standard input or standard output."""
+STANDARD = "-"  # file name that means standard input or standard output
 
 
 def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> bool:

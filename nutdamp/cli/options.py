@@ -100,8 +100,7 @@ class FolderName(FileName):
     completed_as = "dir"
 
 
-SAMPLES = 20_000
-"""Default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
+SAMPLES = 20_000  # default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy
 
 
 class OutputName(FileName):
@@ -210,19 +209,15 @@ class Count(ParamType[int]):
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-GOAL = "Goal and motion"
-"""Heading of the options of the goal."""
+GOAL = "Goal and motion"  # heading of the options of the goal
 
 FASTEST = 100.0
 """rad/s; no spacecraft spins faster, so a larger number without unit is more likely one of rpm, as a whole one is."""
 
 COUNT_FROM_ONE = click.IntRange(1)
 
-WIDEST = 26
-"""Characters of an option that its help comes beside; below a longer one."""
-
-SHARED = names_of(SchemeOptions)
-"""Options of every scheme."""
+WIDEST = 26  # characters of an option that its help comes beside; below a longer one
+SHARED = names_of(SchemeOptions)  # options of every scheme
 
 
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"

@@ -18,8 +18,7 @@ from nutdamp.views.summary import opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, lasting, most, quantity
 
-SLOW = 0.1
-"""Share of its spin by which a year may change it before figures of the present spin mislead."""
+SLOW = 0.1  # share of its spin by which a year may change it before figures of the present spin mislead
 
 
 def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float | None]:

@@ -46,8 +46,7 @@ if TYPE_CHECKING:
     from nutdamp.schemes.optimal.linear_program import Burn
 
 
-VERDICT = {True: "met", False: "NOT met", None: MISSING}
-"""Words for the values of `Plan.meets_requirement`."""
+VERDICT = {True: "met", False: "NOT met", None: MISSING}  # words for the values of `Plan.meets_requirement`
 
 
 def no_plan(plan: Plan) -> str:
@@ -75,11 +74,8 @@ def needless(compared: Comparison) -> str | None:
     return f"{there}: {verdict}{lasting}"
 
 
-UNDECIDED = "the share of cases that comply is undecided"
-"""Verdict on dispersed cases that do not decide."""
-
-ROUNDING = 1e-9
-"""Share by which costs that are equal may differ."""
+UNDECIDED = "the share of cases that comply is undecided"  # verdict on dispersed cases that do not decide
+ROUNDING = 1e-9  # share by which costs that are equal may differ
 
 FARTHER = 1.1
 """Factor of distance or of time by which H ends farther off, or later, for a plan to be called worse in it."""
@@ -119,8 +115,7 @@ def exact_percent(share: float) -> str:
     return f"{100.0 * share:.10g} %"
 
 
-KEPT = {True: "kept", False: "NOT kept"}
-"""Words for a cone about a direction that the spin axis has to keep."""
+KEPT = {True: "kept", False: "NOT kept"}  # words for a cone about a direction that the spin axis has to keep
 
 COUNT = "cases that comply"
 """Name of the row of the decision and of the column of the comparison that count dispersed cases."""
@@ -269,8 +264,7 @@ def lasting(flown: Flight) -> str:
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 
-RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
-"""Angles of a `Residual`."""
+RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")  # angles of a `Residual`
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:

@@ -36,8 +36,7 @@ PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "99.7")
 """Their names, and those on the default screen."""
 
-BOTH = "screen full"
-"""The default screen, and that of all values."""
+BOTH = "screen full"  # the default screen, and that of all values
 
 
 class StudyOutput(NamedTuple):
@@ -67,8 +66,7 @@ FLOWN_OUTPUTS = (
 )
 """The outputs of a schedule, in the order of `OUTPUTS`."""
 
-NOTHING = 1e-9
-"""Values, in these units, below which a number is rounding."""
+NOTHING = 1e-9  # values, in these units, below which a number is rounding
 
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
 """Note on a case whose tank runs empty."""

@@ -38,8 +38,7 @@ WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
 
-ALIKE = ("glossary", "symbol")
-"""Kinds whose names of one paragraph mean the same."""
+ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
 _UNIT = re.compile(
     r"([-,]+(N-m(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
@@ -275,11 +274,8 @@ def flow(value: object) -> str:
     return str(value)
 
 
-WIDEST = 100
-"""Largest width of a text in columns: longer lines are hard to read."""
-
-NARROW = 60
-"""Columns below which names are above their texts, and not beside them."""
+WIDEST = 100  # largest width of a text in columns: longer lines are hard to read
+NARROW = 60  # columns below which names are above their texts, and not beside them
 
 
 def topics_screen() -> RenderableType:

@@ -20,14 +20,9 @@ from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 
-FAR = 4.0
-"""Sigmas of the file from which on a change is remarked upon."""
-
-NOTHING = 1e-3
-"""Sigmas below which a value, or a change, is zero."""
-
-MOST_PAIRS = 6
-"""Largest number of correlations named."""
+FAR = 4.0  # sigmas of the file from which on a change is remarked upon
+NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
+MOST_PAIRS = 6  # largest number of correlations named
 
 
 def in_shown(signal: str) -> tuple[str, float]:

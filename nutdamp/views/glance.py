@@ -59,11 +59,8 @@ from nutdamp.views.text import (
     small_angle,
 )
 
-NOT = "✗"
-"""Sign before a value above the requirement."""
-
-SHORT_NAMES = ("RA", "dec")
-"""Right ascension and declination, where there is little room."""
+NOT = "✗"  # sign before a value above the requirement
+SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
 
 
 class SchemeRow(NamedTuple):
@@ -240,24 +237,15 @@ def _cone(at: int, kept: str, plan: Plan) -> str:
     return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
 
 
-LINES = 24
-"""Lines of the screen."""
-
-ROWS = 6
-"""Pulses or blocks that are shown one by one; of more the first `FIRST` and the last."""
+LINES = 24  # lines of the screen
+ROWS = 6  # pulses or blocks that are shown one by one; of more the first `FIRST` and the last
 
 FIRST = 4
 
 
-TIGHTEST = 2
-"""Requirements that are shown where there is no room for all that are met."""
-
-NOTES = 3
-"""Notes that are shown, at most."""
-
-
-DIGITS = 8
-"""Figures of a value beside its limit, at most."""
+TIGHTEST = 2  # requirements that are shown where there is no room for all that are met
+NOTES = 3  # notes that are shown, at most
+DIGITS = 8  # figures of a value beside its limit, at most
 
 
 def glance(

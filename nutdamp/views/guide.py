@@ -16,8 +16,7 @@ from typing import NamedTuple, cast
 
 from nutdamp.errors import BadRequest, nearest
 
-FOLDER = Path(__file__).parents[1] / "guide"
-"""Folder of the pages."""
+FOLDER = Path(__file__).parents[1] / "guide"  # folder of the pages
 
 
 class Formula(NamedTuple):
@@ -67,8 +66,7 @@ class Topic(NamedTuple):
         return (row for block in self.blocks if isinstance(block, TopicRows) for row in block.rows)
 
 
-ENTRIES = ("schemes", "motion", "equations")
-"""Pages whose sections are topics of their own."""
+ENTRIES = ("schemes", "motion", "equations")  # pages whose sections are topics of their own
 
 
 @cache
@@ -192,8 +190,7 @@ SOURCES = (
     '24.4: lecture text "Kreiseltheorie", section 24.4',
 )
 
-OVERVIEW = "equations"
-"""Name of the table of all equations."""
+OVERVIEW = "equations"  # name of the table of all equations
 
 NAMES = (*(name for _, names in PAGES for name in names), *(topic.name for topic in (*SCHEMES, *MOTION)))
 """Names of pages, and of the topics on them that are no equations."""
@@ -279,8 +276,7 @@ class Equation(NamedTuple):
         return Topic(self.number, self.subject, parts)
 
 
-SYMBOLS = dict(page("symbols").rows)
-"""Symbols of the sources with their units."""
+SYMBOLS = dict(page("symbols").rows)  # symbols of the sources with their units
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))
 """Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""

@@ -25,11 +25,8 @@ from nutdamp.views.summary import Remark, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
-SHOWN = 40
-"""Largest number of firings in a table of a screen."""
-
-ROUNDING = 1e-12
-"""Share of the nutation that a firing leaves by rounding alone."""
+SHOWN = 40  # largest number of firings in a table of a screen
+ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
 
 
 class FiringRow(NamedTuple):

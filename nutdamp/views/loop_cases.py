@@ -42,12 +42,8 @@ SHOWN_OUTPUTS = (
 SHARED = tuple(output for output in SHOWN_OUTPUTS if output.name in ("settled", "nutation", "propellant"))
 """Outputs whose dependence on the inputs is shown."""
 
-RANKED = (*SHARED, SHOWN_OUTPUTS[-1])
-"""Outputs by which worst cases are shown."""
-
-
-NOMINAL = -1
-"""Number of the nominal case."""
+RANKED = (*SHARED, SHOWN_OUTPUTS[-1])  # outputs by which worst cases are shown
+NOMINAL = -1  # number of the nominal case
 
 
 class LoopCaseRow(NamedTuple):

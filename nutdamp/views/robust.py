@@ -26,8 +26,7 @@ from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_o
 from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
 from nutdamp.views.tolerances import in_words, stated_text
 
-MOST_ROWS = 12
-"""Largest number of candidates in the table."""
+MOST_ROWS = 12  # largest number of candidates in the table
 
 
 def robust_screen(robust: RobustComparison) -> RenderableType:

@@ -39,8 +39,7 @@ from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warni
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
-MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}
-"""Names of the two models."""
+MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
 
 
 def _direction(name: str, at: int, flight: Flight) -> str:
@@ -148,23 +147,15 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-BETWEEN = "; "
-"""Separator of the values of several pulses in one spin."""
-
-MOST_SPINS = 100_000
-"""Largest number of spins: more make no table that anyone reads."""
-
-DIGITS = 9
-"""Decimals of seconds and degrees that are written."""
+BETWEEN = "; "  # separator of the values of several pulses in one spin
+MOST_SPINS = 100_000  # largest number of spins: more make no table that anyone reads
+DIGITS = 9  # decimals of seconds and degrees that are written
 
 SAME = 1e-9
 """Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
 
-PIECES = 16
-"""Pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`."""
-
-NEWTON = 3
-"""Newton steps to the end of a turn within its piece: the second one is at rounding already."""
+PIECES = 16  # pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`
+NEWTON = 3  # Newton steps to the end of a turn within its piece: the second one is at rounding already
 
 
 class SpinRow(NamedTuple):
@@ -273,11 +264,8 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
     return turned
 
 
-SHOWN = 1e-9 * math.pi / 180.0
-"""rad; smaller differences are shown as rounding."""
-
-BUDGET = "Error budget: what each imperfection leaves, alone"
-"""The title of `budget_table`."""
+SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
+BUDGET = "Error budget: what each imperfection leaves, alone"  # the title of `budget_table`
 
 BUDGET_NOTE = (
     "Plans are tuned to what is fired, so that the rows do not add up. A row 'without' shows what the same pulses "

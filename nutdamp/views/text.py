@@ -74,11 +74,8 @@ def small_angle(angle: float) -> str:
     return in_degrees(math.radians(angle))
 
 
-FINE = 0.01
-"""Share of a limit below which what is left of it is shown as 0."""
-
-COARSE = 5e-4
-"""Degrees below which an angle without a limit is shown as 0."""
+FINE = 0.01  # share of a limit below which what is left of it is shown as 0
+COARSE = 5e-4  # degrees below which an angle without a limit is shown as 0
 
 
 def short_angle(angle: float | None, largest: float = math.inf) -> str:

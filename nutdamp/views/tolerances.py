@@ -31,15 +31,13 @@ SHOWN = {
 """Units for people of those of inputs, and the factor."""
 
 
-MOST_ROWS = 12
-"""Largest number of inputs that the budget names; the rest is summed up."""
+MOST_ROWS = 12  # largest number of inputs that the budget names; the rest is summed up
 
 
 TINY = 1e-300
 
 
-ROUNDING = 1e-12
-"""rad; a smaller variation is rounding."""
+ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
 class BudgetRow(NamedTuple):

@@ -29,14 +29,9 @@ from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
-ROWS = 18
-"""Points on the default screen, at most: evenly some of more."""
-
-TOGETHER = 1e-3
-"""s between ends that count as one."""
-
-SOONER = 0.05
-"""Share of its time by which a plan that costs as much has to end sooner to be worth a remark."""
+ROWS = 18  # points on the default screen, at most: evenly some of more
+TOGETHER = 1e-3  # s between ends that count as one
+SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
 
 FAILS = "does not meet the requirement with nominal values"
 """Name of points that do not meet the requirement of the file, or break a cone."""
