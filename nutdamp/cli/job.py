@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 
 
 DEFAULT_FILE = "spacecraft.yaml"
-
 FIGURES = ("overview", "motion", "sphere", "history")  # pictures that ``--plot`` can draw, the default first
 
 
@@ -198,11 +197,8 @@ Files = dict[str, Callable[[], Content]]
 Output = tuple[str | None, Callable[[], Content]]
 """Path of a file to write, if one is requested, and the function of its content."""
 
-UNDER_WAY = "nutdamp.cli.job"
-"""Key of the JSON file and the spacecraft of the job that has begun, in the context of a command line."""
-
-KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))
-"""Options of files that a result writes, and the views that they hold."""
+UNDER_WAY = "nutdamp.cli.job"  # key of the JSON file and the spacecraft of the job that has begun, in the context
+KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))  # options of files, and the views that they hold
 
 
 class FlownChoice(NamedTuple):

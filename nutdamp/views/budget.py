@@ -80,7 +80,6 @@ def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
 
 
 def _outlook(budget: Budget) -> Iterator[str]:
-    """Course of the nutation without firing, and the time when damping must begin."""
     body, limit = budget.spacecraft, budget.largest
     now = degrees(body.nutation)
     if body.growth == 0.0:
@@ -104,7 +103,6 @@ def _outlook(budget: Budget) -> Iterator[str]:
 
 
 def _warnings(budget: Budget) -> Iterator[str]:
-    """Warnings of thresholds that waste propellant, of the present spin, and of a missing limit cycle."""
     body = budget.spacecraft
     warned: set[str] = set()
     for row in budget.held:
@@ -146,7 +144,6 @@ def _warnings_of_row(row: HeldNutation, budget: Budget) -> Iterator[str]:
 
 
 def _notes(budget: Budget) -> Iterator[str]:
-    """Notes on the bounds of the limit cycle, and on the accuracy of the figures."""
     known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
     if known:
         yield f"accuracy: {100.0 * max(known):.1g} % (one sigma), at the present spin"

@@ -76,9 +76,7 @@ def needless(compared: Comparison) -> str | None:
 
 UNDECIDED = "the share of cases that comply is undecided"  # verdict on dispersed cases that do not decide
 ROUNDING = 1e-9  # share by which costs that are equal may differ
-
-FARTHER = 1.1
-"""Factor of distance or of time by which H ends farther off, or later, for a plan to be called worse in it."""
+FARTHER = 1.1  # factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
 
 
 def cases_verdict(share: float, probability: float) -> str:
@@ -116,9 +114,7 @@ def exact_percent(share: float) -> str:
 
 
 KEPT = {True: "kept", False: "NOT kept"}  # words for a cone about a direction that the spin axis has to keep
-
-COUNT = "cases that comply"
-"""Name of the row of the decision and of the column of the comparison that count dispersed cases."""
+COUNT = "cases that comply"  # name of the row of the decision and of the column of the comparison
 
 
 def verdict(decision: Decision) -> str:
@@ -441,9 +437,8 @@ def decision_json(decision: Decision) -> dict[str, Any]:
         "met": decision.met,
         "verdict": verdict(decision),
         "requirement": [_line_json(line) for line in decision.lines],
-        "cases": None
-        if cases is None
-        else {
+        "cases": cases
+        and {
             "samples": cases.samples,
             "seed": cases.seed,
             "met_fraction": cases.complying,
@@ -478,13 +473,11 @@ PROVES = (
     "act at once, and for the others gained is at least the integral of cost_per_s times (q - 1) where q is above 1"
 )
 
-
 MODEL = (
     "small angles, symmetric body, spin as at t = 0: exact for the nutation as long as nothing changes the spin, of "
     "first order for the direction of H; impulses of any size at once for channels with acts_at_once, at most the full "
     "torque at a time for the others"
 )
-
 
 NOT_COUNTED = (
     "gaps, ticks, least and longest on-times, max_pulses, that channels may not be on together, valves, cold nozzles "

@@ -78,10 +78,8 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     """
     rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
-    how, ideal = (
-        model_name(plan.pulses for plan in compared.plans),
-        [plan.scheme for plan in compared.plans if plan.pulses.idealised],
-    )
+    how = model_name(plan.pulses for plan in compared.plans)
+    ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
     title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
     return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
@@ -193,7 +191,6 @@ def _over(whole: float) -> Callable[[Plan], float | None]:
 
 
 def _directions(body: Spacecraft) -> Iterator[Column]:
-    """The two angles of the final spin axis, and of H in files."""
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     for which in ("axis", "momentum"):
@@ -214,7 +211,6 @@ def _shown_direction(at: int, plan: Plan) -> str:
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
-    """Residuals of each plan in the parts of the requirement, and of the cones; a sign where that breaks a bound."""
     if not requirements.judged(compared.spacecraft):
         return
     for bound in requirements.required(compared.spacecraft):
@@ -425,15 +421,10 @@ def _fitted(
 
 def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the decision on top."""
-    decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
-    results: list[RenderableType] = [
-        Text(),
-        derived_table(compared.spacecraft),
-        Text(),
-        scheme_table(compared, compared.recommended).transposed("full"),
-    ]
-    needless = decisions.needless(compared)
-    parts: list[RenderableType] = [name]
+    decided, needless = decide(compared), decisions.needless(compared)
+    schemes = scheme_table(compared, compared.recommended).transposed("full")
+    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), schemes]
+    parts: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
     if needless is not None:
         parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]

@@ -167,7 +167,7 @@ def _plain(text: str) -> str:
     return _LINK.sub(shown, " ".join(text.split()))
 
 
-PAGES = (
+PAGES = (  # the pages in groups
     ("To begin", ("tutorial", "reading", "cases", "glossary")),
     (
         "How to",
@@ -177,11 +177,8 @@ PAGES = (
     ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
     ("The project", ("contributing", "speed", "changes")),
 )
-"""The pages in groups."""
 
-FILE = "file"
-"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.explain`)."""
-
+FILE = "file"  # name of the topic on the spacecraft file, made from the models that read it (`views.explain`)
 SCHEMES, MOTION = entries("schemes"), entries("motion")
 
 SOURCES = (

@@ -286,7 +286,6 @@ def _names(column: Column) -> list[str]:
 
 
 def _parts(column: Column, row: Any) -> list[Any]:
-    """Cells of a file: one, or three of a vector."""
     value = column.value(row)
     if "#" in column.key:
         return [math.nan] * 3 if value is None else [float(part) for part in value]
