@@ -113,7 +113,6 @@ def verify_command(job: Job, looped: bool, verbose: bool) -> None:
 
 
 def _verify_loop(job: Job) -> None:
-    """The closed loop of the file against the same by DOP853."""
     from nutdamp.api import verify_loop
 
     with job.working("verifying"):

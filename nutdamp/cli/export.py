@@ -116,7 +116,7 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is None and (inertia or at is not None):
         raise click.UsageError("--inertia and --at say what to merge: name the spacecraft file with --into")
 
-    from nutdamp.files.ccsds.read import contradictions, imported, read_apm
+    from nutdamp.files.ccsds.read import contradictions, imported, merged_text, read_apm
     from nutdamp.files.telemetry import is_history, read_history
     from nutdamp.flight.propagation import flown
     from nutdamp.views.pulses import pulse_table
@@ -124,8 +124,6 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
     if into is not None:
         if schedule is not None:
             raise click.UsageError("--schedule writes the manoeuvres of a message that makes a spacecraft file")
-        from nutdamp.files.ccsds.read import merged_text
-
         message = read_history(file) if is_history(file) else read_apm(file)
         for entry in message.remarks:
             job.remark(f"{file}: {entry}")
@@ -145,11 +143,8 @@ def import_command(job: Job, given: tuple[str, ...], into: str | None, inertia: 
         job.remark(f"{file}: {len(pulses)} manoeuvres; --schedule FILE writes them")
 
 
-POINTS = 6
-"""Horizons tried for each front where no number follows ``--trade``."""
-
-COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}
-"""Options that may come without a number, and their values then."""
+POINTS = 6  # horizons tried for each front where no number follows ``--trade``
+COUNTS = {"--disperse": SAMPLES, "--trade": POINTS}  # options that may come without a number, and their values then
 
 
 class ReportCommand(SessionCommand):
@@ -166,17 +161,15 @@ class ReportCommand(SessionCommand):
         return super().parse_args(ctx, given)
 
 
-CONTROL = (
+CONTROL = (  # options of configuration control on a page, and their subjects
     ("title", "Title of the page."),
     ("document", "Number of the document."),
     ("issue", "Issue or revision."),
     ("author", "Author of the page."),
     ("date", "Date of issue, printed as given; default that of SOURCE_DATE_EPOCH."),
 )
-"""Options of configuration control on a page, and their subjects."""
 
-CONTROLLED = "Configuration control"
-"""Their heading."""
+CONTROLLED = "Configuration control"  # their heading
 
 
 def control_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -50,9 +50,7 @@ if TYPE_CHECKING:
 
 
 DEFAULT_FILE = "spacecraft.yaml"
-
-FIGURES = ("overview", "motion", "sphere", "history")
-"""Pictures that ``--plot`` can draw, the default first."""
+FIGURES = ("overview", "motion", "sphere", "history")  # pictures that ``--plot`` can draw, the default first
 
 
 def _units(ctx: click.Context, _: click.Parameter, value: str) -> None:
@@ -148,8 +146,7 @@ def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     return lambda command: where(which(command))
 
 
-STANDARD = "-"
-"""File name that means standard input or standard output."""
+STANDARD = "-"  # file name that means standard input or standard output
 
 
 def expect_outputs(*read: str | None, **written: str | Sequence[str] | None) -> bool:
@@ -200,11 +197,8 @@ Files = dict[str, Callable[[], Content]]
 Output = tuple[str | None, Callable[[], Content]]
 """Path of a file to write, if one is requested, and the function of its content."""
 
-UNDER_WAY = "nutdamp.cli.job"
-"""Key of the JSON file and the spacecraft of the job that has begun, in the context of a command line."""
-
-KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))
-"""Options of files that a result writes, and the views that they hold."""
+UNDER_WAY = "nutdamp.cli.job"  # key of the JSON file and the spacecraft of the job that has begun, in the context
+KINDS = (("csv", "csv"), ("json", "data"), ("plot", "figure"))  # options of files, and the views that they hold
 
 
 class FlownChoice(NamedTuple):

@@ -164,7 +164,7 @@ def _explain(wrong: Exception) -> int:
     return next(status for kind, status in statuses.items() if isinstance(wrong, kind))
 
 
-COMMANDS = {
+COMMANDS = {  # the subcommands in the order of a first use, with their modules and their lines on the help page
     "plan": ("plan", "Plan pulse schedules that damp the nutation, and compare them."),
     "simulate": ("plan", "Propagate a scheme or a schedule; cone angles and axis track."),
     "trade": ("studies", "Trade finish time against propellant."),
@@ -182,7 +182,6 @@ COMMANDS = {
     "init": ("check", "Write a commented spacecraft file to start from."),
     "schema": ("check", "JSON Schema of the spacecraft file, for editors."),
 }
-"""The subcommands in the order of a first use, with their modules and their lines on the help page."""
 
 
 class CommandGroup(click.Group):
@@ -243,8 +242,7 @@ def group() -> None:
     """
 
 
-RARELY = 100_000
-"""New objects between two searches for cycles: loading modules makes very many objects, and few that are garbage."""
+RARELY = 100_000  # new objects between two searches for cycles: loading modules makes many, and little garbage
 
 
 def main() -> None:

@@ -23,8 +23,6 @@ from nutdamp.schemes.catalogue import SCHEMES, SUNLIT, OptionKind, Options, Sche
 if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft, Vector
 
-
-if TYPE_CHECKING:
     ParamType = click.ParamType
     Choice = click.Choice
 else:
@@ -100,8 +98,7 @@ class FolderName(FileName):
     completed_as = "dir"
 
 
-SAMPLES = 20_000
-"""Default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy."""
+SAMPLES = 20_000  # default number of cases: as `nutdamp.montecarlo.study.SAMPLES`, without loading numpy
 
 
 class OutputName(FileName):
@@ -116,11 +113,10 @@ FOLDER = FolderName()
 class UnitType(ParamType[float]):
     """A number in SI or a text with a unit, as in a spacecraft file, that passes a ``check``, or one of ``words``."""
 
-    name = "quantity"
-
     def __init__(
         self, kind: str, check: Callable[[float], object] = float, problem: str = "", **words: float | str
     ) -> None:
+        self.name = kind
         self.kind, self.check, self.problem, self.words = kind, check, problem, words
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
@@ -135,10 +131,6 @@ class UnitType(ParamType[float]):
         except BadRequest:
             self.fail(self.problem, param, ctx)
         return Bare(number) if isinstance(value, str) and is_number(value) else number
-
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Form of the value on the help page; click gives a context from 8.2 on."""
-        return self.kind.upper()
 
 
 END = UnitType("time", units.end_of_flight, "expected a time after t = 0")
@@ -191,7 +183,7 @@ class Direction(ParamType[Angles]):
 class Count(ParamType[int]):
     """A whole number of cases above zero, which may be written as 1e6 or 1_000_000."""
 
-    name = "count"
+    name = "n"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """The number; a usage error for anything else."""
@@ -203,28 +195,14 @@ class Count(ParamType[int]):
             self.fail(f"{value} is not a number of cases: 1 or more, such as 100000 or 1e6", param, ctx)
         return int(number)
 
-    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:  # noqa: ARG002 - click's
-        """Form of the value on the help page."""
-        return "N"
-
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-GOAL = "Goal and motion"
-"""Heading of the options of the goal."""
-
-FASTEST = 100.0
-"""rad/s; no spacecraft spins faster, so a larger number without unit is more likely one of rpm, as a whole one is."""
-
+GOAL = "Goal and motion"  # heading of the options of the goal
+FASTEST = 100.0  # rad/s; no spacecraft spins faster: a larger number without unit is more likely one of rpm
 COUNT_FROM_ONE = click.IntRange(1)
-
-WIDEST = 26
-"""Characters of an option that its help comes beside; below a longer one."""
-
-SHARED = names_of(SchemeOptions)
-"""Options of every scheme."""
-
-
+WIDEST = 26  # characters of an option that its help comes beside; below a longer one
+SHARED = names_of(SchemeOptions)  # options of every scheme
 NO_SUN = f"--sun is for {' and '.join(SUNLIT)}, which is not planned here"
 
 

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from nutdamp.spacecraft.model import Spacecraft
 
 
-JITTER_SEED = 1
-"""Seed of the errors of the Sun pulses from which blocks are fired: the same in every run."""
+JITTER_SEED = 1  # seed of the errors of the Sun pulses from which blocks are fired: the same in every run
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
@@ -157,8 +156,7 @@ def _fired(job: Job, path: str, *, jitter: bool) -> Plan:
     return Plan(body, printable(path), pulses, options=job.options.of(SchemeOptions), from_file=True)
 
 
-PRIMER = "primer"
-"""The picture of the certificate; the others are of one plan."""
+PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 
 
 @click.command("plan", cls=SessionCommand)

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from nutdamp.planning.decision import Comparison
 
 
-NARROWEST = 20
-"""Characters of a line at least."""
+NARROWEST = 20  # characters of a line at least
 
 
 def visible(text: str) -> str:
@@ -83,8 +82,7 @@ class _Visible:
             yield Segment(text if control else visible(text), style, control)
 
 
-UNITS = "nutdamp.units"
-"""Key of ``--units`` in the context of a command line."""
+UNITS = "nutdamp.units"  # key of ``--units`` in the context of a command line
 
 
 def units_of_screen() -> AbstractContextManager[None]:
@@ -93,8 +91,7 @@ def units_of_screen() -> AbstractContextManager[None]:
     return screen_units(SI if context is None else context.meta.get(UNITS, SI))
 
 
-DEBUG = "nutdamp.debug"
-"""Key of ``--debug`` in the context of a command line."""
+DEBUG = "nutdamp.debug"  # key of ``--debug`` in the context of a command line
 
 
 def _debugging(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -117,11 +114,8 @@ def show_failures(compared: Comparison) -> bool:
     return bool(compared.failed)
 
 
-PATIENCE = 1.0
-"""Seconds that pass before progress is shown."""
-
-BELIEVED = 0.1
-"""Share of the steps that have to be done before a time left is named."""
+PATIENCE = 1.0  # seconds that pass before progress is shown
+BELIEVED = 0.1  # share of the steps that have to be done before a time left is named
 
 
 @contextmanager

@@ -241,8 +241,7 @@ def fit_command(job: Job, telemetry: str, sun_pulses: str | None, at: float, ahe
     job.deliver(fitted, partial(fit_screen, fitted.core, at, prospects, verbose=verbose), more=files)
 
 
-FIGURES = ("overview", "cases", "momentum")
-"""Figures that ``--plot`` draws."""
+FIGURES = ("overview", "cases", "momentum")  # figures that ``--plot`` draws
 
 
 @click.command("disperse", cls=SessionCommand)

@@ -18,8 +18,7 @@ from nutdamp.views.summary import opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, lasting, most, quantity
 
-SLOW = 0.1
-"""Share of its spin by which a year may change it before figures of the present spin mislead."""
+SLOW = 0.1  # share of its spin by which a year may change it before figures of the present spin mislead
 
 
 def _of_cycle(name: str, scale: float = 1.0) -> Callable[[HeldNutation], float | None]:
@@ -81,7 +80,6 @@ def budget_screen(budget: Budget, *, verbose: bool = True) -> RenderableType:
 
 
 def _outlook(budget: Budget) -> Iterator[str]:
-    """Course of the nutation without firing, and the time when damping must begin."""
     body, limit = budget.spacecraft, budget.largest
     now = degrees(body.nutation)
     if body.growth == 0.0:
@@ -105,7 +103,6 @@ def _outlook(budget: Budget) -> Iterator[str]:
 
 
 def _warnings(budget: Budget) -> Iterator[str]:
-    """Warnings of thresholds that waste propellant, of the present spin, and of a missing limit cycle."""
     body = budget.spacecraft
     warned: set[str] = set()
     for row in budget.held:
@@ -147,7 +144,6 @@ def _warnings_of_row(row: HeldNutation, budget: Budget) -> Iterator[str]:
 
 
 def _notes(budget: Budget) -> Iterator[str]:
-    """Notes on the bounds of the limit cycle, and on the accuracy of the figures."""
     known = [row.cycle.doubt for row in budget.held if row.cycle is not None]
     if known:
         yield f"accuracy: {100.0 * max(known):.1g} % (one sigma), at the present spin"

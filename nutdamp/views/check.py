@@ -54,7 +54,7 @@ def channel_table(spacecraft: Spacecraft) -> DataTable:
     return DataTable("Channels", columns, capability.channel_steps(spacecraft))
 
 
-VALVES = (
+VALVES = (  # columns of pulses of valves that are alike
     Column("", Shared.CHANNEL, "", lambda alike: ", ".join(pulse.channel.name for pulse in alike), where="screen",
            kind=TEXT),
     Column("on_time_s", "on-time commanded", "", lambda alike: alike[0].on_time, duration, "screen json"),
@@ -62,7 +62,6 @@ VALVES = (
     Column("impulse_Nms", Shared.IMPULSE, "N m s", lambda alike: alike[0].impulse, to_figures(4), "screen json"),
     Column("centroid_s", "centroid after the start", "", lambda alike: alike[0].centroid, duration, "screen json"),
 )  # fmt: skip
-"""Columns of pulses of valves that are alike."""
 
 
 def valve_table(spacecraft: Spacecraft) -> DataTable:
@@ -137,13 +136,12 @@ def _effects(row: Consequence) -> Iterator[str]:
         yield f"changes the spin by {row.spin_rate:.4g} rad/s²"
 
 
-TOLERANCES = (
+TOLERANCES = (  # columns of tolerances by their name, distribution and size, and the thrusters that they are given for
     Column("", "dispersion", "", lambda row: in_words(row[0][0]), where="screen", kind=TEXT),
     Column("", "distribution", "", lambda row: row[0][1], where="screen", kind=TEXT),
     Column("", "one sigma or bias", "", lambda row: row[0][2], where="screen"),
     Column("", Shared.THRUSTERS, "", lambda row: ", ".join(row[1]), where="screen", kind=TEXT),
 )
-"""Columns of tolerances by their name, distribution and size, and the thrusters that they are given for."""
 
 
 def tolerance_table(spacecraft: Spacecraft) -> DataTable:
@@ -241,7 +239,6 @@ def sun_pulse_facts(spacecraft: Spacecraft) -> Iterator[tuple[str, str]]:
 
 
 def _margins(spacecraft: Spacecraft) -> DataTable:
-    """Margins of the channels of a loop before they feed the nutation; no rows for a file without one."""
     return margin_table(() if spacecraft.loop is None else margins(spacecraft, spacecraft.loop))
 
 
@@ -327,7 +324,6 @@ def checked_json(name: str | None, spacecraft: Spacecraft, doubts: Iterable[Faul
 
 
 def _channels_json(spacecraft: Spacecraft) -> list[dict[str, Any]]:
-    """Channels; one with a valve has the pulses of its shortest and its longest command."""
     rows, pulses = channel_table(spacecraft).json(), capability.acting(spacecraft)
     for row, channel in zip(rows, spacecraft.channels, strict=True):
         if channel.valve is not None:
@@ -351,7 +347,6 @@ def _spin_axis_json(spacecraft: Spacecraft) -> dict[str, Any]:
 
 
 def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """Times of the Sun pulses, and capability of command blocks; None without Sun or sensor in the file."""
     clock, commands = capability.sun_clock(spacecraft), spacecraft.commands
     if clock is None:
         return None
@@ -367,7 +362,6 @@ def _sun_pulses_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
 
 
 def _dispersions_json(spacecraft: Spacecraft) -> dict[str, Any] | None:
-    """Inputs that a study could draw, sizes in SI or as factors, and those without effect on any actuator."""
     if spacecraft.dispersions is None:
         return None
     inputs, unused = reachable(spacecraft)

@@ -46,8 +46,7 @@ if TYPE_CHECKING:
     from nutdamp.schemes.optimal.linear_program import Burn
 
 
-VERDICT = {True: "met", False: "NOT met", None: MISSING}
-"""Words for the values of `Plan.meets_requirement`."""
+VERDICT = {True: "met", False: "NOT met", None: MISSING}  # words for the values of `Plan.meets_requirement`
 
 
 def no_plan(plan: Plan) -> str:
@@ -75,14 +74,9 @@ def needless(compared: Comparison) -> str | None:
     return f"{there}: {verdict}{lasting}"
 
 
-UNDECIDED = "the share of cases that comply is undecided"
-"""Verdict on dispersed cases that do not decide."""
-
-ROUNDING = 1e-9
-"""Share by which costs that are equal may differ."""
-
-FARTHER = 1.1
-"""Factor of distance or of time by which H ends farther off, or later, for a plan to be called worse in it."""
+UNDECIDED = "the share of cases that comply is undecided"  # verdict on dispersed cases that do not decide
+ROUNDING = 1e-9  # share by which costs that are equal may differ
+FARTHER = 1.1  # factor of distance or of time by which H ends farther off, or later, for a plan to be worse in it
 
 
 def cases_verdict(share: float, probability: float) -> str:
@@ -119,11 +113,8 @@ def exact_percent(share: float) -> str:
     return f"{100.0 * share:.10g} %"
 
 
-KEPT = {True: "kept", False: "NOT kept"}
-"""Words for a cone about a direction that the spin axis has to keep."""
-
-COUNT = "cases that comply"
-"""Name of the row of the decision and of the column of the comparison that count dispersed cases."""
+KEPT = {True: "kept", False: "NOT kept"}  # words for a cone about a direction that the spin axis has to keep
+COUNT = "cases that comply"  # name of the row of the decision and of the column of the comparison
 
 
 def verdict(decision: Decision) -> str:
@@ -269,8 +260,7 @@ def lasting(flown: Flight) -> str:
     return f"{end}; changed further by {' and '.join(causes)}" if causes else ""
 
 
-RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")
-"""Angles of a `Residual`."""
+RESIDUAL = ("nutation", "body_cone", "space_cone", "momentum_shift", "axis_error")  # angles of a `Residual`
 
 
 def heading(spacecraft: Spacecraft) -> dict[str, Any]:
@@ -447,9 +437,8 @@ def decision_json(decision: Decision) -> dict[str, Any]:
         "met": decision.met,
         "verdict": verdict(decision),
         "requirement": [_line_json(line) for line in decision.lines],
-        "cases": None
-        if cases is None
-        else {
+        "cases": cases
+        and {
             "samples": cases.samples,
             "seed": cases.seed,
             "met_fraction": cases.complying,
@@ -484,13 +473,11 @@ PROVES = (
     "act at once, and for the others gained is at least the integral of cost_per_s times (q - 1) where q is above 1"
 )
 
-
 MODEL = (
     "small angles, symmetric body, spin as at t = 0: exact for the nutation as long as nothing changes the spin, of "
     "first order for the direction of H; impulses of any size at once for channels with acts_at_once, at most the full "
     "torque at a time for the others"
 )
-
 
 NOT_COUNTED = (
     "gaps, ticks, least and longest on-times, max_pulses, that channels may not be on together, valves, cold nozzles "

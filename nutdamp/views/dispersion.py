@@ -36,8 +36,7 @@ PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.7)
 LEVELS, BRIEFLY = tuple(f"{percent:g}" for percent in PERCENTS), ("50", "95", "99.7")
 """Their names, and those on the default screen."""
 
-BOTH = "screen full"
-"""The default screen, and that of all values."""
+BOTH = "screen full"  # the default screen, and that of all values
 
 
 class StudyOutput(NamedTuple):
@@ -60,15 +59,13 @@ class StudyOutput(NamedTuple):
         return f"{self.heading}, {self.shown_unit[0]}" if self.unit else self.heading
 
 
-FLOWN_OUTPUTS = (
+FLOWN_OUTPUTS = (  # the outputs of a schedule, in the order of `OUTPUTS`
     *(StudyOutput(part.value, f"{part.value}_deg", part.label) for part in (Part.NUTATION, Part.SHIFT, Part.DISTANCE)),
     StudyOutput("spin_change", "spin_change_rad_s", "spin change", "mrad/s", 1e3),
     StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
 )
-"""The outputs of a schedule, in the order of `OUTPUTS`."""
 
-NOTHING = 1e-9
-"""Values, in these units, below which a number is rounding."""
+NOTHING = 1e-9  # values, in these units, below which a number is rounding
 
 EMPTY = "the pulses take more propellant than there is, so that the last ones do not fire, and it does not comply"
 """Note on a case whose tank runs empty."""
@@ -153,12 +150,10 @@ def _title(results: Results, scheme: str) -> Text:
 
 
 def _again(results: Results) -> str:
-    """Options that show the worst case alone."""
     return f"--seed {results.study.seed} --case {results.worst.cases[0] + 1}"
 
 
 def _varies(results: Results) -> bool:
-    """True where any input varies from case to case."""
     return any(entry.sigma for entry in results.study.model.inputs.drawn)
 
 
@@ -218,13 +213,12 @@ def percentile_row(
     return row
 
 
-PERCENTILES = (
+PERCENTILES = (  # columns of rows of texts: the name without a key, the values by the names of `percentiles_json`
     Column("", "", "", itemgetter(""), where=BOTH, kind=TEXT),
     Column("", Shared.NOMINAL, "", itemgetter("nominal"), where=BOTH),
     *(Column("", f"{key} %", "", itemgetter(key), where=BOTH if key in BRIEFLY else "full") for key in LEVELS),
     Column("", Shared.MOST, "", itemgetter("max"), where=BOTH),
 )
-"""Columns of rows of texts: the name without a key, the values by the names of `percentiles_json`."""
 
 
 def shown(column: str, value: float) -> float:
@@ -317,7 +311,6 @@ def _cones(results: Results | LoopResults) -> Iterator[tuple[Keep, dict[str, Any
 
 
 def _emptied(results: Results) -> Iterator[Text]:
-    """Number of cases in which the tank runs empty, where any does."""
     if results.emptied:
         share = decisions.percent(results.emptied / results.done, 1.0 - results.probability)
         yield Text.assemble(("Tank ", "bold"), (f"empty too soon in {share} of cases", "red"), f": {EMPTY}.")
@@ -377,7 +370,6 @@ def _angle(cone: int, which: str, row: Mapping[str, Any]) -> float:
 
 
 def _contributors(study: Study, row: Mapping[str, Any]) -> str:
-    """The three inputs that count most in a case, by name and size in sigmas."""
     inputs = study.model.inputs.drawn
     effects = np.hypot(*(study.first_order.effects(output) for output, _ in tolerances.budgeted_outputs(study)))
     sigmas = [(row["inputs"][entry.name] - entry.nominal) / (entry.sigma or math.inf) for entry in inputs]
@@ -408,7 +400,6 @@ def angles_json(spacecraft: Spacecraft, angles: Array) -> dict[str, Any]:
 
 
 def _shares(results: Results) -> Iterator[dict[str, Any]]:
-    """Share of each input in each output, by first order and by the cases."""
     first = results.study.first_order
     linear = {name: first.shares(name).tolist() for name in OUTPUTS}
     effects = np.degrees(first.effects("nutation")).tolist()

@@ -48,7 +48,6 @@ class Format(NamedTuple):
 
 
 def _text(form: str, request: Request) -> str:
-    """The text of a plan in the format ``form``."""
     plan, until = request.plan, request.until
     if form == "json":
         from nutdamp.files.tabular import json_text
@@ -87,7 +86,7 @@ def _message(kind: str, request: Request) -> str:
     return message.to_xml(written) if request.xml else message.to_kvn(written)
 
 
-FORMATS = {
+FORMATS = {  # formats by name
     row.name: row
     for row in (
         Format("apm", "state and pulses (CCSDS)", message=True, dated=True),
@@ -100,7 +99,6 @@ FORMATS = {
         Format("json", "as `plan --json`"),
     )
 }
-"""Formats by name."""
 
 
 def expect_possible(form: str, *, xml: bool, until: float | None) -> None:

@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.constrain import Constrain
 from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest, listed, nearest
@@ -20,10 +19,10 @@ from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
 from nutdamp.views import guide
 from nutdamp.views.guide import Block, CommandHelp, Formula, Topic, TopicPart, TopicRows
+from nutdamp.views.tables import facts
 
 
 def _notes() -> Iterator[tuple[str, str]]:
-    """Codes of notes, with their sentences and paragraphs; values of a case stand in brackets."""
     for code, entry in guide.note_entries().items():
         sentence = re.sub(r"\{(\w+?)(_[a-zA-Z]+)?\}", lambda name: f"[{name[1].replace('_', ' ')}]", entry.sentence)
         yield code, f"{sentence} {entry.paragraph}"
@@ -38,13 +37,11 @@ WORDS: tuple[tuple[str, Callable[[], Iterable[tuple[str, str]]]], ...] = (
 )
 """Sources of words, each with its kind: pairs of names, separated by commas, and their paragraph."""
 
-ALIKE = ("glossary", "symbol")
-"""Kinds whose names of one paragraph mean the same."""
+ALIKE = ("glossary", "symbol")  # kinds whose names of one paragraph mean the same
 
-_UNIT = re.compile(
+_UNIT = re.compile(  # end of a heading with hyphens for blanks: its unit
     r"([-,]+(N-m(-s)?|kg-m²|deg(/s)?|m?rad(/s)?|rpm|s|m|N|g|kg|%|relative|sigmas?|(1|%|kg)/(day|year)))$|[-,≤≥]+$"
 )
-"""End of a heading with hyphens for blanks: its unit."""
 
 
 def explained(requested: str) -> Topic:
@@ -98,7 +95,6 @@ def _folded(name: str) -> str:
 
 
 def _bare(name: str) -> str:
-    """A heading without its unit."""
     hyphened = re.sub(r"[\s_]+", "-", name.strip())
     while (bare := _UNIT.sub("", hyphened)) not in ("", hyphened):
         hyphened = bare
@@ -242,7 +238,6 @@ def _key_sections(key: KeyGuide, every: list[KeyGuide]) -> Iterator[TopicPart]:
 
 
 def _what(field: fields.Key) -> str:
-    """The units of a quantity, the words of a choice, or the form of another value."""
     parts = list(_within(field.type))
     quantity = next((part for part in parts if isinstance(part, Quantity)), None)
     if quantity is not None:
@@ -253,14 +248,12 @@ def _what(field: fields.Key) -> str:
 
 
 def _within(annotation: Any) -> Iterator[Any]:
-    """A type, the types within it, and their annotations."""
     yield annotation
     for part in get_args(annotation):
         yield from _within(part)
 
 
 def _plain(annotation: Any) -> Any:
-    """A type without None and without annotations."""
     if get_origin(annotation) in (list, dict) or isinstance(annotation, type):
         return annotation
     return next((_plain(part) for part in get_args(annotation) if part is not type(None)), None)
@@ -275,11 +268,8 @@ def flow(value: object) -> str:
     return str(value)
 
 
-WIDEST = 100
-"""Largest width of a text in columns: longer lines are hard to read."""
-
-NARROW = 60
-"""Columns below which names are above their texts, and not beside them."""
+WIDEST = 100  # largest width of a text in columns: longer lines are hard to read
+NARROW = 60  # columns below which names are above their texts, and not beside them
 
 
 def topics_screen() -> RenderableType:
@@ -345,11 +335,7 @@ class _Pairs:
                 yield Text(name, style="dim", overflow="fold")
                 yield Padding(Text(text, overflow="fold"), (0, 0, 0, 2))
             return
-        table = Table.grid(padding=(0, 2))
-        table.add_column(style="dim", overflow="fold")
-        for name, text in self.rows:
-            table.add_row(name, Text(text, overflow="fold"))
-        yield table
+        yield facts((name, Text(text, overflow="fold")) for name, text in self.rows)
 
 
 class _Typed:

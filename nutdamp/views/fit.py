@@ -20,14 +20,9 @@ from nutdamp.views.summary import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 
-FAR = 4.0
-"""Sigmas of the file from which on a change is remarked upon."""
-
-NOTHING = 1e-3
-"""Sigmas below which a value, or a change, is zero."""
-
-MOST_PAIRS = 6
-"""Largest number of correlations named."""
+FAR = 4.0  # sigmas of the file from which on a change is remarked upon
+NOTHING = 1e-3  # sigmas below which a value, or a change, is zero
+MOST_PAIRS = 6  # largest number of correlations named
 
 
 def in_shown(signal: str) -> tuple[str, float]:
@@ -44,7 +39,6 @@ def _unit(row: Estimate) -> tuple[str, float]:
 
 
 def _scaled(name: str, row: Estimate) -> float | None:
-    """A field of an estimate in its unit; None where it is not known, or infinite."""
     value = getattr(row, name)
     return None if value is None or math.isinf(value) else value * _unit(row)[1]
 
@@ -60,7 +54,6 @@ def _file(row: Estimate) -> str | None:
 
 
 def _changed(change: float) -> str:
-    """A change in sigmas, to two digits or to whole ones."""
     return "0" if abs(change) <= NOTHING else f"{change:+.2g}" if abs(change) < 99.5 else f"{change:+.0f}"
 
 
@@ -107,20 +100,14 @@ def signal_table(fit: Fit) -> DataTable:
     columns = (
         Column("signal", "signal", "", lambda at: fit.model.signals[at], where="screen json", kind=TEXT),
         Column("samples", "samples", "", lambda at: int(of_signal[at].sum()), where="screen json", kind=WHOLE),
-        Column(
-            "outliers",
-            "outliers",
-            "",
-            lambda at: int((of_signal[at] & ~fit.used).sum()),
-            where="screen json",
-            kind=WHOLE,
-        ),
+        Column("outliers", "outliers", "", lambda at: int((of_signal[at] & ~fit.used).sum()), where="screen json",
+               kind=WHOLE),
         Column("noise_SI", "", "", lambda at: float(fit.noise[at]), where="json"),
         Column("", "noise", "", noise, where="screen"),
         Column("", "unit", "", lambda at: in_shown(fit.model.signals[at])[0], where="screen", kind=TEXT),
         Column("white", "", "", fit.white, where="json", kind=YES_NO),
         Column("", "residuals", "", verdict, where="screen", kind=TEXT),
-    )
+    )  # fmt: skip
     return DataTable("Signals", columns, range(len(of_signal)))
 
 
@@ -175,7 +162,6 @@ def fit_screen(fit: Fit, time: float, ahead: Outlook | None = None, *, verbose: 
 
 
 def _record(fit: Fit) -> str:
-    """Length of the record, and the pulses fired in it."""
     record, values = fit.model.record, fit.named
     body = fit.model.spacecraft
     wheel = values.get("wheel", body.inertia.wheel) / in_moments(body, values)[0]

@@ -59,11 +59,8 @@ from nutdamp.views.text import (
     small_angle,
 )
 
-NOT = "✗"
-"""Sign before a value above the requirement."""
-
-SHORT_NAMES = ("RA", "dec")
-"""Right ascension and declination, where there is little room."""
+NOT = "✗"  # sign before a value above the requirement
+SHORT_NAMES = ("RA", "dec")  # right ascension and declination, where there is little room
 
 
 class SchemeRow(NamedTuple):
@@ -81,10 +78,8 @@ def scheme_table(compared: Comparison, chosen: Plan | None) -> DataTable:
     """
     rows = [SchemeRow(plan, compared) for plan in compared.plans]
     mark = next((index for index, plan in enumerate(compared.plans) if plan is chosen), None)
-    how, ideal = (
-        model_name(plan.pulses for plan in compared.plans),
-        [plan.scheme for plan in compared.plans if plan.pulses.idealised],
-    )
+    how = model_name(plan.pulses for plan in compared.plans)
+    ideal = [plan.scheme for plan in compared.plans if plan.pulses.idealised]
     alone = f" (ideal impulses: {listed(ideal)})" if how == REAL_WIDTHS and ideal else ""
     title = f"Cost and residuals of each scheme with nominal values, by {how}{alone}"
     return DataTable(title, tuple(_columns(compared, chosen)), rows, compared, mark)
@@ -196,7 +191,6 @@ def _over(whole: float) -> Callable[[Plan], float | None]:
 
 
 def _directions(body: Spacecraft) -> Iterator[Column]:
-    """The two angles of the final spin axis, and of H in files."""
     keys = ("tilt_deg", "azimuth_deg") if body.attitude is None else ("right_ascension_deg", "declination_deg")
     names = angle_names(body) if body.attitude is None else SHORT_NAMES
     for which in ("axis", "momentum"):
@@ -217,7 +211,6 @@ def _shown_direction(at: int, plan: Plan) -> str:
 
 
 def _bounds(compared: Comparison) -> Iterator[Column]:
-    """Residuals of each plan in the parts of the requirement, and of the cones; a sign where that breaks a bound."""
     if not requirements.judged(compared.spacecraft):
         return
     for bound in requirements.required(compared.spacecraft):
@@ -240,24 +233,15 @@ def _cone(at: int, kept: str, plan: Plan) -> str:
     return next(f"{NOT} " * (left < -SLACK) + degrees(angle).removesuffix(" deg") for angle, left in angles)
 
 
-LINES = 24
-"""Lines of the screen."""
-
-ROWS = 6
-"""Pulses or blocks that are shown one by one; of more the first `FIRST` and the last."""
+LINES = 24  # lines of the screen
+ROWS = 6  # pulses or blocks that are shown one by one; of more the first `FIRST` and the last
 
 FIRST = 4
 
 
-TIGHTEST = 2
-"""Requirements that are shown where there is no room for all that are met."""
-
-NOTES = 3
-"""Notes that are shown, at most."""
-
-
-DIGITS = 8
-"""Figures of a value beside its limit, at most."""
+TIGHTEST = 2  # requirements that are shown where there is no room for all that are met
+NOTES = 3  # notes that are shown, at most
+DIGITS = 8  # figures of a value beside its limit, at most
 
 
 def glance(
@@ -437,15 +421,10 @@ def _fitted(
 
 def comparison_screen(compared: Comparison) -> RenderableType:
     """All tables of ``plan``, the decision on top."""
-    decided, name = decide(compared), Text(compared.spacecraft.name, style="bold")
-    results: list[RenderableType] = [
-        Text(),
-        derived_table(compared.spacecraft),
-        Text(),
-        scheme_table(compared, compared.recommended).transposed("full"),
-    ]
-    needless = decisions.needless(compared)
-    parts: list[RenderableType] = [name]
+    decided, needless = decide(compared), decisions.needless(compared)
+    schemes = scheme_table(compared, compared.recommended).transposed("full")
+    results: list[RenderableType] = [Text(), derived_table(compared.spacecraft), Text(), schemes]
+    parts: list[RenderableType] = [Text(compared.spacecraft.name, style="bold")]
     if needless is not None:
         parts.append(Text.assemble(("No pulse needed: ", "bold"), f"{needless}."))
     remarks = [note for plan in compared.plans for note in plan_notes(plan)]

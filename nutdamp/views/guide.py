@@ -16,8 +16,7 @@ from typing import NamedTuple, cast
 
 from nutdamp.errors import BadRequest, nearest
 
-FOLDER = Path(__file__).parents[1] / "guide"
-"""Folder of the pages."""
+FOLDER = Path(__file__).parents[1] / "guide"  # folder of the pages
 
 
 class Formula(NamedTuple):
@@ -67,8 +66,7 @@ class Topic(NamedTuple):
         return (row for block in self.blocks if isinstance(block, TopicRows) for row in block.rows)
 
 
-ENTRIES = ("schemes", "motion", "equations")
-"""Pages whose sections are topics of their own."""
+ENTRIES = ("schemes", "motion", "equations")  # pages whose sections are topics of their own
 
 
 @cache
@@ -169,7 +167,7 @@ def _plain(text: str) -> str:
     return _LINK.sub(shown, " ".join(text.split()))
 
 
-PAGES = (
+PAGES = (  # the pages in groups
     ("To begin", ("tutorial", "reading", "cases", "glossary")),
     (
         "How to",
@@ -179,11 +177,8 @@ PAGES = (
     ("Theory", ("schemes", "motion", "equations", "symbols", "limits")),
     ("The project", ("contributing", "speed", "changes")),
 )
-"""The pages in groups."""
 
-FILE = "file"
-"""Name of the topic on the spacecraft file, which is made from the models that read it (`nutdamp.views.explain`)."""
-
+FILE = "file"  # name of the topic on the spacecraft file, made from the models that read it (`views.explain`)
 SCHEMES, MOTION = entries("schemes"), entries("motion")
 
 SOURCES = (
@@ -192,8 +187,7 @@ SOURCES = (
     '24.4: lecture text "Kreiseltheorie", section 24.4',
 )
 
-OVERVIEW = "equations"
-"""Name of the table of all equations."""
+OVERVIEW = "equations"  # name of the table of all equations
 
 NAMES = (*(name for _, names in PAGES for name in names), *(topic.name for topic in (*SCHEMES, *MOTION)))
 """Names of pages, and of the topics on them that are no equations."""
@@ -279,8 +273,7 @@ class Equation(NamedTuple):
         return Topic(self.number, self.subject, parts)
 
 
-SYMBOLS = dict(page("symbols").rows)
-"""Symbols of the sources with their units."""
+SYMBOLS = dict(page("symbols").rows)  # symbols of the sources with their units
 
 EQUATIONS = tuple(map(Equation.of, entries("equations")))
 """Equations of Magnus 1970, of the lecture texts "Kreisel-Bewegungen" and "Kreiseltheorie", and of nutdamp itself."""

@@ -25,11 +25,8 @@ from nutdamp.views.summary import Remark, opening, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, moment, most, small_angle
 
-SHOWN = 40
-"""Largest number of firings in a table of a screen."""
-
-ROUNDING = 1e-12
-"""Share of the nutation that a firing leaves by rounding alone."""
+SHOWN = 40  # largest number of firings in a table of a screen
+ROUNDING = 1e-12  # share of the nutation that a firing leaves by rounding alone
 
 
 class FiringRow(NamedTuple):
@@ -51,9 +48,8 @@ def _apart(value: float) -> str:
 
 FIRINGS = (
     Column("", "firing", "", lambda row: row.at + 1, where="screen verified", kind=WHOLE),
-    Column(
-        "channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json", kind=TEXT
-    ),
+    Column("channel", Shared.CHANNEL, "", lambda row: row.firing.pulse.channel, where="verified verified_json",
+           kind=TEXT),
     Column("", Shared.START, "s", lambda row: row.firing.pulse.start, seconds, "screen"),
     Column("start_s", Shared.START, "s", lambda row: row.firing.pulse.loaded[0], seconds, "verified verified_json"),
     Column("start_difference_s", "differs by", "s", lambda row: row.apart[0], _apart, "verified verified_json"),
@@ -66,15 +62,9 @@ FIRINGS = (
     Column("", "before", "deg", angle_of("before"), small_angle, "screen"),
     Column("", "after", "deg", angle_of("after"), small_angle, "screen"),
     Column("", "nutation", "deg", angle_of("firing.true_nutation"), small_angle, "verified"),
-    Column(
-        "nutation_difference_deg",
-        "differs by",
-        "deg",
-        lambda row: math.degrees(row.apart[2]),
-        _apart,
-        "verified verified_json",
-    ),
-)
+    Column("nutation_difference_deg", "differs by", "deg", lambda row: math.degrees(row.apart[2]), _apart,
+           "verified verified_json"),
+)  # fmt: skip
 
 
 def firing_table(run: LoopRun) -> DataTable:
@@ -129,7 +119,6 @@ def loop_screen(plan: LoopPlan, *, verbose: bool = True) -> RenderableType:
 
 
 def _remarks(plan: LoopPlan, decision: Decision) -> Iterator[Remark]:
-    """Notes on the run: idealisations, dead band, margin, law and sensor."""
     run = plan.flown_run
     yield from decision_notes(decision, looped=True)
     band = f"dead band at most {degrees(plan.band.most)} in {100.0 * SURELY:g} % of cases as it falls quiet"
@@ -145,7 +134,6 @@ def _remarks(plan: LoopPlan, decision: Decision) -> Iterator[Remark]:
 
 
 def _verdict(plan: LoopPlan, decision: Decision) -> Iterator[Text]:
-    """The verdict on a run, or the reason for its stop."""
     run = plan.flown_run
     if run.stop.fault:
         yield Text.assemble(("Stopped: ", "bold red"), f"{stopped(run)}.")

@@ -27,7 +27,7 @@ from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, to_figu
 from nutdamp.views.text import degrees, duration
 from nutdamp.views.tolerances import MOST_ROWS, correlation_json, in_words, inputs_table, size_text, unused_table
 
-SHOWN_OUTPUTS = (
+SHOWN_OUTPUTS = (  # the outputs, in the order of `OUTPUTS`
     StudyOutput("settled", "settled_s", "first quiet", "s"),
     StudyOutput("quiet", "quiet_nutation_deg", "left then"),
     StudyOutput("nutation", "largest_nutation_deg", "largest"),
@@ -37,17 +37,12 @@ SHOWN_OUTPUTS = (
     StudyOutput("propellant", "propellant_kg", "propellant", "g", 1e3),
     StudyOutput("firings", "firings", "firings", ""),
 )
-"""The outputs, in the order of `OUTPUTS`."""
 
 SHARED = tuple(output for output in SHOWN_OUTPUTS if output.name in ("settled", "nutation", "propellant"))
 """Outputs whose dependence on the inputs is shown."""
 
-RANKED = (*SHARED, SHOWN_OUTPUTS[-1])
-"""Outputs by which worst cases are shown."""
-
-
-NOMINAL = -1
-"""Number of the nominal case."""
+RANKED = (*SHARED, SHOWN_OUTPUTS[-1])  # outputs by which worst cases are shown
+NOMINAL = -1  # number of the nominal case
 
 
 class LoopCaseRow(NamedTuple):
@@ -61,7 +56,6 @@ class LoopCaseRow(NamedTuple):
 
 
 def _value(output: StudyOutput, row: LoopCaseRow) -> float | int | None:
-    """An output in the unit of its key; None where it is not known."""
     value = row.values[OUTPUTS.index(output.name)]
     if math.isnan(value):
         return None
@@ -78,7 +72,6 @@ def _angle(at: int, row: LoopCaseRow) -> float:
 
 
 def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
-    """Columns of a case: its number (from 1), true inputs, outputs, angles to cones."""
     yield Column("case", Shared.CASE, "", lambda row: row.case + 1, where="screen csv", kind=WHOLE)
     named = (Shared.THIS_CASE, Shared.NOMINAL)
     yield Column("", "", "", lambda row: named[row.case == NOMINAL], where="case", kind=TEXT)
@@ -97,7 +90,6 @@ def _columns(study: LoopStudy, rows: Sequence[LoopCaseRow]) -> Iterator[Column]:
 
 
 def _largest(study: LoopStudy, row: LoopCaseRow) -> str:
-    """The three inputs that are farthest off."""
     drawn = study.model.inputs.drawn
     sigmas = [(in_words(entry.name), row.draws[entry.name] / entry.sigma) for entry in drawn if entry.sigma]
     return ", ".join(f"{name} {sigma:+.1f}" for name, sigma in sorted(sigmas, key=lambda pair: -abs(pair[1]))[:3])
@@ -182,7 +174,6 @@ def _dead_band(results: LoopResults) -> Text:
 
 
 def _shares(results: LoopResults) -> Iterator[RenderableType]:
-    """Shares of the inputs in the variance of the outputs."""
     shares = {output.name: results.shares(output.name) for output in SHARED}
     inputs = [entry for entry in results.study.model.inputs.drawn if entry.sigma]
     if not inputs or not any(shares.values()):

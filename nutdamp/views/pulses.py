@@ -18,8 +18,7 @@ from nutdamp.spacecraft.schedule import STEERABLE, Pulse, Schedule
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import digits, longitude, short_angle, small_angle, steering
 
-MILLISECONDS = 3
-"""Digits of a second that tables show of a date."""
+MILLISECONDS = 3  # digits of a second that tables show of a date
 
 
 class PulseRow(NamedTuple):
@@ -190,8 +189,7 @@ def block_table(flown: Flight) -> DataTable:
     return DataTable("Command blocks", BLOCKS, rows, flown.schedule)
 
 
-EVENLY = 8
-"""Largest number of pulses of a block on a screen: the first, the last, and evenly some between."""
+EVENLY = 8  # largest number of pulses of a block on a screen: the first, the last, and evenly some between
 
 
 def shown_rows(table: DataTable, blocks: tuple[Block, ...]) -> DataTable:

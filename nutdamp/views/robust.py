@@ -26,8 +26,7 @@ from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_o
 from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
 from nutdamp.views.tolerances import in_words, stated_text
 
-MOST_ROWS = 12
-"""Largest number of candidates in the table."""
+MOST_ROWS = 12  # largest number of candidates in the table
 
 
 def robust_screen(robust: RobustComparison) -> RenderableType:
@@ -169,7 +168,6 @@ def _columns(robust: RobustComparison) -> Iterator[Column]:
 
 
 def _candidates(robust: RobustComparison) -> list[RenderableType]:
-    """The best candidates, with the chosen one and the usual one, and a note on the others."""
     named = list(robust.candidates[:MOST_ROWS])
     named += [entry for entry in (robust.chosen, robust.usual) if entry is not None and entry not in named]
     rest, fewer = len(robust.candidates) - len(named), [f"{count:,}" for count in _fewer(robust)]
@@ -185,7 +183,6 @@ def _candidates(robust: RobustComparison) -> list[RenderableType]:
 
 
 def _fresh(robust: RobustComparison) -> Iterator[str]:
-    """Result of the plan in new cases; nothing where none were flown."""
     if robust.fresh is not None and robust.chosen is not None:
         cases = robust.fresh.cases
         shares = (robust.fresh.met, *robust.fresh.interval)

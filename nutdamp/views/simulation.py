@@ -1,9 +1,7 @@
 """The simulation of a schedule and its verification: ends, cone angles around each pulse, extremes of the axis track.
 
-Also the schedule spin by spin, as operators of spinners count: one row a spin, with its firings. Where the file has a
-Sun sensor a spin begins with its pulse, 1 with the first one, as in command blocks; the time before that is spin 0.
-Else spin 1 begins at t = 0, and each is a turn of the body about axis 3: ∫ω3 dt grows by 2π. ``verify`` sets methods
-side by side, with conserved quantities and the effect of each imperfection.
+Also the schedule spin by spin. Where the file has a Sun sensor a spin begins with its pulse, 1 with the first one, as
+in command blocks; the time before that is spin 0. Else spin 1 begins at t = 0, and in each ∫ω3 dt grows by 2π.
 """
 
 from __future__ import annotations
@@ -39,8 +37,7 @@ from nutdamp.views.summary import Remark, blocks_screen, opening, summary, warni
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 
-MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}
-"""Names of the two models."""
+MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
 
 
 def _direction(name: str, at: int, flight: Flight) -> str:
@@ -48,7 +45,6 @@ def _direction(name: str, at: int, flight: Flight) -> str:
 
 
 def _columns(simulation: Simulation) -> Iterator[Column]:
-    """Residuals and directions at the end of a flight by one of the models."""
     body = simulation.flown.spacecraft
     yield Column("", "model", "", lambda flight: MODELS[flight.model], where="screen", kind=TEXT)
     names = ["nutation", "body_cone", "space_cone", "momentum_shift", *["axis_error"] * (body.goal.axis is not None)]
@@ -86,7 +82,6 @@ def simulation_screen(simulation: Simulation, *, verbose: bool = True) -> Render
 
 
 def _fired(simulation: Simulation) -> Iterator[RenderableType]:
-    """Blocks and pulses of the track."""
     flight, schedule = simulation.shown, simulation.shown.schedule
     if schedule.blocks:
         yield blocks_screen(flight, simulation.plan.delta_v)
@@ -148,23 +143,12 @@ def simulation_json(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-BETWEEN = "; "
-"""Separator of the values of several pulses in one spin."""
-
-MOST_SPINS = 100_000
-"""Largest number of spins: more make no table that anyone reads."""
-
-DIGITS = 9
-"""Decimals of seconds and degrees that are written."""
-
-SAME = 1e-9
-"""Share of a spin after t = 0 within which the first Sun pulse comes at once, and there is no spin before it."""
-
-PIECES = 16
-"""Pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`."""
-
-NEWTON = 3
-"""Newton steps to the end of a turn within its piece: the second one is at rounding already."""
+BETWEEN = "; "  # separator of the values of several pulses in one spin
+MOST_SPINS = 100_000  # largest number of spins: more make no table that anyone reads
+DIGITS = 9  # decimals of seconds and degrees that are written
+SAME = 1e-9  # share of a spin after t = 0 within which the first Sun pulse comes at once: no spin is before it
+PIECES = 16  # pieces of each turn over which ω3 is integrated by `end_state.LEGENDRE`
+NEWTON = 3  # Newton steps to the end of a turn within its piece: the second one is at rounding already
 
 
 class SpinRow(NamedTuple):
@@ -179,7 +163,6 @@ class SpinRow(NamedTuple):
 
 
 def _several(value: Callable[[SpinRow, Pulse], float]) -> Callable[[SpinRow], str]:
-    """Seconds or degrees of each pulse of a spin."""
     return lambda row: BETWEEN.join(number(round(value(row, pulse), DIGITS)) for pulse in row.fired)
 
 
@@ -273,17 +256,12 @@ def _turned(flown: Flight, begins: Vector, ends: Vector) -> Vector:
     return turned
 
 
-SHOWN = 1e-9 * math.pi / 180.0
-"""rad; smaller differences are shown as rounding."""
-
-BUDGET = "Error budget: what each imperfection leaves, alone"
-"""The title of `budget_table`."""
-
-BUDGET_NOTE = (
+SHOWN = 1e-9 * math.pi / 180.0  # rad; smaller differences are shown as rounding
+BUDGET = "Error budget: what each imperfection leaves, alone"  # the title of `budget_table`
+BUDGET_NOTE = (  # note on `budget_table`
     "Plans are tuned to what is fired, so that the rows do not add up. A row 'without' shows what the same pulses "
     "leave without that effect, more or less."
 )
-"""Note on `budget_table`."""
 
 
 def verification_brief(plan: Plan, verification: Verification) -> RenderableType:
@@ -376,7 +354,6 @@ def budget_table(spacecraft: Spacecraft, verification: Verification) -> FittedCo
 
 
 def _missing(verification: Verification) -> list[str]:
-    """Methods that were not flown, with the reason."""
     return [f"{method.name}: {method.missing}" for method in verification.methods if method.missing]
 
 

@@ -20,11 +20,8 @@ from nutdamp.views.spacecraft import angle_names, angle_texts, derived_table, sp
 from nutdamp.views.tables import facts, lines_of
 from nutdamp.views.text import NOTE, WARNING, degrees, mass, moment, quantity, screen_line
 
-LINES = 40
-"""Lines of a default screen."""
-
-SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))
-"""Rows of the table before the last one, and notes: the first pair that fits is shown."""
+LINES = 40  # lines of a default screen
+SIZES = ((14, 3), (8, 3), (4, 3), (4, 2), (4, 1), (1, 0))  # rows before the last one, and notes: the first that fits
 
 
 Rows = Callable[..., RenderableType]

@@ -25,17 +25,10 @@ from nutdamp.common.numerics import MISSING
 from nutdamp.files.tabular import csv_text, number, truth
 from nutdamp.units import screen_unit
 
-NARROW = 60
-"""Characters below which a table becomes one block a row."""
-
-GAP = 2
-"""Characters between two columns."""
-
-WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")
-"""Pattern of the words that a column keeps on one line."""
-
-WIDTH = 80
-"""Columns of a default screen."""
+NARROW = 60  # characters below which a table becomes one block a row
+GAP = 2  # characters between two columns
+WORD = re.compile(r"(?:[<≤≥✗] )?\S+(?: %(?!\S))?")  # pattern of the words that a column keeps on one line
+WIDTH = 80  # columns of a default screen
 
 
 def lines_of(*parts: RenderableType) -> int:
@@ -293,7 +286,6 @@ def _names(column: Column) -> list[str]:
 
 
 def _parts(column: Column, row: Any) -> list[Any]:
-    """Cells of a file: one, or three of a vector."""
     value = column.value(row)
     if "#" in column.key:
         return [math.nan] * 3 if value is None else [float(part) for part in value]

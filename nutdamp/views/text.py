@@ -21,13 +21,12 @@ from nutdamp.schemes.catalogue import NAMES
 from nutdamp.units import screen_unit
 from nutdamp.views.guide import note_entries
 
-LONG = (
+LONG = (  # units of long times: their length, s, and the time, s, up to which they are used
     ("s", 1.0, 3600.0),
     ("hours", 3600.0, 172_800.0),
     ("days", 86_400.0, 63_115_200.0),
     ("years", 31_557_600.0, math.inf),
 )
-"""Units of long times: their length, s, and the time, s, up to which they are used."""
 
 
 def quantity(value: float | None, unit: str, digits: int = 4) -> str:
@@ -74,11 +73,8 @@ def small_angle(angle: float) -> str:
     return in_degrees(math.radians(angle))
 
 
-FINE = 0.01
-"""Share of a limit below which what is left of it is shown as 0."""
-
-COARSE = 5e-4
-"""Degrees below which an angle without a limit is shown as 0."""
+FINE = 0.01  # share of a limit below which what is left of it is shown as 0
+COARSE = 5e-4  # degrees below which an angle without a limit is shown as 0
 
 
 def short_angle(angle: float | None, largest: float = math.inf) -> str:
@@ -158,10 +154,8 @@ WARNING, NOTE, REASON = "warning", "note", "reason"
 """Severities: a warning may change what is fired; a reason says why a plan is recommended."""
 
 NAME = re.compile(r"\{(\w+)\}")
-
 INSTEAD = re.compile(r"\{(\w+)\} instead of \{(than_\1)\}")
-
-UNITS: dict[str, Callable[[float], str]] = {
+UNITS: dict[str, Callable[[float], str]] = {  # texts of values by the end of their names, the first that fits
     "_deg": lambda value: degrees(math.radians(value)),
     "_rad_s": lambda value: quantity(value, "rad/s"),
     "lasting_s": lasting,
@@ -172,7 +166,6 @@ UNITS: dict[str, Callable[[float], str]] = {
     "_bar": lambda value: quantity(value, "bar"),
     "_s": duration,
 }
-"""Texts of values by the end of their names, the first that fits."""
 
 
 def severity(note: Note) -> str:

@@ -21,25 +21,18 @@ from nutdamp.units import screen_unit
 from nutdamp.views.tables import TEXT, Column, DataTable, FittedColumns, Shared, facts
 from nutdamp.views.text import quantity
 
-SHOWN = {
+SHOWN = {  # units for people of those of inputs, and the factor
     "rad": ("deg", 180.0 / math.pi),
     "rad/s": ("deg/s", 180.0 / math.pi),
     "m": ("mm", 1e3),
     "s": ("ms", 1e3),
     "Pa": ("bar", 1e-5),
 }
-"""Units for people of those of inputs, and the factor."""
 
 
-MOST_ROWS = 12
-"""Largest number of inputs that the budget names; the rest is summed up."""
-
-
+MOST_ROWS = 12  # largest number of inputs that the budget names; the rest is summed up
 TINY = 1e-300
-
-
-ROUNDING = 1e-12
-"""rad; a smaller variation is rounding."""
+ROUNDING = 1e-12  # rad; a smaller variation is rounding
 
 
 class BudgetRow(NamedTuple):
@@ -81,14 +74,12 @@ def _budget_rows(study: Study) -> list[BudgetRow]:
 
 
 def _effect(first: FirstOrder, output: str, rows: list[int]) -> float:
-    """Effect of an input alone, or of correlated ones together (root mean square)."""
     if len(rows) == 1:
         return float(first.effects(output)[rows[0]])
     return float(np.linalg.norm(first.independent(output)[:, rows]))
 
 
 def _named(entries: list[DispersedInput]) -> tuple[str, str]:
-    """Name and size of an input, or of correlated ones."""
     name, size = (", ".join(map(text, entries)) for text in (lambda entry: in_words(entry.name), size_text))
     return (f"{name} (correlated)" if len(entries) > 1 else name), size
 

@@ -29,33 +29,22 @@ from nutdamp.views.summary import summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 
-ROWS = 18
-"""Points on the default screen, at most: evenly some of more."""
-
-TOGETHER = 1e-3
-"""s between ends that count as one."""
-
-SOONER = 0.05
-"""Share of its time by which a plan that costs as much has to end sooner to be worth a remark."""
-
-FAILS = "does not meet the requirement with nominal values"
-"""Name of points that do not meet the requirement of the file, or break a cone."""
-
-BELOW = (
+ROWS = 18  # points on the default screen, at most: evenly some of more
+TOGETHER = 1e-3  # s between ends that count as one
+SOONER = 0.05  # share of its time by which a plan that costs as much has to end sooner to be worth a remark
+FAILS = "does not meet the requirement with nominal values"  # or breaks a cone
+BELOW = (  # note on points that cost less than their small-angle bound
     "The small-angle bound is for plans that leave no nutation: where a cost is below it, the plan leaves a little, or "
     "its flight at larger angles needs less."
 )
-"""Note on points that cost less than their small-angle bound."""
 
-OFF = (
+OFF = (  # note on points whose H ends a little beside its target
     "With real widths, ticks and on-time limits H ends slightly off the direction that the schedules were planned for."
 )
-"""Note on points whose H ends a little beside its target."""
 
-ALIKE = (
+ALIKE = (  # note on a plan that is cheaper than the points by less than counts
     "the cheapest point that ends no later costs as much as the recommended plan within 0.1 %, which counts as equal."
 )
-"""Note on a plan that is cheaper than the points by less than counts."""
 
 
 class TradeRow(NamedTuple):
@@ -86,7 +75,6 @@ def rows_of(fronts: Sequence[Front]) -> list[TradeRow]:
 
 
 def _table(rows: Sequence[TradeRow]) -> DataTable:
-    """One row a point."""
     return DataTable("Schedules by their ends", tuple(_columns(rows)), rows)
 
 
@@ -149,7 +137,6 @@ def trade_brief(spacecraft: Spacecraft, fronts: Sequence[Front]) -> RenderableTy
 
 
 def _head(spacecraft: Spacecraft, fronts: Sequence[Front]) -> Iterator[Text]:
-    """Title, the cheapest and the earliest schedule, and the number that meet the requirement."""
     points = rows_of(fronts)
     yield Text.assemble((spacecraft.name, "bold"), f": finish time against cost; schedules: {len(points)}")
     if not points:
@@ -190,7 +177,6 @@ def front_parts(spacecraft: Spacecraft, fronts: Sequence[Front]) -> list[Rendera
 
 
 def _ends_off(fronts: Sequence[Front]) -> Iterator[str]:
-    """Note on schedules that end off a target that they were planned for."""
     off = [row.plan.flight.residual.axis_error for row in rows_of(fronts) if row.front.shift == 0.0]
     if max(off, default=0.0) > DAMPED_ANGLE:
         yield OFF
@@ -202,7 +188,6 @@ def fails(point: Point) -> bool:
 
 
 def _without_optimal(front: Front) -> str:
-    """The reason why a front has no points, or none of the scheme optimal."""
     return f"{'no schedule of optimal' if front.points else 'none'}: {front.why}"
 
 
