@@ -492,7 +492,7 @@ def export(
     """
     from nutdamp.files.tabular import write_whole
     from nutdamp.planning.plan import feasible
-    from nutdamp.views.exchange import FORMATS, export_text
+    from nutdamp.views.simulation import FORMATS, export_text
 
     form, name = units.one_of("format", format, tuple(FORMATS)), units.path("path", path)
     end = None if until is None else units.end_of_flight(until)

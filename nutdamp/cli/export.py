@@ -28,7 +28,7 @@ from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_re
 from nutdamp.cli.screen import say, show_failures
 from nutdamp.errors import BadRequest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
-from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
+from nutdamp.views.simulation import FORMATS, expect_possible, export_notes, lacking
 
 
 @click.command("export", cls=SessionCommand, context_settings={"allow_extra_args": True})

@@ -189,7 +189,7 @@ def budget_command(job: Job, pairs: tuple[Angles, ...], largest: float | None, s
         job.remark(f"--thresholds: warning: {reading}")
 
     from nutdamp.api import budget
-    from nutdamp.views.budget import budget_screen
+    from nutdamp.views.loop import budget_screen
 
     with job.working("following cycles"):
         result = budget(body, pairs, largest=largest, seed=seed)

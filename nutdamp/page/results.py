@@ -76,10 +76,10 @@ VIEWS = {
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
     "Verified.data": "views.simulation:verification_json plan.flight plan.scheme core",
     "Verified.screen": "views.simulation:verification_screen plan core",
-    "Budget.data": "views.budget:budget_json",
-    "Budget.csv": "views.budget:budget_csv",
+    "Budget.data": "views.loop:budget_json",
+    "Budget.csv": "views.loop:budget_csv",
     "Budget.figure": "figures.loop:budget_figure",
-    "Budget.screen": "views.budget:budget_screen",
+    "Budget.screen": "views.loop:budget_screen",
 }
 """Functions of results, see `nutdamp.common.results.view`."""
 

@@ -27,7 +27,7 @@ from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import reached
-from nutdamp.views.budget import _notes, _warnings
+from nutdamp.views.loop import _notes, _warnings
 
 
 def thrusters(torque: float = 6.0, least: float = 0.002, isp: float | None = 220.0) -> tuple[Channel, ...]:

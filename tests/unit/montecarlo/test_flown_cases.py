@@ -18,12 +18,12 @@ from support.flights import BODY_ERRORS, by_blocks
 from support.single_case import flown_outputs, realised, timed
 from support.spinners import commanded, flown_by_reference
 
+from nutdamp.common.numerics import cos_sin
 from nutdamp.flight import propagation
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.propagated import ClosedForm, RealWidths, nodes_for
 from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import Results, Study, run, study_of
-from nutdamp.physics.batch import cos_sin
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
