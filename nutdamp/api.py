@@ -204,7 +204,7 @@ def robust(
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
-    from nutdamp.spacecraft.tolerances import expect_dispersions
+    from nutdamp.spacecraft.equipment import expect_dispersions
 
     expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions)
     trials = search.variations_of(compared, options)

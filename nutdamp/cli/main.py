@@ -172,15 +172,15 @@ COMMANDS = {  # the subcommands in the order of a first use, with their modules 
     "budget": ("studies", "Hold the nutation: pulses a day, propellant a year."),
     "fit": ("studies", "Estimate motion, C/A and thrust from telemetry; re-plan."),
     "disperse": ("studies", "Fly many dispersed cases; percentiles, tolerance budget."),
-    "verify": ("check", "Fly a schedule by independent means; an error budget."),
-    "report": ("export", "Write a report, one page of HTML."),
+    "verify": ("files", "Fly a schedule by independent means; an error budget."),
+    "report": ("files", "Write a report, one page of HTML."),
     "animate": ("plan", "Film the body cone rolling on the space cone."),
-    "check": ("check", "Check spacecraft files: all faults, derived quantities."),
-    "export": ("export", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
-    "import": ("export", "A spacecraft file from a CCSDS attitude parameter message."),
-    "explain": ("check", "The schemes, the equations, the keys of the file, the units."),
-    "init": ("check", "Write a commented spacecraft file to start from."),
-    "schema": ("check", "JSON Schema of the spacecraft file, for editors."),
+    "check": ("files", "Check spacecraft files: all faults, derived quantities."),
+    "export": ("files", "A schedule for other tools: CCSDS, STK, Basilisk, JSON."),
+    "import": ("files", "A spacecraft file from a CCSDS attitude parameter message."),
+    "explain": ("files", "The schemes, the equations, the keys of the file, the units."),
+    "init": ("files", "Write a commented spacecraft file to start from."),
+    "schema": ("files", "JSON Schema of the spacecraft file, for editors."),
 }
 
 

@@ -201,9 +201,9 @@ def plan_command(
 
     from nutdamp.planning.decision import decide
     from nutdamp.planning.notes import comparison_warnings
-    from nutdamp.spacecraft.tolerances import expect_dispersions
+    from nutdamp.spacecraft.equipment import expect_dispersions
     from nutdamp.views.glance import scheme_table
-    from nutdamp.views.pulses import pulse_table
+    from nutdamp.views.parts import pulse_table
 
     if robust:
         expect_dispersions(body.dispersions)
@@ -244,7 +244,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
         return {}
     if source is not chosen:
         job.remark(f"writing the blocks of {source.scheme}, which is not the recommended plan")
-    from nutdamp.views.pulses import block_table
+    from nutdamp.views.parts import block_table
 
     return {"blocks": lambda: block_table(source.flight).csv()}
 

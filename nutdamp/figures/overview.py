@@ -19,7 +19,7 @@ from nutdamp.spacecraft.equipment import Channel
 from nutdamp.spacecraft.model import Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.views.spacecraft import angle_names, angle_texts
+from nutdamp.views.parts import angle_names, angle_texts
 from nutdamp.views.text import steering
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.schedule import STEERABLE, Pulse
 from nutdamp.views import decisions
 from nutdamp.views.glance import limits
-from nutdamp.views.pulses import MILLISECONDS, channel_text
+from nutdamp.views.parts import MILLISECONDS, channel_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Heading, Shared
 from nutdamp.views.text import MISSING, RPM, fixed, mass, quantity, sentence, short_angle, text
 

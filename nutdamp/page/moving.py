@@ -25,8 +25,7 @@ from nutdamp.spacecraft.constraints import channel_of
 from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
-from nutdamp.views.pulses import channel_text
-from nutdamp.views.spacecraft import angle_names, angle_texts
+from nutdamp.views.parts import angle_names, angle_texts, channel_text
 from nutdamp.views.text import MISSING, most, quantity
 
 ROWS_A_TURN, LEAST_ROWS, MOST_ROWS = 24, 600, 2400

@@ -62,9 +62,8 @@ from nutdamp.views import decisions, glance, guide
 from nutdamp.views.check import check_screen
 from nutdamp.views.glance import scheme_table
 from nutdamp.views.guide import Formula, Topic
-from nutdamp.views.pulses import pulse_table
+from nutdamp.views.parts import beyond_floors, pulse_table, turn_floor
 from nutdamp.views.simulation import BUDGET, BUDGET_NOTE, budget_table, conservation, methods_table, verdict
-from nutdamp.views.spacecraft import beyond_floors, turn_floor
 from nutdamp.views.text import WARNING, joined, mass, quantity, sentence, severity, text
 from nutdamp.views.trade import apart, beats, front_parts
 

@@ -18,7 +18,7 @@ from nutdamp.planning.plan import Plan, feasible
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import decided_json
 from nutdamp.views.glance import scheme_table
-from nutdamp.views.pulses import pulse_table
+from nutdamp.views.parts import pulse_table
 from nutdamp.views.text import degrees, joined, sentences
 
 if TYPE_CHECKING:
@@ -65,12 +65,12 @@ VIEWS = {
     "LoopDispersion.figure": "figures.studies:loop_cases_figure core",
     "LoopDispersion.screen": "views.loop_cases:loop_cases_screen core",
     "LoopPlan.data": "views.loop:loop_json",
-    "LoopPlan.figure": "figures.loop:loop_figure",
+    "LoopPlan.figure": "figures.signals:loop_figure",
     "LoopPlan.screen": "views.loop:loop_screen",
     "LoopVerification.data": "views.loop:verified_json",
     "LoopVerification.screen": "views.loop:verification_screen",
     "Fitted.data": "views.fit:fit_json core",
-    "Fitted.figure": "figures.fit:fit_figure core",
+    "Fitted.figure": "figures.signals:fit_figure core",
     "Fitted.text": "files.carried:fitted_file core",
     "Plan.carried": "files.carried:carried_spacecraft",
     "Fitted.spacecraft": "files.carried:fitted_spacecraft",
@@ -78,7 +78,7 @@ VIEWS = {
     "Verified.screen": "views.simulation:verification_screen plan core",
     "Budget.data": "views.loop:budget_json",
     "Budget.csv": "views.loop:budget_csv",
-    "Budget.figure": "figures.loop:budget_figure",
+    "Budget.figure": "figures.signals:budget_figure",
     "Budget.screen": "views.loop:budget_screen",
 }
 """Functions of results, see `nutdamp.common.results.view`."""
@@ -246,7 +246,7 @@ def html(result: Spacecraft | Plan | Flight | Comparison) -> str | None:
 def _block(result: Spacecraft | Plan | Flight | Comparison) -> Block:
     """The table of a result."""
     from nutdamp.page.document import FactList, Prose, facts_of, sheet
-    from nutdamp.views.spacecraft import derived_table
+    from nutdamp.views.parts import derived_table
 
     if isinstance(result, Spacecraft):
         return facts_of(result.name, derived_table(result))

@@ -25,8 +25,7 @@ from nutdamp.planning.capability import Acting, Consequence
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views.decisions import aspects_json, direction_json, spacecraft_json
 from nutdamp.views.loop import described, margin_table, warnings
-from nutdamp.views.pulses import summary, warnings_of
-from nutdamp.views.spacecraft import derived_table
+from nutdamp.views.parts import derived_table, summary, warnings_of
 from nutdamp.views.tables import TEXT, YES_NO, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import degrees, duration, moment, quantity, small_angle, vector
 from nutdamp.views.tolerances import correlation_json, in_words, size_text, without_effect

@@ -26,8 +26,7 @@ from nutdamp.schemes import catalogue
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import SLACK, Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Bound, Part
-from nutdamp.views.pulses import commanded
-from nutdamp.views.spacecraft import FRAME_N, aspect_facts, cone_margins, direction_text, required, spin_text
+from nutdamp.views.parts import FRAME_N, aspect_facts, commanded, cone_margins, direction_text, required, spin_text
 from nutdamp.views.tables import TEXT, Column, DataTable, Shared, facts
 from nutdamp.views.text import (
     MISSING,

@@ -23,8 +23,7 @@ from nutdamp.spacecraft.model import Keep, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.units import screen_unit
 from nutdamp.views import decisions, tolerances
-from nutdamp.views.pulses import summary
-from nutdamp.views.spacecraft import bounds_text, requested
+from nutdamp.views.parts import bounds_text, requested, summary
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, facts, to_figures
 from nutdamp.views.text import degrees, digits
 

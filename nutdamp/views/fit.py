@@ -16,7 +16,7 @@ from nutdamp.estimation.search import Fit
 from nutdamp.files.carried import notes
 from nutdamp.units import screen_unit
 from nutdamp.views.decisions import exact_percent, heading, percent
-from nutdamp.views.pulses import opening, summary
+from nutdamp.views.parts import opening, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, to_figures
 from nutdamp.views.text import degrees, mass
 

@@ -28,8 +28,18 @@ from nutdamp.spacecraft.model import SLACK, Spacecraft
 from nutdamp.spacecraft.requirements import Bound, Part
 from nutdamp.views import decisions
 from nutdamp.views.decisions import COUNT, coloured, lasting, limit, size, verdict
-from nutdamp.views.pulses import block_table, blocks_screen, pulse_table
-from nutdamp.views.spacecraft import angle_names, angle_texts, cone_margins, derived_table, title, turn_floor, turning
+from nutdamp.views.parts import (
+    angle_names,
+    angle_texts,
+    block_table,
+    blocks_screen,
+    cone_margins,
+    derived_table,
+    pulse_table,
+    title,
+    turn_floor,
+    turning,
+)
 from nutdamp.views.tables import (
     TEXT,
     WHOLE,

@@ -23,7 +23,7 @@ from nutdamp.spacecraft.equipment import GYRO, Loop
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.views import decisions
 from nutdamp.views.decisions import VERDICT, heading
-from nutdamp.views.pulses import Remark, opening, pulse_table, seconds, summary, warnings_of
+from nutdamp.views.parts import Remark, opening, pulse_table, seconds, summary, warnings_of
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import degrees, duration, lasting, moment, most, quantity, small_angle
 

@@ -20,8 +20,7 @@ from nutdamp.planning.screening import PlanCandidate
 from nutdamp.spacecraft import requirements
 from nutdamp.views import decisions
 from nutdamp.views.decisions import KEPT, figures, final_json, plan_json, statement, target_json
-from nutdamp.views.pulses import pulse_table
-from nutdamp.views.spacecraft import derived_table
+from nutdamp.views.parts import derived_table, pulse_table
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, Shared, angle_of, to_figures
 from nutdamp.views.text import in_degrees, joined, note_json, ordered, screen_line
 from nutdamp.views.tolerances import in_words, stated_text

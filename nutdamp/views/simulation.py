@@ -28,8 +28,21 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 from nutdamp.views import decisions
-from nutdamp.views.pulses import Remark, blocks_screen, opening, pulse_table, shown_rows, summary, warnings_of
-from nutdamp.views.spacecraft import FRAME_N, angle_names, angle_texts, aspect_facts, derived_table, requested
+from nutdamp.views.parts import (
+    FRAME_N,
+    Remark,
+    angle_names,
+    angle_texts,
+    aspect_facts,
+    blocks_screen,
+    derived_table,
+    opening,
+    pulse_table,
+    requested,
+    shown_rows,
+    summary,
+    warnings_of,
+)
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
 

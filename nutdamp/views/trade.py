@@ -23,8 +23,7 @@ from nutdamp.spacecraft.requirements import DAMPED_ANGLE, SAME_COST, Part
 from nutdamp.spacecraft.schedule import STEERABLE
 from nutdamp.views import decisions
 from nutdamp.views.decisions import FARTHER, heading, plan_json
-from nutdamp.views.pulses import pulse_table, summary
-from nutdamp.views.spacecraft import derived_table, requested
+from nutdamp.views.parts import derived_table, pulse_table, requested, summary
 from nutdamp.views.tables import TEXT, WHOLE, YES_NO, Column, DataTable, Shared, angle_of
 from nutdamp.views.text import cost, degrees, duration, fixed, small_angle
 

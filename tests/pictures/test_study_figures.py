@@ -25,14 +25,13 @@ from nutdamp.control_loop.dispersion import LoopResults, loop_study
 from nutdamp.control_loop.dispersion import run as run_loops
 from nutdamp.control_loop.evaluation import loop_of
 from nutdamp.figures import studies
-from nutdamp.figures.loop import first_seconds, loop_figure
 from nutdamp.figures.overview import BAR
+from nutdamp.figures.signals import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
 from nutdamp.page.report import dispersion_pictures
-from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
+from nutdamp.spacecraft.equipment import Channel, Dispersions, Loop, Sensor, Steerable, Tolerance
 from nutdamp.spacecraft.model import Requirement, Spacecraft
-from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

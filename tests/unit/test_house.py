@@ -19,8 +19,8 @@ LONGEST, SHORTEST = 600, 80
 FLOORS = 22
 """Longest chain of imports, those within functions and for types alone too."""
 
-MOST_MODULES = 112
-"""Modules without views, figures, the page and the markers of packages."""
+MOST_MODULES, MOST_OUTSIDE = 135, 112
+"""Modules without the markers of packages, and of them those outside views, figures and the page."""
 
 RIDDLES = re.compile(r"(What|Whether|How|Which|That|Why|Where|When)\b")
 """First words of a docstring that does not say what the thing is."""
@@ -56,8 +56,9 @@ def test_a_module_can_be_read_in_a_sitting() -> None:
 
 
 def test_the_house_can_be_held_in_the_head() -> None:
-    outside = [path for path in trees() if not path.startswith(("views/", "figures/", "page/"))]
-    assert len([path for path in outside if not path.endswith("__init__.py")]) <= MOST_MODULES
+    modules = [path for path in trees() if not path.endswith("__init__.py")]
+    assert len(modules) <= MOST_MODULES
+    assert len([path for path in modules if not path.startswith(("views/", "figures/", "page/"))]) <= MOST_OUTSIDE
 
 
 @cache

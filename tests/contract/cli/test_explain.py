@@ -27,7 +27,7 @@ from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
-from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
+from nutdamp.spacecraft.equipment import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
 from nutdamp.views import explain, guide, loop_cases, simulation
 from nutdamp.views.explain import WIDEST, flow, keys
@@ -318,8 +318,8 @@ def test_long_pages_go_through_a_pager_on_a_terminal_alone(monkeypatch: pytest.M
     assert "Sun pulse" in explained("command-block")
     assert paged == []
     terminal = Console(force_terminal=True, width=80, height=30, file=io.StringIO())
-    monkeypatch.setattr("nutdamp.cli.check.console", lambda: terminal)
-    monkeypatch.setattr("nutdamp.cli.check.on_keyboard", lambda: True)
+    monkeypatch.setattr("nutdamp.cli.files.console", lambda: terminal)
+    monkeypatch.setattr("nutdamp.cli.files.on_keyboard", lambda: True)
     assert explained("command-block") == ""
     assert "Sun pulse" in paged.pop()
     assert "angle" in explained("tilt")

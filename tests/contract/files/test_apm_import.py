@@ -24,7 +24,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views.pulses import pulse_table
+from nutdamp.views.parts import pulse_table
 from nutdamp.views.simulation import export_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

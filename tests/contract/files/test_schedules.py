@@ -29,7 +29,7 @@ from nutdamp.schemes.block_model import fired
 from nutdamp.spacecraft.equipment import Block, Steerable
 from nutdamp.spacecraft.model import Limits
 from nutdamp.spacecraft.schedule import Pulse, Schedule, overlapping
-from nutdamp.views.pulses import pulse_table
+from nutdamp.views.parts import pulse_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -22,7 +22,7 @@ from nutdamp.control_loop.sensor import Estimator, Signal
 from nutdamp.control_loop.simulation import fly
 from nutdamp.control_loop.stability import Odds, Transfer, exceeds, transfer
 from nutdamp.errors import BadRequest, Infeasible
-from nutdamp.figures.loop import budget_figure
+from nutdamp.figures.signals import budget_figure
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.spacecraft.equipment import BANG, ONE_PULSE, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft

@@ -36,7 +36,7 @@ from nutdamp.spacecraft.equipment import Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
 from nutdamp.views.decisions import final_json, plan_json, target_json
-from nutdamp.views.pulses import channel_text, pulse_table
+from nutdamp.views.parts import channel_text, pulse_table
 from nutdamp.views.text import longitude, steering, vector
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

@@ -16,7 +16,7 @@ from support.places import CONFIGS
 import nutdamp
 from nutdamp.files.schedules import BLOCKS_HEADER, EFFECTIVE, PULSES_HEADER
 from nutdamp.units import US, screen_units
-from nutdamp.views.pulses import block_table, pulse_table
+from nutdamp.views.parts import block_table, pulse_table
 from nutdamp.views.tables import REAL, TEXT, WHOLE, YES_NO, Column, DataTable, angle_of
 from nutdamp.views.text import vector
 

@@ -27,7 +27,7 @@ from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.model import Disturbance, Goal, Limits, Requirement
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.views import decisions
-from nutdamp.views.spacecraft import required
+from nutdamp.views.parts import required
 
 FIRED = spinner(channels=cross(8.0))
 WIDE = Goal(spin=3.0)
