@@ -353,7 +353,12 @@ class Pilot:
         if self._found is not None:
             return self._pulse(self._found) or Course.OVER
         if self._pending is None:
-            self._seen = self._seen[-3:]  # the last period is among them
+            edge = seen.times[-1] - self.law.period
+            if seen.times[0] <= edge:
+                row = int(np.searchsorted(seen.times, edge))
+                self._seen = [(seen.times[row:].copy(), seen.best[row:].copy(), seen.spin[row:].copy())]
+            else:
+                self._seen = self._seen[-3:]  # the last period is among them
         later = None if self.active or self._pending is not None else self._idle_until(seen)
         if later is None:
             return Course.ON

@@ -23,8 +23,8 @@ LEAST = 1e-9  # degrees or deg/s below which a motion is drawn as a point
 INSET_FROM, INSET_BELOW = 1e-4, 0.15
 """Shares of the width of the axis track between which the path of H is shown enlarged beside it."""
 
-CLOSE, MANY = 1.0 / 125.0, 3
-"""Part of the time shown below which firings cannot be distinguished: 4 points on a sheet; so many are drawn as one."""
+CLOSE = 1.0 / 125.0  # part of the time shown below which firings cannot be distinguished: 4 points on a sheet
+MANY = 3  # least number of firings drawn as one
 
 NO_CONE = 1e-10  # half-angle in rad below which a cone is not distinguished from its axis
 

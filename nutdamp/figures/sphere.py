@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-ELEVATION, ASIDE = math.radians(28.0), math.radians(65.0)
-"""The sphere is seen from above the plane square to H(0); the spin axis leans to the right at t = 0, so far round."""
+ELEVATION = math.radians(28.0)  # direction from which the sphere is seen: above the plane square to H(0)
+ASIDE = math.radians(65.0)  # the spin axis leans to the right at t = 0, this far round from the viewer
 
 WIDE, DRAWN = math.radians(14.0), math.radians(28.0)
 """Below the first angle from H(0) everything is magnified, to the second one at most."""

@@ -45,8 +45,8 @@ NOTHING, NEXT_TO_NOTHING = 1e-6, "1e-6°"
 FAR = 4.0
 """A requirement is drawn where it is at most so many times the largest value: beyond, it would leave a panel empty."""
 
-DOTS, DENSE = 2_000, 0.8
-"""Cases shown as dots at most, more would only make the picture heavy, and their opacity: fainter ones are not seen."""
+DOTS = 2_000  # largest number of cases shown as dots: more would only make the picture heavy
+DENSE = 0.8  # opacity of a dot: fainter ones are not seen
 
 TITLE: dict[str, Any] = {"fontsize": style.TICK_SIZE}  # look of the title of a panel
 
@@ -313,8 +313,8 @@ def _draw_fronts(axes: Axes, spacecraft: Spacecraft, fronts: Sequence[Front], sc
 
 ROWS = 6000  # moments of the envelope, over all windows
 
-AFTER, TURNS = 1.25, 2.0
-"""End of the time shown over that of the last firing of the plan, and periods of the nutation shown at least."""
+AFTER = 1.25  # end of the time shown over that of the last firing of the plan
+TURNS = 2.0  # periods of the nutation shown at least
 
 SHALLOW = 1e-3  # depth of the envelope below 0 that is the step of the linear program in time
 

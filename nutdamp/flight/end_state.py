@@ -179,7 +179,7 @@ def aspects(flown: Flight, until: float | None = None) -> tuple[Aspect, ...]:
     """For each direction that the spacecraft watches, from t = 0 to ``until`` s.
 
     Default: one inertial nutation period after the last pulse. A flight that ends earlier is flown on by its model.
-    Raises Infeasible as `flight.flown` does.
+    Raises Infeasible as `propagation.flown` does.
     """
     body = flown.spacecraft
     if not body.watched:

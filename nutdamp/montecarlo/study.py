@@ -235,8 +235,8 @@ class Study(DrawnCases):
     def lightening_error(self) -> str:
         """Message on the error of falling moments in cases, by the nominal one; empty where negligible.
 
-        They fall half as each pulse begins and half as it ends, which errs in second order; `flight.flown` lets them
-        fall as the thrust goes.
+        They fall half as each pulse begins and half as it ends, which errs in second order; `propagation.flown` lets
+        them fall as the thrust goes.
         """
         body = self.model.spacecraft
         if shed(body) is None:

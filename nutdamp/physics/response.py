@@ -46,7 +46,7 @@ def impulse_sum(
 
     ω(t) = e^{-iaα(t)} [ω0 + (1/A) Σ J_v e^{iaα(t_v)}] over the pulses with t_v <= t, where α = ∫ω3 dt (Magnus (2)):
     an axial impulse J3 changes the spin by J3/C, and the arcs between stay exact, through spin reversal too. With
-    energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`flight.by_impulses`).
+    energy dissipation ω3 changes along the arcs, and the sum has to be taken arc by arc (`propagation.by_impulses`).
     A ``wheel`` of momentum h N m s turns ω by h t/A besides.
 
     ``times`` (n,) s; ``pulse_times`` (k,) s ascending; ``transverse`` (k,) J1 + iJ2 and ``axial`` (k,) J3 in N m s.

@@ -90,7 +90,7 @@ def _thrusting(planned: Pulse, start: float, one: Thrusting, propellant: float |
 
 
 def flown_outputs(model: DispersedModel, draws: Draws) -> Array:
-    """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by `flight.flown`."""
+    """The outputs (5,) of one case with real pulse widths, true moments and disturbances, by `propagation.flown`."""
     true, schedule = realised(model, draws)
     made = propagation.flown(true, schedule)
     settled, left = made.settled, made.residual
