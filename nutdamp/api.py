@@ -204,7 +204,7 @@ def robust(
     """
     from nutdamp.planning import robust as search
     from nutdamp.planning.decision import Comparison
-    from nutdamp.spacecraft.equipment import expect_dispersions
+    from nutdamp.spacecraft.tolerances import expect_dispersions
 
     expect_dispersions(units.instance("compared", compared, Comparison, "a Comparison").spacecraft.dispersions)
     trials = search.variations_of(compared, options)
@@ -492,7 +492,7 @@ def export(
     """
     from nutdamp.files.tabular import write_whole
     from nutdamp.planning.plan import feasible
-    from nutdamp.views.simulation import FORMATS, export_text
+    from nutdamp.views.exchange import FORMATS, export_text
 
     form, name = units.one_of("format", format, tuple(FORMATS)), units.path("path", path)
     end = None if until is None else units.end_of_flight(until)

@@ -40,7 +40,7 @@ from nutdamp.cli.plan import compared_with, flown_options, fronts_of, plan_or_re
 from nutdamp.cli.screen import console, say, show, show_failures, units_of_screen
 from nutdamp.errors import BadRequest, nearest, printable
 from nutdamp.schemes.catalogue import LEAST, PLANNED
-from nutdamp.views.simulation import FORMATS, expect_possible, export_notes, lacking
+from nutdamp.views.exchange import FORMATS, expect_possible, export_notes, lacking
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -442,7 +442,7 @@ def report_command(
 
     from nutdamp.page.report import repeated
     from nutdamp.planning.decision import compare_plans
-    from nutdamp.spacecraft.equipment import expect_dispersions
+    from nutdamp.spacecraft.tolerances import expect_dispersions
 
     kept = controlled(**{name: value for name, value in control.items() if value is not None})
     if disperse is not None or robust:

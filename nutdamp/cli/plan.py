@@ -201,7 +201,7 @@ def plan_command(
 
     from nutdamp.planning.decision import decide
     from nutdamp.planning.notes import comparison_warnings
-    from nutdamp.spacecraft.equipment import expect_dispersions
+    from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.glance import scheme_table
     from nutdamp.views.parts import pulse_table
 

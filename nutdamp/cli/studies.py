@@ -295,8 +295,8 @@ def disperse_command(
     body = job.begin()
 
     from nutdamp import api
-    from nutdamp.spacecraft.equipment import expect_dispersions
     from nutdamp.spacecraft.requirements import expect_loop
+    from nutdamp.spacecraft.tolerances import expect_dispersions
     from nutdamp.views.dispersion import dispersion_brief
 
     if looped:

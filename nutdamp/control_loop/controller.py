@@ -18,9 +18,9 @@ from nutdamp.errors import Infeasible, Unsuitable
 from nutdamp.flight.dynamics import Dynamics, Path, Supply, shed, weakened
 from nutdamp.physics import taylor
 from nutdamp.spacecraft.constraints import commandable
-from nutdamp.spacecraft.equipment import Tolerance
 from nutdamp.spacecraft.model import Spacecraft, SpinState, Vector
 from nutdamp.spacecraft.schedule import Pulse, channel_pulse, on_command
+from nutdamp.spacecraft.tolerances import Tolerance
 
 GRID = 64  # moments per nutation period at which a continuous signal is examined for a firing in between
 LONGEST = 1024  # moments looked at together, at most

@@ -29,10 +29,11 @@ from nutdamp.montecarlo.statistics import Exact, angle, cases_to_show
 from nutdamp.montecarlo.study import Counted, Dispersed, DrawnCases
 from nutdamp.physics import attitude
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor, expect_dispersions
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Channel, Loop, Sensor
 from nutdamp.spacecraft.model import Attitude, Inertia, Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Left
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import expect_dispersions
 
 OF_FIRINGS = ("thrust_per_pulse", "timing")  # tolerances that each firing draws anew
 

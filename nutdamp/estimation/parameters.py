@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from nutdamp.control_loop.sensor import felt
 from nutdamp.montecarlo.inputs import SPREAD
 from nutdamp.physics import attitude, sky
-from nutdamp.spacecraft.equipment import GYRO, Dispersions, Tolerance
+from nutdamp.spacecraft.equipment import GYRO
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -19,8 +19,8 @@ from nutdamp.estimation.parameters import EXACT, RATIO, Matrix, Values, Vector, 
 from nutdamp.estimation.search import KEPT, Fit
 from nutdamp.physics import attitude
 from nutdamp.physics.triaxial import arc_cones
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Spacecraft, SpinState
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 WHEEL = "wheel momentum"  # input of a wheel that is estimated
 

@@ -12,8 +12,9 @@ from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, READING, VALVE_TIM
 from nutdamp.files.thruster_rules import instead, thrusts
 from nutdamp.files.yaml import Node
 from nutdamp.montecarlo.inputs import Pair, grouped, positive_definite
-from nutdamp.spacecraft.equipment import ACCELEROMETER, KINDS
+from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.schedule import STEERABLE
+from nutdamp.spacecraft.tolerances import KINDS
 from nutdamp.units import bar, shown
 
 PARTS = {

@@ -20,8 +20,8 @@ from nutdamp.files.rules import (
 )
 from nutdamp.files.thruster_rules import instead, on_times_of, torque_of
 from nutdamp.files.yaml import Node
-from nutdamp.spacecraft.equipment import KINDS
 from nutdamp.spacecraft.model import Inertia
+from nutdamp.spacecraft.tolerances import KINDS
 from nutdamp.units import KINDS as UNITS
 from nutdamp.units import shown
 

@@ -24,7 +24,7 @@ from nutdamp.files.fields import (
     Section,
     Time,
 )
-from nutdamp.spacecraft.equipment import KINDS, Dispersions, Tolerance
+from nutdamp.spacecraft.tolerances import KINDS, Dispersions, Tolerance
 from nutdamp.units import parse, pattern, shown
 
 if TYPE_CHECKING:

@@ -23,9 +23,10 @@ from numpy.typing import NDArray
 
 from nutdamp.errors import BadRequest, Unsuitable
 from nutdamp.flight.dynamics import shed
-from nutdamp.spacecraft.equipment import ACCELEROMETER, Dispersions, Thruster, Tolerance
+from nutdamp.spacecraft.equipment import ACCELEROMETER, Thruster
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import STEERABLE, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 SPREAD = {"normal": 1.0, "uniform": 1.0 / math.sqrt(3.0), "triangular": 1.0 / math.sqrt(6.0), "bias": 0.0}
 """Standard deviation of each kind for a size of one."""

@@ -44,10 +44,11 @@ from nutdamp.montecarlo.statistics import (
 )
 from nutdamp.physics import batch
 from nutdamp.spacecraft import requirements
-from nutdamp.spacecraft.equipment import Block, expect_dispersions
+from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft, required_share
 from nutdamp.spacecraft.requirements import Left, Part
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import expect_dispersions
 
 Array = NDArray[np.float64]
 

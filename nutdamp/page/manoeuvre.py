@@ -173,7 +173,7 @@ def _columns(plan: Plan, rows: Sequence[SheetRow]) -> Iterator[Column]:
 
 def _counted(body: Spacecraft, which: str, value: float) -> str:
     """A ``delay`` or ``width`` in s, and in counts of the steps of the commands, where the file has them."""
-    counts = f" ({getattr(body.commands, f'{which}_counts')(value)})" if body.commands is not None else ""
+    counts = f" ({body.commands.counts(which, value)})" if body.commands is not None else ""
     return f"{value:.6g}{counts}"
 
 

@@ -33,10 +33,10 @@ from nutdamp.schemes.optimal.refinement import EndEquations, Refinement, small_a
 from nutdamp.schemes.sequential import model_of
 from nutdamp.spacecraft import requirements
 from nutdamp.spacecraft.constraints import keeps_limits
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Spacecraft, Vector, required_share
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import TOUCHING, Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 ROUNDING = 1e-9  # of a number of cases
 

@@ -28,11 +28,11 @@ from nutdamp.physics.thruster import Tank as Tank
 from nutdamp.physics.triaxial import arc_cones
 from nutdamp.spacecraft.equipment import Channel as Channel
 from nutdamp.spacecraft.equipment import Commands as Commands
-from nutdamp.spacecraft.equipment import Dispersions
 from nutdamp.spacecraft.equipment import Loop as Loop
 from nutdamp.spacecraft.equipment import Steerable as Steerable
 from nutdamp.spacecraft.equipment import SunSensor as SunSensor
 from nutdamp.spacecraft.equipment import Thruster as Thruster
+from nutdamp.spacecraft.tolerances import Dispersions
 
 Vector = NDArray[np.float64]
 

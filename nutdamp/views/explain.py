@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.constrain import Constrain
 from rich.padding import Padding
+from rich.table import Table
 from rich.text import Text
 
 from nutdamp.errors import BadRequest, listed, nearest
@@ -19,7 +20,6 @@ from nutdamp.files.study_keys import QUANTITIES, ToleranceSection, unit_kinds
 from nutdamp.units import KINDS
 from nutdamp.views import guide
 from nutdamp.views.guide import Block, CommandHelp, Formula, Topic, TopicPart, TopicRows
-from nutdamp.views.tables import facts
 
 
 def _notes() -> Iterator[tuple[str, str]]:
@@ -335,7 +335,11 @@ class _Pairs:
                 yield Text(name, style="dim", overflow="fold")
                 yield Padding(Text(text, overflow="fold"), (0, 0, 0, 2))
             return
-        yield facts((name, Text(text, overflow="fold")) for name, text in self.rows)
+        table = Table.grid(padding=(0, 2))
+        table.add_column(style="dim", overflow="fold")
+        for name, text in self.rows:
+            table.add_row(name, Text(text, overflow="fold"))
+        yield table
 
 
 class _Typed:

@@ -1,20 +1,23 @@
-"""A flight on screens and in files: cones around each pulse, its end by both models, verification, exchange formats."""
+"""The simulation of a schedule and its verification: ends, cone angles around each pulse, extremes of the axis track.
+
+Also the schedule spin by spin. Where the file has a Sun sensor a spin begins with its pulse, 1 with the first one, as
+in command blocks; the time before that is spin 0. Else spin 1 begins at t = 0, and in each ∫ω3 dt grows by 2π.
+"""
 
 from __future__ import annotations
 
-import datetime
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from nutdamp.errors import BadRequest, Unsuitable
+from nutdamp.errors import BadRequest
 from nutdamp.files.tabular import number
 from nutdamp.flight import end_state, propagation
 from nutdamp.flight.end_state import LEGENDRE, aspects
@@ -45,11 +48,6 @@ from nutdamp.views.parts import (
 )
 from nutdamp.views.tables import TEXT, WHOLE, Column, DataTable, FittedColumns, Shared, angle_of, facts, to_figures
 from nutdamp.views.text import MISSING, degrees, longitude, moment, pointing, small_angle
-
-if TYPE_CHECKING:
-    from nutdamp.common.results import Note
-    from nutdamp.flight.propagation import Flight
-    from nutdamp.planning.plan import Plan
 
 MODELS = {IMPULSE_SUM: "impulse approximation (17)", REAL_WIDTHS: "full simulation"}  # names of the two models
 
@@ -390,135 +388,3 @@ def _course(course: Conservation) -> str:
     how = f"changed by {' and '.join(course.changed)}" if course.changed else "constant to rounding"
     how = "NOT constant" if course.kept is False else how
     return f"{how} (by {_difference(course.drift)} of itself at most)" if course.drift else how
-
-
-class Request(NamedTuple):
-    """A plan to be written: CCSDS messages as ``xml`` or as keyword = value, tracks ``until`` a time, s, or None."""
-
-    plan: Plan
-    xml: bool
-    until: float | None
-
-    def end(self) -> float:
-        """End of an attitude history, s: by default an inertial period after the last pulse."""
-        return self.plan.pulses.end + self.plan.spacecraft.inertial_period if self.until is None else self.until
-
-    def flight(self) -> Flight:
-        """The flight up to that end."""
-        from nutdamp.flight.propagation import flown
-
-        return flown(self.plan.spacecraft, self.plan.pulses, self.end())
-
-
-class Format(NamedTuple):
-    """A format: its ``name``, and a ``summary`` for help pages.
-
-    ``message``: a CCSDS message, in either notation. ``track``: ends when requested. ``dated``: needs the epoch and the
-    frame of the attitude. ``needs_orbit``: incomplete without one. ``nutates``: as symmetric bodies do.
-    """
-
-    name: str
-    summary: str
-    message: bool = False
-    track: bool = False
-    dated: bool = False
-    needs_orbit: bool = False
-    nutates: bool = False
-
-
-def _text(form: str, request: Request) -> str:
-    plan, until = request.plan, request.until
-    if form == "json":
-        from nutdamp.files.tabular import json_text
-        from nutdamp.planning.decision import compare_plans
-        from nutdamp.views.decisions import comparison_json
-
-        return json_text(comparison_json(compare_plans((plan,))))
-    if form == "spin-table":
-        return spin_table(plan.spacecraft, plan.pulses, plan.pulses.end if until is None else until)
-    if FORMATS[form].message:
-        return _message(form, request)
-    from nutdamp.files.export import basilisk_script, reference, stk_attitude
-
-    if form == "basilisk":
-        return basilisk_script(plan)
-    return stk_attitude(request.flight(), request.end(), reference(plan.spacecraft))
-
-
-def _message(kind: str, request: Request) -> str:
-    """A CCSDS message, created now to the second."""
-    from nutdamp.common.time import Epoch
-    from nutdamp.files.ccsds import message, write
-    from nutdamp.files.export import reference
-
-    plan, place = request.plan, reference(request.plan.spacecraft)
-    now = Epoch.parse(datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"))
-    if kind == "apm":
-        written = write.apm(plan, place, now)
-    elif kind == "opm":
-        written = write.opm(plan, place, now)
-    else:
-        form = message.SPIN_NUTATION_MOM if kind == "aem-spin" else message.QUATERNION_ANGVEL
-        written = write.aem(plan, request.flight(), request.end(), place, now, form)
-    return message.to_xml(written) if request.xml else message.to_kvn(written)
-
-
-FORMATS = {  # formats by name
-    row.name: row
-    for row in (
-        Format("apm", "state and pulses (CCSDS)", message=True, dated=True),
-        Format("aem", "attitude history (CCSDS) as quaternions", message=True, track=True, dated=True),
-        Format("aem-spin", "as spin, nutation and momentum", message=True, track=True, dated=True, nutates=True),
-        Format("opm", "velocity change of each pulse (CCSDS)", message=True, dated=True, needs_orbit=True),
-        Format("stk", "attitude history as .a", track=True, dated=True),
-        Format("spin-table", "CSV, one row a spin", track=True),
-        Format("basilisk", "a script that flies the schedule"),
-        Format("json", "as `plan --json`"),
-    )
-}
-
-
-def expect_possible(form: str, *, xml: bool, until: float | None) -> None:
-    """Raise BadRequest for an XML notation or an end that the format has not."""
-    if xml and not FORMATS[form].message:
-        raise BadRequest(f"{form} has no XML notation; {', '.join(_names_where('message'))} have")
-    if until is not None and not FORMATS[form].track:
-        raise BadRequest(f"until is for {', '.join(_names_where('track'))}; {form} has no end time")
-
-
-def _names_where(flag: str) -> list[str]:
-    return [name for name, row in FORMATS.items() if getattr(row, flag)]
-
-
-def export_text(plan: Plan, form: str, *, xml: bool = False, until: float | None = None) -> str:
-    """The text of a plan in the format ``form``; messages in XML or else in keyword = value notation.
-
-    ``until`` is the end of a track in s, by default the last pulse and an inertial period. Raises BadRequest where the
-    format needs data that the spacecraft file lacks, or cannot hold those of the plan.
-    """
-    expect_possible(form, xml=xml, until=until)
-    row, request = FORMATS[form], Request(plan, xml, until)
-    if row.dated:
-        from nutdamp.files.export import reference
-
-        reference(plan.spacecraft)  # refuses a file without epoch or frame
-        last = request.end() if row.track else plan.pulses.end
-        if plan.spacecraft.utc(last) is None:
-            cure = "an earlier --until" if row.track else "a shorter horizon"
-            raise Unsuitable(("attitude", "epoch"), f"{last:.4g} s after it the year 9999 is over; {cure} helps")
-    return _text(form, request)
-
-
-def export_notes(plan: Plan, form: str) -> list[Note]:
-    """Notes on the motion that the format ``form`` does not hold."""
-    from nutdamp.common.results import note
-    from nutdamp.files.ccsds.write import spinning
-
-    return [note("spin-alone")] * (FORMATS[form].nutates and not spinning(plan.spacecraft.inertia))
-
-
-def lacking(plan: Plan, form: str) -> str | None:
-    """Data that the format ``form`` needs to be complete and the spacecraft file lacks; None where it is complete."""
-    if not FORMATS[form].needs_orbit or plan.spacecraft.orbit is not None:
-        return None
-    return "the spacecraft file has no orbit: this is the part of an OPM with the manoeuvres, and no whole message"

@@ -39,9 +39,9 @@ from nutdamp.figures import geometry, overview, sphere, style
 from nutdamp.flight import propagation
 from nutdamp.physics.attitude import angle_between
 from nutdamp.planning import plan as planning
-from nutdamp.spacecraft.equipment import Dispersions
 from nutdamp.spacecraft.model import Inertia, Requirement
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

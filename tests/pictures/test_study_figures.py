@@ -30,8 +30,9 @@ from nutdamp.figures.signals import first_seconds, loop_figure
 from nutdamp.montecarlo.statistics import OUTPUTS, Exact
 from nutdamp.montecarlo.study import Results
 from nutdamp.page.report import dispersion_pictures
-from nutdamp.spacecraft.equipment import Channel, Dispersions, Loop, Sensor, Steerable, Tolerance
+from nutdamp.spacecraft.equipment import Channel, Loop, Sensor, Steerable
 from nutdamp.spacecraft.model import Requirement, Spacecraft
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from support.builders import cross, spinner
 from support.dispersed import normal
 
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Limits, Requirement, Vector
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 REQUIRED = Requirement(math.radians(0.5), math.radians(0.2), 0.997)
 TOLERANCES = Dispersions(

@@ -12,9 +12,10 @@ from support.builders import spinner
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.montecarlo.inputs import BLOCK, Draws
 from nutdamp.montecarlo.study import Study
-from nutdamp.spacecraft.equipment import Channel, Dispersions, Steerable, Thruster, Tolerance
+from nutdamp.spacecraft.equipment import Channel, Steerable, Thruster
 from nutdamp.spacecraft.model import Inertia, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 def normal(size: float, *, relative: bool = False) -> Tolerance:

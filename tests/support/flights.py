@@ -17,9 +17,10 @@ from support.spinners import commanded
 from nutdamp.montecarlo.cases import DispersedModel
 from nutdamp.physics import attitude
 from nutdamp.schemes.block_model import fired
-from nutdamp.spacecraft.equipment import Block, Dispersions
+from nutdamp.spacecraft.equipment import Block
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
 
 Array = NDArray[np.float64]
 

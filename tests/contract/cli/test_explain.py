@@ -27,7 +27,7 @@ from nutdamp.files.editing import parse_setting
 from nutdamp.files.reader import json_schema, read_spacecraft
 from nutdamp.files.schedules import EFFECTIVE
 from nutdamp.schemes.catalogue import NAMES, SCHEMES, names_of
-from nutdamp.spacecraft.equipment import KINDS as TOLERANCE_KINDS
+from nutdamp.spacecraft.tolerances import KINDS as TOLERANCE_KINDS
 from nutdamp.units import KINDS
 from nutdamp.views import explain, guide, loop_cases, simulation
 from nutdamp.views.explain import WIDEST, flow, keys
@@ -285,13 +285,12 @@ def keys_of_columns() -> Iterator[tuple[str, str]]:
 def keys_written() -> Iterator[str]:
     """Names that the code gives to numbers in JSON."""
     names = (
-        "budget",
         "check",
         "dispersion",
         "fit",
         "loop",
         "loop_cases",
-        "pulses",
+        "parts",
         "robust",
         "simulation",
         "trade",

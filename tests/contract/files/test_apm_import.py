@@ -24,8 +24,8 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.views.exchange import export_text
 from nutdamp.views.parts import pulse_table
-from nutdamp.views.simulation import export_text
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -28,7 +28,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Disturbance
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
-from nutdamp.views.simulation import export_text, lacking
+from nutdamp.views.exchange import export_text, lacking
 
 pytestmark = pytest.mark.usefixtures("plans_shared")
 

@@ -29,9 +29,10 @@ from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics import attitude
 from nutdamp.planning.decision import broken_limits, compare, infeasibility
 from nutdamp.schemes.catalogue import CLASSIC
-from nutdamp.spacecraft.equipment import Channel, Steerable, Tolerance
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Tolerance
 from nutdamp.units import STANDARD_GRAVITY
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

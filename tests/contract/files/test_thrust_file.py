@@ -26,9 +26,9 @@ from nutdamp.montecarlo.inputs import reachable
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid
 from nutdamp.planning import plan as planning
 from nutdamp.planning.decision import infeasibility
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.parts import pulse_table
 
 pytestmark = pytest.mark.usefixtures("plans_shared")

@@ -28,7 +28,8 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Limits, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
-from nutdamp.views.simulation import SPINS, export_notes, export_text, spin_table
+from nutdamp.views.exchange import export_notes, export_text
+from nutdamp.views.simulation import SPINS, spin_table
 
 HEADER = [column.key for column in SPINS]
 

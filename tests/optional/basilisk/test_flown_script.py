@@ -17,7 +17,7 @@ from nutdamp.planning import plan as planning
 from nutdamp.planning.plan import Plan
 from nutdamp.spacecraft.model import Disturbance
 from nutdamp.spacecraft.schedule import Pulse, Schedule
-from nutdamp.views.simulation import export_text
+from nutdamp.views.exchange import export_text
 from nutdamp.views.text import degrees
 
 pytestmark = [pytest.mark.basilisk, pytest.mark.usefixtures("plans_shared")]

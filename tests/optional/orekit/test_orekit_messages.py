@@ -19,7 +19,7 @@ from support.contract import PUSHED, known, pushing, valved, velocity_change
 from nutdamp.flight import propagation
 from nutdamp.flight.propagation import Flight
 from nutdamp.physics import attitude
-from nutdamp.views.simulation import export_text
+from nutdamp.views.exchange import export_text
 
 pytestmark = [pytest.mark.orekit, pytest.mark.usefixtures("plans_shared")]
 

@@ -20,17 +20,9 @@ from nutdamp.control_loop.simulation import Fleet, LoopRun, expects_alone, fly
 from nutdamp.control_loop.stability import Margin, feeding
 from nutdamp.errors import Infeasible
 from nutdamp.physics.thruster import Cold, Trapezoid
-from nutdamp.spacecraft.equipment import (
-    ACCELEROMETER,
-    BANG,
-    FOUR_PULSE,
-    ONE_PULSE,
-    Dispersions,
-    Loop,
-    Sensor,
-    Tolerance,
-)
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, FOUR_PULSE, ONE_PULSE, Loop, Sensor
 from nutdamp.spacecraft.model import Disturbance, Limits, Spacecraft, Vector
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop import margin_table
 
 CRAFT = fired_by(channels=around(4, 2.0))

@@ -24,9 +24,10 @@ from nutdamp.errors import BadRequest, Infeasible
 from nutdamp.montecarlo.statistics import binomial_interval
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
-from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Dispersions, Sensor, Tolerance
+from nutdamp.spacecraft.equipment import ACCELEROMETER, BANG, Channel, Sensor
 from nutdamp.spacecraft.model import Attitude, Disturbance, Keep, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.loop_cases import LoopCasesWriter
 
 VALVE = Trapezoid(0.01, 0.02, 0.01, 0.01)

@@ -21,7 +21,7 @@ from nutdamp.estimation.fit import fit
 from nutdamp.estimation.model import Model
 from nutdamp.estimation.parameters import GYROS, Vector, moments, prior, quantisation
 from nutdamp.estimation.search import Fit, residuals, search, units_of
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.8, -0.5])

@@ -19,9 +19,9 @@ from nutdamp.flight.propagation import flown
 from nutdamp.montecarlo.study import study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.planning import plan as planning
-from nutdamp.spacecraft.equipment import Dispersions
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, on_command
+from nutdamp.spacecraft.tolerances import Dispersions
 from nutdamp.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]

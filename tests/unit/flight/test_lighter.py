@@ -29,9 +29,9 @@ from nutdamp.physics.thruster import Tank, Trapezoid
 from nutdamp.planning import plan as planning
 from nutdamp.schemes import command_block
 from nutdamp.schemes.catalogue import CommandBlockOptions
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, on_command
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 Shed = tuple[float, float, float]
 

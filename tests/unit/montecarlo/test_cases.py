@@ -32,9 +32,10 @@ from nutdamp.montecarlo.inputs import (
 )
 from nutdamp.montecarlo.study import Results, Study, run
 from nutdamp.physics.body import principal_axes
-from nutdamp.spacecraft.equipment import Channel, Dispersions, Steerable, Tolerance
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Inertia
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 
 def test_a_tilted_and_moved_force_gives_its_torque() -> None:

@@ -26,9 +26,10 @@ from nutdamp.montecarlo.statistics import OUTPUTS, measure
 from nutdamp.montecarlo.study import Results, Study, run, study_of
 from nutdamp.physics.thruster import Cold, Tank, Trapezoid
 from nutdamp.schemes.block_model import fired
-from nutdamp.spacecraft.equipment import Block, Dispersions, Steerable, SunSensor, Tolerance
+from nutdamp.spacecraft.equipment import Block, Steerable, SunSensor
 from nutdamp.spacecraft.model import Disturbance, Inertia
 from nutdamp.spacecraft.schedule import Schedule, steerable_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 CASES = 40
 PROLATE = dispersed.with_jets()

@@ -33,9 +33,9 @@ from nutdamp.montecarlo.statistics import (
     vectors,
 )
 from nutdamp.montecarlo.study import EARLY, PORTION, Results, Study, run, study_of
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Goal, Requirement
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 
 MANY = BLOCK + 5_234
 JETS = dispersed.with_jets()

@@ -21,9 +21,9 @@ from nutdamp.montecarlo.inputs import DrawSource, list_inputs
 from nutdamp.montecarlo.propagated import ClosedForm, Ends, RealWidths
 from nutdamp.montecarlo.study import Results, run, study_of
 from nutdamp.physics.thruster import Cold, Measured, Tank, Trapezoid, Valve
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule, on_command
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views.tolerances import in_words, size_text
 
 SLOW = Trapezoid(0.008, 0.012, 0.005, 0.010)

@@ -35,10 +35,11 @@ from nutdamp.planning.robust import robust_reasons
 from nutdamp.planning.screening import Cases, PlanCandidate
 from nutdamp.schemes import four_pulse
 from nutdamp.schemes.catalogue import CLASSIC, Options
-from nutdamp.spacecraft.equipment import Block, Dispersions, Steerable
+from nutdamp.spacecraft.equipment import Block, Steerable
 from nutdamp.spacecraft.model import Goal, Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.requirements import Part
 from nutdamp.spacecraft.schedule import Schedule
+from nutdamp.spacecraft.tolerances import Dispersions
 from nutdamp.views.robust import robust_json
 from nutdamp.views.text import joined
 

@@ -26,9 +26,9 @@ from nutdamp.planning.chance_plan import scaled
 from nutdamp.planning.decision import compare
 from nutdamp.planning.plan import plan
 from nutdamp.schemes.optimal.linear_program import ProgramColumns
-from nutdamp.spacecraft.equipment import Dispersions, Tolerance
 from nutdamp.spacecraft.model import Limits, Requirement, Spacecraft
 from nutdamp.spacecraft.schedule import Schedule, channel_pulse
+from nutdamp.spacecraft.tolerances import Dispersions, Tolerance
 from nutdamp.views import text
 from nutdamp.views.robust import robust_notes
 from nutdamp.views.tolerances import stated_text
