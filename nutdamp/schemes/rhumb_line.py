@@ -31,6 +31,8 @@ from nutdamp.spacecraft.model import Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
 
 TURN_SHARE = 0.125  # default on-time as a share of the spin turn: 2.6 % of the impulse is lost to the arc
+SPARE = 3e-3  # pulses that a train has to spare: without them it could not bend, and its phases not bring H nearer
+LEAST_RATIO = 0.1  # inertia ratio below which the phases of pulses hardly matter to the nutation
 # share of the spin turn up to which pulses widen where the horizon is short: a quarter of the impulse is lost
 WIDEST = 0.4
 BENT = 10.0  # times as many spare pulses for a last try
@@ -138,9 +140,8 @@ class Train:
         A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
         of its square.
         """
-        ratio = abs(self.here.nutation_rate / self.here.spin)  # below 0.1 the phases of pulses hardly matter
-        # Without 3e-3 to spare, by which a train may bend, its phases could not bring H nearer.
-        return 3e-3 + (float(left[count - 1]) / max(ratio, 0.1)) ** 2 / min(count, LAST)
+        ratio = abs(self.here.nutation_rate / self.here.spin)
+        return SPARE + (float(left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(count, LAST)
 
     def _free(self, left: Vector) -> list[Attempt]:
         """Trains of pulses of any length: `left` by 1, 2, … pulses is ``left`` (n,)."""
