@@ -8,13 +8,13 @@ from typing import NamedTuple
 from nutdamp.errors import nearest
 from nutdamp.files.fields import RIGHT_ANGLE, KeyPath
 from nutdamp.files.rules import Facts, Finding, inertia_of, principal_of
-from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, READING, VALVE_TIMES, by_name, size_of
+from nutdamp.files.study_keys import BY_THRUSTER, QUANTITIES, VALVE_TIMES, by_name, size_of
 from nutdamp.files.thruster_rules import instead, thrusts
 from nutdamp.files.yaml import Node
 from nutdamp.montecarlo.inputs import Pair, grouped, positive_definite
 from nutdamp.spacecraft.equipment import ACCELEROMETER
 from nutdamp.spacecraft.schedule import STEERABLE
-from nutdamp.spacecraft.tolerances import KINDS
+from nutdamp.spacecraft.tolerances import KINDS, READING
 from nutdamp.units import bar, shown
 
 PARTS = {

@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nutdamp.files.fields import (
     RIGHT_ANGLE,
     AcuteAngle,
     Direction,
     Field,
+    Key,
     Length,
     Name,
     Position,
@@ -24,13 +26,11 @@ from nutdamp.files.fields import (
     Section,
     Time,
 )
-from nutdamp.spacecraft.tolerances import KINDS, Dispersions, Tolerance
+from nutdamp.spacecraft.tolerances import KINDS, READING, Dispersions, Each, Tolerance
 from nutdamp.units import parse, pattern, shown
 
 if TYPE_CHECKING:
     from nutdamp.spacecraft.equipment import Steerable, Thruster
-
-READING = "reading"  # kind of the signal of a sensor: angular rate of a gyro, acceleration of an accelerometer
 
 RELATIVE = ("inertia", "momentum", "rate", "force", "ratio", "mass", "pressure")
 """The kinds of quantity that may be dispersed by a percentage of the nominal value."""
@@ -90,7 +90,7 @@ class ToleranceSection(Section):
 class _Tolerance(Rule):
     """Annotation of a tolerance of ``kind``; or of those of ``each`` axis or thruster, one of which may be for all."""
 
-    def __init__(self, kind: str, each: Literal["", "axis", "thruster"] = "") -> None:
+    def __init__(self, kind: str, each: Each = "") -> None:
         self.kind, self.each = kind, each
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
@@ -118,84 +118,19 @@ class _Tolerance(Rule):
         return single
 
 
-_Three = Annotated[list[ToleranceSection], Length(3, 3)]
-_ByThruster = dict[str, ToleranceSection]
-_Moment = Annotated[ToleranceSection, _Tolerance("inertia")]
-_Share = Annotated[ToleranceSection, _Tolerance("ratio")]
-_Time = Annotated[ToleranceSection, _Tolerance("time")]
-_Pressure = Annotated[ToleranceSection, _Tolerance("pressure")]
-_Times = Annotated[_ByThruster, _Tolerance("time", "thruster")]
+_WRITTEN: dict[str, Any] = {
+    "": ToleranceSection,
+    "axis": Annotated[list[ToleranceSection], Length(3, 3)],
+    "thruster": dict[str, ToleranceSection],
+}
+_TOLERANCES = {each.name: each.metadata for each in fields(Dispersions) if each.metadata}
+QUANTITIES = {key: declared["kind"] for key, declared in _TOLERANCES.items()}  # kinds of quantity by key
+BY_THRUSTER = tuple(key for key, declared in _TOLERANCES.items() if declared["each"] == "thruster")
 
 
 class DispersionsSection(Section):
     """Tolerances: {normal: one sigma}, {uniform: half width}, {triangular: half width} or {bias: fixed offset}."""
 
-    A: _Moment | None = Field("Of the transverse moment of inertia, kg m² or %.", {"normal": "2 %"})
-    C: _Moment | None = Field("Of the moment of inertia about the spin axis, kg m² or %.", {"normal": "1.6 kg m^2"})
-    wheel_momentum: Annotated[ToleranceSection, _Tolerance("momentum")] | None = Field(
-        "Of the angular momentum of the wheel, N m s or %.", {"normal": "0.5 N m s"}
-    )
-    omega0: Annotated[_Three, _Tolerance("rate", "axis")] | None = Field(
-        "Of each body rate at t = 0, rad/s or %; or a list of three.", {"normal": "0.1 deg/s"}
-    )
-    thrust: Annotated[_ByThruster, _Tolerance("force", "thruster")] | None = Field(
-        "Of each thruster, the same in all its pulses, % or N; or by name.", {"normal": "3 %"}
-    )
-    thrust_per_pulse: _Share | None = Field("Of the thrust, in each pulse anew, %.", {"normal": "1 %"})
-    thrust_direction: Annotated[_ByThruster, _Tolerance("angle", "thruster")] | None = Field(
-        "Tilt of each force about two axes across it, rad; or by name.", {"normal": "0.5 deg"}
-    )
-    position: Annotated[_ByThruster, _Tolerance("length", "thruster")] | None = Field(
-        "Of each thruster's position, each component, m; or by name.", {"normal": "5 mm"}
-    )
-    center_of_mass: Annotated[ToleranceSection, _Tolerance("length")] | None = Field(
-        "Of the center of mass, each component, m.", {"normal": "2 mm"}
-    )
-    timing: _Time | None = Field("Shift of each pulse, s.", {"uniform": "5 ms"})
-    timing_offset: _Time | None = Field("One shift of the whole schedule, s.", {"bias": "2 ms"})
-    attitude: Annotated[ToleranceSection, _Tolerance("angle")] | None = Field(
-        "Of the direction of the spin axis at t = 0, about two axes across it, rad.", {"normal": "0.2 deg"}
-    )
-    open_delay: _Times | None = Field(
-        "Of each valve's open_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
-    )
-    close_delay: _Times | None = Field(
-        "Of each valve's close_delay, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
-    )
-    rise_time: _Times | None = Field(
-        "Of each valve's rise_time, the same in all its pulses, s; or by name.", {"normal": "0.5 ms"}
-    )
-    fall_time: _Times | None = Field(
-        "Of each valve's fall_time, the same in all its pulses, s; or by name.", {"normal": "1 ms"}
-    )
-    impulse_bit: Annotated[_ByThruster, _Tolerance("ratio", "thruster")] | None = Field(
-        "Of the impulses of each impulse_bit, the same in all its pulses, %; or by name.", {"normal": "2 %"}
-    )
-    cold: _Share | None = Field("Of the factor of a first cold pulse, cold.first, in % of it.", {"normal": "2 %"})
-    sensor_bias: Annotated[ToleranceSection, _Tolerance(READING)] | None = Field(
-        "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", {"normal": "0.01 deg/s"}
-    )
-    sensor_scale: _Share | None = Field(
-        "Of the scale of each gyro of a loop, or of its accelerometer, %.", {"normal": "1 %"}
-    )
-    sensor_noise: _Share | None = Field("Of the noise of the sensor of a loop, %.", {"uniform": "20 %"})
-    sensor_delay: _Time | None = Field(
-        "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", {"uniform": "2 ms"}
-    )
-    cold_pulses: _Share | None = Field("Of the number of pulses over which nozzles warm up, in %.", {"normal": "10 %"})
-    tank_propellant: Annotated[ToleranceSection, _Tolerance("mass")] | None = Field(
-        "Of the propellant in the tank at t = 0, kg or %.", {"normal": "1 %"}
-    )
-    tank_pressure: _Pressure | None = Field(
-        "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", {"normal": "0.2 bar"}
-    )
-    tank_final_pressure: _Pressure | None = Field("Of the pressure with nothing left, Pa or %.", {"normal": "0.2 bar"})
-    tank_exponent: _Share | None = Field(
-        "Of the power of the pressure that the thrust goes with, in %.", {"normal": "5 %"}
-    )
-    inertia_per_kg: _Share | None = Field(
-        "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", {"normal": "10 %"}
-    )
     correlation: list[tuple[str, str, Annotated[float, Quantity("ratio", minimum=-1, maximum=1)]]] = Field(
         "Pairs of inputs that vary together, named as in disperse --json, and their correlation, -1 to 1;"
         " of uniform and triangular ones that of the normals behind them (Gaussian copula).",
@@ -203,15 +138,15 @@ class DispersionsSection(Section):
         default=[],
     )
 
-
-_TOLERANCES = {
-    key: rule
-    for key, field in DispersionsSection.fields().items()
-    for rule in get_args(get_args(field.type)[0])
-    if isinstance(rule, _Tolerance)
-}
-QUANTITIES = {key: rule.kind for key, rule in _TOLERANCES.items()}  # kinds of quantity by key
-BY_THRUSTER = tuple(key for key, rule in _TOLERANCES.items() if rule.each == "thruster")  # of all or by name
+    @classmethod
+    @cache
+    def fields(cls) -> dict[str, Key]:
+        """Keys declared by `Dispersions`, and the correlation."""
+        keys = {}
+        for key, declared in _TOLERANCES.items():
+            rule = _Tolerance(declared["kind"], declared["each"])
+            keys[key] = Key(Annotated[_WRITTEN[rule.each], rule] | None, None, declared["text"], [declared["example"]])
+        return keys | super().fields()
 
 
 def dispersions(

@@ -7,11 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from nutdamp.errors import BadRequest
 
 KINDS = ("normal", "uniform", "triangular", "bias")
 """Distribution, by the meaning of the size: one sigma, half width, half width, a fixed offset."""
+
+
+READING = "reading"  # kind of the signal of a sensor: angular rate of a gyro, acceleration of an accelerometer
+
+Each = Literal["", "axis", "thruster"]
+"""Tolerances that may differ by axis or by thruster; empty for a single one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,53 +34,72 @@ class Tolerance:
     relative: bool = False
 
 
+Known = Tolerance | None
+ByThruster = Mapping[str, Tolerance]
+
+
+def tolerance(kind: str, text: str, size: str, by: str = "normal", each: Each = "") -> Any:
+    """Field of `Dispersions` for a quantity of ``kind``, with an example: ``size`` in its distribution ``by``."""
+    default = (None, None, None) if each == "axis" else None
+    return field(default=default, metadata={"kind": kind, "each": each, "text": text, "example": {by: size}})
+
+
+def by_thruster(kind: str, text: str, size: str) -> Any:
+    """`tolerance` of each thruster, in the file of all or by name."""
+    declared = tolerance(kind, f"{text}; or by name.", size, each="thruster").metadata
+    return field(default_factory=dict, metadata=declared)
+
+
 @dataclass(frozen=True, slots=True)
 class Dispersions:
-    """Tolerances of a spacecraft; None, or no entry, for exactly known values.
+    """Tolerances of a spacecraft; None, or no entry, for exactly known values. The steerable torquer is a thruster.
 
-    ``A`` (both transverse moments) and ``C`` in kg m², ``wheel_momentum`` N m s; ``omega0`` the rates at t = 0 about
-    the axes of the file, rad/s. ``thrust`` holds relative tolerances by thruster, the same factor in all its pulses;
-    ``thrust_per_pulse`` is a relative one that each pulse draws anew. ``thrust_direction`` (rad, tilts about two axes
-    across the force) and ``position`` (m, each component) are by thruster too. The steerable torquer counts as the
-    thruster `schedule.STEERABLE`; ``center_of_mass`` is of each component, m. ``timing`` s shifts each pulse,
-    ``timing_offset`` s the whole schedule; ``attitude`` rad tilts the spin axis at t = 0 about two axes across it.
-    ``open_delay``, ``close_delay``, ``rise_time`` and ``fall_time`` s and ``impulse_bit``, a relative one, are by
-    thruster and alike in all its pulses; ``cold`` is how far the factor of a first cold pulse is off,
-    ``cold_pulses`` how far their number; ``tank_…`` are those of the tank (kg, Pa, a bare number),
-    ``inertia_per_kg`` a relative one of all its moments alike. ``sensor_bias`` (rad/s or m/s²) and the relative
-    ``sensor_scale`` are of each gyro, or of the accelerometer, of a loop, the relative ``sensor_noise`` and
-    ``sensor_delay`` s of all its samples. ``correlation``: pairs of inputs, by the names of
-    `nutdamp.montecarlo.inputs`, that vary together, see `nutdamp.montecarlo.inputs`.
+    Each field declares the key of the file. ``A`` is of both transverse moments; the axes of ``omega0`` are those of
+    the file. ``correlation``: pairs of inputs, by the names of `nutdamp.montecarlo.inputs`, that vary together.
     """
 
-    A: Tolerance | None = None
-    C: Tolerance | None = None
-    wheel_momentum: Tolerance | None = None
-    omega0: tuple[Tolerance | None, Tolerance | None, Tolerance | None] = (None, None, None)
-    thrust: Mapping[str, Tolerance] = field(default_factory=dict)
-    thrust_per_pulse: Tolerance | None = None
-    thrust_direction: Mapping[str, Tolerance] = field(default_factory=dict)
-    position: Mapping[str, Tolerance] = field(default_factory=dict)
-    center_of_mass: Tolerance | None = None
-    timing: Tolerance | None = None
-    timing_offset: Tolerance | None = None
-    attitude: Tolerance | None = None
-    open_delay: Mapping[str, Tolerance] = field(default_factory=dict)
-    close_delay: Mapping[str, Tolerance] = field(default_factory=dict)
-    rise_time: Mapping[str, Tolerance] = field(default_factory=dict)
-    fall_time: Mapping[str, Tolerance] = field(default_factory=dict)
-    impulse_bit: Mapping[str, Tolerance] = field(default_factory=dict)
-    cold: Tolerance | None = None
-    sensor_bias: Tolerance | None = None
-    sensor_scale: Tolerance | None = None
-    sensor_noise: Tolerance | None = None
-    sensor_delay: Tolerance | None = None
-    cold_pulses: Tolerance | None = None
-    tank_propellant: Tolerance | None = None
-    tank_pressure: Tolerance | None = None
-    tank_final_pressure: Tolerance | None = None
-    tank_exponent: Tolerance | None = None
-    inertia_per_kg: Tolerance | None = None
+    A: Known = tolerance("inertia", "Of the transverse moment of inertia, kg m² or %.", "2 %")
+    C: Known = tolerance("inertia", "Of the moment of inertia about the spin axis, kg m² or %.", "1.6 kg m^2")
+    wheel_momentum: Known = tolerance("momentum", "Of the angular momentum of the wheel, N m s or %.", "0.5 N m s")
+    omega0: tuple[Known, Known, Known] = tolerance(
+        "rate", "Of each body rate at t = 0, rad/s or %; or a list of three.", "0.1 deg/s", each="axis"
+    )
+    thrust: ByThruster = by_thruster("force", "Of each thruster, the same in all its pulses, % or N", "3 %")
+    thrust_per_pulse: Known = tolerance("ratio", "Of the thrust, in each pulse anew, %.", "1 %")
+    thrust_direction: ByThruster = by_thruster("angle", "Tilt of each force about two axes across it, rad", "0.5 deg")
+    position: ByThruster = by_thruster("length", "Of each thruster's position, each component, m", "5 mm")
+    center_of_mass: Known = tolerance("length", "Of the center of mass, each component, m.", "2 mm")
+    timing: Known = tolerance("time", "Shift of each pulse, s.", "5 ms", "uniform")
+    timing_offset: Known = tolerance("time", "One shift of the whole schedule, s.", "2 ms", "bias")
+    attitude: Known = tolerance(
+        "angle", "Of the direction of the spin axis at t = 0, about two axes across it, rad.", "0.2 deg"
+    )
+    open_delay: ByThruster = by_thruster("time", "Of each valve's open_delay, the same in all its pulses, s", "1 ms")
+    close_delay: ByThruster = by_thruster("time", "Of each valve's close_delay, the same in all its pulses, s", "1 ms")
+    rise_time: ByThruster = by_thruster("time", "Of each valve's rise_time, the same in all its pulses, s", "0.5 ms")
+    fall_time: ByThruster = by_thruster("time", "Of each valve's fall_time, the same in all its pulses, s", "1 ms")
+    impulse_bit: ByThruster = by_thruster(
+        "ratio", "Of the impulses of each impulse_bit, the same in all its pulses, %", "2 %"
+    )
+    cold: Known = tolerance("ratio", "Of the factor of a first cold pulse, cold.first, in % of it.", "2 %")
+    sensor_bias: Known = tolerance(
+        READING, "Of the bias of each gyro of a loop, rad/s, or of its accelerometer, m/s².", "0.01 deg/s"
+    )
+    sensor_scale: Known = tolerance("ratio", "Of the scale of each gyro of a loop, or of its accelerometer, %.", "1 %")
+    sensor_noise: Known = tolerance("ratio", "Of the noise of the sensor of a loop, %.", "20 %", "uniform")
+    sensor_delay: Known = tolerance(
+        "time", "Of the delay of the sensor of a loop, s; what would be below 0 is drawn again.", "2 ms", "uniform"
+    )
+    cold_pulses: Known = tolerance("ratio", "Of the number of pulses over which nozzles warm up, in %.", "10 %")
+    tank_propellant: Known = tolerance("mass", "Of the propellant in the tank at t = 0, kg or %.", "1 %")
+    tank_pressure: Known = tolerance(
+        "pressure", "Of the pressure at t = 0, for which the file gives the thrust, Pa or %.", "0.2 bar"
+    )
+    tank_final_pressure: Known = tolerance("pressure", "Of the pressure with nothing left, Pa or %.", "0.2 bar")
+    tank_exponent: Known = tolerance("ratio", "Of the power of the pressure that the thrust goes with, in %.", "5 %")
+    inertia_per_kg: Known = tolerance(
+        "ratio", "Of what each kg that is used takes off the moments of inertia, of all alike, in %.", "10 %"
+    )
     correlation: tuple[tuple[str, str, float], ...] = ()
 
 
