@@ -49,8 +49,9 @@ TIME = OptionKind("a time above zero, in s", "time")
 ANGLE = OptionKind("an angle of at least 0, in rad", "angle")
 
 
-def _option(default: Any, kind: OptionKind, text: str) -> Any:
-    return dataclasses.field(default=default, metadata={"kind": kind, "help": text})
+def _option(default: Any, kind: OptionKind, text: str, *, as_is: bool = False) -> Any:
+    """Field of an option; ``as_is``: where it is on, the schedule is not corrected."""
+    return dataclasses.field(default=default, metadata={"kind": kind, "help": text, "as_is": as_is})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +76,7 @@ class SchemeOptions:
     @property
     def uncorrected(self) -> bool:
         """True if the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
-        return False
+        return any(field.metadata["as_is"] and getattr(self, field.name) for field in dataclasses.fields(self))
 
     @property
     def frees_axis(self) -> bool:
@@ -92,12 +93,7 @@ class SchemeOptions:
 class TwoPulseOptions(SchemeOptions):
     """Options of two-pulse."""
 
-    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.")
-
-    @property
-    def uncorrected(self) -> bool:
-        """True as printed."""
-        return self.literal
+    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True)
 
 
 DEFAULT_SHARE = 0.125  # default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width
@@ -108,12 +104,7 @@ class FourPulseOptions(SchemeOptions):
     """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
-    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.")
-
-    @property
-    def uncorrected(self) -> bool:
-        """True for full pulses only."""
-        return self.coarse
+    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.", as_is=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,17 +190,15 @@ class Options:
 
     def __init__(self, **chosen: Any) -> None:
         self.chosen: Mapping[str, Any] = chosen
-        unknown = next((name for name in chosen if not any(name in names_of(kind) for kind in KINDS)), None)
-        if unknown is not None:
-            known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
-            raise BadRequest(f"options: no scheme has {unknown!r}; there are {', '.join(known)}")
+        known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
+        if unknown := [name for name in chosen if name not in known]:
+            raise BadRequest(f"options: no scheme has {unknown[0]!r}; there are {', '.join(known)}")
         for kind in KINDS:
             self.of(kind)
 
     def of(self, kind: type[Chosen]) -> Chosen:
         """Options of one scheme."""
-        names = names_of(kind)
-        return kind(**{name: value for name, value in self.chosen.items() if name in names})
+        return kind(**{name: value for name, value in self.chosen.items() if name in names_of(kind)})
 
     @property
     def with_disturbances(self) -> bool:
@@ -276,13 +265,7 @@ OPTIMAL = Scheme(
 )
 HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(
-    "rhumb-line",
-    RhumbLineOptions,
-    points=True,
-    only_points=True,
-    reads_sun=True,
-    body_fixed=True,
-    by_turns=True,
+    "rhumb-line", RhumbLineOptions, points=True, only_points=True, reads_sun=True, body_fixed=True, by_turns=True
 )
 COMMAND_BLOCK = Scheme(
     "command-block",
@@ -333,8 +316,9 @@ def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = N
         raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
     if not chosen:
         return value
-    own = [] if scheme is None else [SCHEMES[scheme].options]
-    if unread := [*Options(**chosen).without_effect(own)] if own else []:
-        has = ", ".join(names_of(own[0]))
-        raise BadRequest(f"options: {scheme} has no {unread[0]!r}; there are {has}")
-    return Options(**chosen)
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}")
+    return options

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
-from nutdamp.errors import TooShort
+from nutdamp.common import work
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel
@@ -15,6 +18,9 @@ from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
 TRAIN_SHARE = 0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
+
+PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
+IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
 
 LEFT_OVER = 0.01  # share of A|ω0| from which a remainder counts against a channel
 
@@ -36,13 +42,9 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)
-    return min(trains, key=_preference).schedule()
-
-
-def _preference(builder: ImpulseBuilder) -> tuple[bool, int, float, float]:
-    chosen = builder.schedule()
-    lacks = not builder.settled and builder.left > LEFT_OVER * builder.spacecraft.least_impulse
-    return lacks, len(chosen), chosen.cost, chosen.end
+    lacking = LEFT_OVER * spacecraft.least_impulse
+    choices = [(not train.settled and train.left > lacking, train.schedule()) for train in trains]
+    return min(choices, key=lambda choice: (choice[0], len(choice[1]), choice[1].cost, choice[1].end))[1]
 
 
 def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
@@ -72,12 +74,10 @@ def _train(
             return math.inf
         return torque * on_time * abs(response.width_factor(start.turning, slope, on_time))
 
-    longest = longest_useful(max_on_time, start.period)
-    count = 1
+    longest, most, count = longest_useful(max_on_time, start.period), start.most, 1
     single = math.isinf(torque) or response.on_time_for(start.left, torque, start.turning, slope, longest)
-    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))  # a pulse as wide as that loses 10 % of its impulse
+    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
     if not single and share > 0.0:
-        most = start.most
         count = math.ceil(min(start.left / share, most + 1.0))
         if count > most:  # rather longer pulses than too many
             count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
@@ -101,3 +101,46 @@ def _fire_train(
             break
         builder.fire(pulse)
     return builder
+
+
+def damped(start: FlownBuilder) -> FlownBuilder:
+    """The ``start``, after the damping by one pulse or a train, from which the rest of the way costs least.
+
+    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
+    C|ω3| times its angle, differs by the cone.
+    Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
+    """
+    here = start.here
+    h = abs(here.axial)
+    # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
+    span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
+    best: tuple[float, FlownBuilder] | None = None
+    reason: Infeasible | None = None
+    steps = 0
+    moments = 16  # earliest starts that are tried
+    for number in range(moments):
+        earliest = here.limits.earliest + number * span / moments
+        if number > 0 and earliest > IN_REACH * here.horizon:  # the rest is for the turn
+            break
+        try:
+            damping = schedule(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+        except Infeasible as why:
+            reason = why
+            continue
+        builder = start.fork()
+        try:
+            builder.fire(damping, bounded=True)
+        except Infeasible as why:
+            reason = why
+            break
+        cost = damping.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        if best is None or cost < best[0]:
+            best = cost, builder
+        steps += builder.steps
+        if steps > PREDAMPING_INTEGRATED or work.exhausted():
+            break
+    if best is None:
+        text = "the nutation is to be taken out first, and"
+        # Its cure, where it has one, is for the damping alone.
+        raise TooShort(f"{text} {reason.why}") if isinstance(reason, TooShort) else Infeasible(f"{text} {reason}")
+    return best[1]
