@@ -58,9 +58,7 @@ def _option(default: Any, kind: OptionKind, text: str, *, as_is: bool = False) -
 class SchemeOptions:
     """Options of every scheme. Raises SenselessOption for an invalid value."""
 
-    equal: ClassVar[bool] = False
-    """True if the pulses are of one size, which corrections keep."""
-
+    equal: ClassVar[bool] = False  # whether the pulses are of one size, which corrections keep
     with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
 
     def __post_init__(self) -> None:
@@ -79,14 +77,9 @@ class SchemeOptions:
         return any(field.metadata["as_is"] and getattr(self, field.name) for field in dataclasses.fields(self))
 
     @property
-    def frees_axis(self) -> bool:
-        """True if H may end anywhere."""
-        return False
-
-    @property
     def resizable(self) -> bool:
-        """True if corrections may change the length of pulses."""
-        return True
+        """True if corrections may change the length of pulses: none was requested."""
+        return getattr(self, "on_time", None) is None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,11 +127,6 @@ class RhumbLineOptions(SchemeOptions):
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
 
-    @property
-    def resizable(self) -> bool:
-        """False where a length was requested."""
-        return self.on_time is None
-
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
@@ -156,11 +144,6 @@ class OptimalOptions(SchemeOptions):
         if self.shift is not None and self.free_axis:
             problem = "expected none beside a free axis, where H may end anywhere"
             raise SenselessOption("shift", as_given(self.shift), problem)
-
-    @property
-    def frees_axis(self) -> bool:
-        """True if H may end anywhere."""
-        return bool(self.free_axis)
 
     def settled(self, *, keeps_axis: bool) -> Self:
         """Copy with the default freedom of H; no ``shift`` at all is none."""
@@ -224,32 +207,23 @@ def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme: its ``name`` and the class of its ``options``.
-
-    ``classic``: of Magnus 1970. ``points``: can turn the spin axis to a target, and is planned when there is one and
-    none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
-    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a function ``alternatives`` too,
-    of schedules about as good. ``body_fixed``: fires channels of the file only, no steerable torquer.
-    ``reads_commands``: makes blocks of the ``commands`` of the file, and is planned where there are some.
-    ``on_true_body``: needs no symmetric model. ``slow``: may take seconds. ``by_turns``: fires at one phase of each
-    spin turn, so that the body has to spin. ``home``: its module, where that has another name.
-    """
+    """A scheme, and what it can do."""
 
     name: str
     options: type[SchemeOptions] = SchemeOptions
     fires: bool = True
-    classic: bool = False
-    points: bool = False
-    only_points: bool = False
-    reads_sun: bool = False
-    sets_spin: bool = False
-    weighs_alternatives: bool = False
-    body_fixed: bool = False
-    reads_commands: bool = False
-    on_true_body: bool = False
-    slow: bool = False
-    by_turns: bool = False
-    home: str = ""
+    classic: bool = False  # of Magnus 1970
+    points: bool = False  # can turn the spin axis to a target, and is planned when there is one and none is named
+    only_points: bool = False  # does nothing else, and needs a target
+    reads_sun: bool = False  # keeps its pulses at a fixed phase to the Sun
+    sets_spin: bool = False  # can change the spin rate
+    weighs_alternatives: bool = False  # has a function ``alternatives`` too, of schedules about as good
+    body_fixed: bool = False  # fires channels of the file only, no steerable torquer
+    reads_commands: bool = False  # makes blocks of the ``commands`` of the file, and is planned where there are some
+    on_true_body: bool = False  # needs no symmetric model
+    slow: bool = False  # may take seconds
+    by_turns: bool = False  # fires at one phase of each spin turn, so that the body has to spin
+    home: str = ""  # its module, where that has another name
 
     @property
     def module(self) -> str:
@@ -287,8 +261,8 @@ NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
 COMPARED = (*CLASSIC, OPTIMAL.name)  # default schemes without a target
+# in the order in which they are shown: those that take seconds last
 POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
-"""In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)

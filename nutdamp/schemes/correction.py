@@ -2,7 +2,7 @@
 
 Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a handful of unknowns.
 scipy.optimize would do it too, but loading it takes longer than a whole plan. Schemes that point the spin axis lay
-their schedules stage by stage along the flown motion, after damping at a time at which H ends near the target.
+their schedules stage by stage along the flown motion.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics, supplied
 from nutdamp.physics import attitude, precession
-from nutdamp.schemes.catalogue import Scheme, SchemeOptions
+from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft.constraints import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
 from nutdamp.spacecraft.equipment import Channel
@@ -48,7 +48,6 @@ before the equal ones, which damp the nutation, and at the end."""
 
 EXACT = 1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
 
-
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
 """Factors of cost and miss within which candidates count as equal: of those the one that ends first is preferred."""
 
@@ -60,12 +59,9 @@ class PairCandidate(NamedTuple):
     end: float
     channels: tuple[Channel, Channel]
     timing: tuple[tuple[float, float], tuple[float, float]]
-    short: float = 0.0
-    """Part of the impulse out of reach."""
-    miss: float = 0.0
-    """ψ, rad."""
-    factor: float = 1.0
-    """Impulse over A|ω0|."""
+    short: float = 0.0  # part of the impulse out of reach
+    miss: float = 0.0  # ψ, rad
+    factor: float = 1.0  # impulse over A|ω0|
 
     def fired(self, spacecraft: Spacecraft) -> Schedule:
         """The two pulses, commandable."""
@@ -191,7 +187,7 @@ class Correction:
     @property
     def momentum(self) -> bool:
         """True if H too has an end condition."""
-        return self.scheme.points and not self.options.frees_axis
+        return self.scheme.points and not (isinstance(self.options, OptimalOptions) and self.options.free_axis)
 
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
         """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 from nutdamp.common import work
@@ -13,7 +12,7 @@ from nutdamp.schemes.catalogue import SchemeOptions
 from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
-from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Pulse, Schedule
 
@@ -33,13 +32,12 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     """
     torquer = spacecraft.torquer
     if torquer is not None:
-        torque = math.inf if torquer.torque is None else torquer.torque
-        builder = _train(spacecraft, torque, 0.0, math.inf, lambda builder, impulse: builder.steer(torquer, impulse))
-        if builder.pulses:
-            return builder.schedule()
+        train = _train(spacecraft, torquer)
+        if train.pulses:
+            return train.schedule()
         raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = at_hand(spacecraft, usable(spacecraft))
-    trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
+    trains = [train for train in (_train(spacecraft, channel) for channel in channels) if train.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)
     lacking = LEFT_OVER * spacecraft.least_impulse
@@ -47,27 +45,14 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     return min(choices, key=lambda choice: (choice[0], len(choice[1]), choice[1].cost, choice[1].end))[1]
 
 
-def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
-    """Pulses of one channel at its successive alignments."""
-
-    def fire(builder: ImpulseBuilder, impulse: float) -> Pulse | None:
-        on_time = builder.on_time_for(channel, impulse)
-        longest = longest_useful(channel.max_on_time, builder.period)
-        return builder.align(channel, longest if on_time is None else on_time)
-
-    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
-    return _train(spacecraft, abs(channel.transverse), slope, channel.max_on_time, fire)
-
-
-def _train(
-    spacecraft: Spacecraft,
-    torque: float,
-    slope: float,
-    max_on_time: float,
-    fire: Callable[[ImpulseBuilder, float], Pulse | None],
-) -> ImpulseBuilder:
+def _train(spacecraft: Spacecraft, actuator: Channel | Steerable) -> ImpulseBuilder:
     """The fewest equal pulses that take out what is left; fewer where the limits end it or nothing is gained."""
-    start = ImpulseBuilder(spacecraft)
+    start, slope, max_on_time = ImpulseBuilder(spacecraft), 0.0, math.inf
+    if isinstance(actuator, Channel):
+        torque, max_on_time = abs(actuator.transverse), actuator.max_on_time
+        slope = spacecraft.inertia.a * actuator.axial / spacecraft.inertia.C
+    else:
+        torque = math.inf if actuator.torque is None else actuator.torque
 
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
@@ -83,24 +68,29 @@ def _train(
             count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
     # A channel that also spins up takes out less the longer it is on: one pulse may do what the longest cannot.
     strongest = math.inf if single else capacity(longest)
-    builder = _fire_train(spacecraft, count, strongest, fire)
-    if spacecraft.growth > 0.0 and builder.pulses and builder.left > LEFT_OVER * start.left:
+
+    def fired(count: int) -> ImpulseBuilder:
+        builder = ImpulseBuilder(spacecraft)
+        for remaining in range(count, 0, -1):
+            pulse = _next_pulse(builder, actuator, min(builder.left / remaining, strongest))
+            if builder.full or pulse is None or not builder.helps(pulse):
+                break
+            builder.fire(pulse)
+        return builder
+
+    train = fired(count)
+    if spacecraft.growth > 0.0 and train.pulses and train.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
-        longer = _fire_train(spacecraft, count + 1, strongest, fire)
-        builder = min(builder, longer, key=lambda train: train.left)
-    return builder
+        train = min(train, fired(count + 1), key=lambda train: train.left)
+    return train
 
 
-def _fire_train(
-    spacecraft: Spacecraft, count: int, strongest: float, fire: Callable[[ImpulseBuilder, float], Pulse | None]
-) -> ImpulseBuilder:
-    builder = ImpulseBuilder(spacecraft)
-    for remaining in range(count, 0, -1):
-        pulse = fire(builder, min(builder.left / remaining, strongest))
-        if builder.full or pulse is None or not builder.helps(pulse):
-            break
-        builder.fire(pulse)
-    return builder
+def _next_pulse(builder: ImpulseBuilder, actuator: Channel | Steerable, impulse: float) -> Pulse | None:
+    """Pulse like ``impulse`` N m s: a torquer fires at once, a channel at its next alignment, as long as it can."""
+    if isinstance(actuator, Steerable):
+        return builder.steer(actuator, impulse)
+    on_time = builder.on_time_for(actuator, impulse)
+    return builder.align(actuator, longest_useful(actuator.max_on_time, builder.period) if on_time is None else on_time)
 
 
 def damped(start: FlownBuilder) -> FlownBuilder:

@@ -338,26 +338,24 @@ class _PairSearch:
             body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
         return TwoJumps(middle, first, np.linalg.norm(jump, axis=1), wait, turn), body
 
-    def all_candidates(self) -> list[PairCandidate]:
+    def all_candidates(self) -> Iterator[PairCandidate]:
         """Candidates for the target; where that lies on the cone of the spin axis, for targets beside it."""
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
         if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
-            return self.candidates()
-        candidates, target = [], self.target
+            yield from self.candidates()
+            return
+        target = self.target
         side = np.cross(self.momentum, target)
         for beside, sense in product((side, np.cross(side, target)), (1.0, -1.0)):
             moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
             self.target = moved / float(np.linalg.norm(moved))
-            candidates += self.candidates()
-        self.target = target
-        return candidates
+            yield from self.candidates()
 
-    def candidates(self) -> list[PairCandidate]:
+    def candidates(self) -> Iterator[PairCandidate]:
         """Pairs that close and keep the limits, the cheapest of each first channel."""
         times = self.times()
-        candidates: list[PairCandidate] = []
         if len(times) < 2:
-            return candidates
+            return
         adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / self.spacecraft.fastest / BODY_SAMPLES
         for one in self.channels:
             if work.exhausted():
@@ -373,8 +371,8 @@ class _PairSearch:
                     off = np.angle(needed * two.transverse.conjugate())
                     near = np.abs(off) < 0.5 * math.pi
                     crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
-                    candidates += self._placed(one, two, further, times, after, off, crosses)
-        return candidates
+                    if len(crosses) > 0:
+                        yield from self._placed(one, two, further, times, after, off, crosses)
 
     def _placed(
         self,
@@ -387,8 +385,6 @@ class _PairSearch:
         crosses: NDArray[np.intp],
     ) -> list[PairCandidate]:
         """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
-        if len(crosses) == 0:
-            return []
         here, there = off[crosses], off[crosses + 1]
         share = np.where(here == there, 0.5, here / (here - there + (here == there)))
 
