@@ -52,8 +52,11 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         return _row(builder, options.cones)
     best: Schedule | None = None
     reasons = list[Infeasible]()
-    cones = fewest = _fewest(builder.here)
-    while cones <= _most(builder.here):
+    here = builder.here
+    cones = fewest = _fewest(here)
+    allowed, horizon = here.limits.max_pulses, here.horizon
+    half_turns = int(max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial)))
+    while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
             row = _row(builder.fork(), cones)
             if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
@@ -66,9 +69,23 @@ def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
         if work.exhausted():
             break
         cones += 1 + cones // 6  # where there are many, in steps of a sixth
-    if best is None:
-        raise reasons[-1] if reasons else _no_time(builder.here, fewest)
-    return best
+    if best is not None:
+        return best
+    if reasons:
+        raise reasons[-1]
+    if allowed is not None and allowed < fewest + 1:
+        raise Infeasible(
+            f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {allowed}"
+        )
+    if fewest >= MOST_CONES:
+        raise Infeasible(
+            f"one pulse turns H by {turn_of(here, _reach(here))} at most, so more than {MOST_CONES} half "
+            "cones would be needed; rhumb-line takes many small pulses"
+        )
+    raise TooShort(
+        f"{fewest} half cones are needed at least, each half a nutation turn long; "
+        f"the {horizon:.4g} s up to limits.horizon do not suffice for them"
+    )
 
 
 def _reach(spacecraft: Spacecraft) -> float:
@@ -88,29 +105,6 @@ def _fewest(spacecraft: Spacecraft) -> int:
         if 0.0 <= pulse <= reach:
             return cones
     return MOST_CONES
-
-
-def _most(spacecraft: Spacecraft) -> int:
-    """Largest number of cones for which there are time and pulses."""
-    half_turn = math.pi * spacecraft.inertia.A / abs(spacecraft.axial)
-    room = int(max(spacecraft.horizon - spacecraft.limits.earliest, 0.0) / half_turn) + 1
-    most = spacecraft.limits.max_pulses
-    return min(MOST_CONES, room, MOST_CONES if most is None else most - 1)
-
-
-def _no_time(spacecraft: Spacecraft, fewest: int) -> Infeasible:
-    most = spacecraft.limits.max_pulses
-    if most is not None and most < fewest + 1:
-        return Infeasible(f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}")
-    if fewest >= MOST_CONES:
-        return Infeasible(
-            f"one pulse turns H by {turn_of(spacecraft, _reach(spacecraft))} at most, so more than {MOST_CONES} half "
-            "cones would be needed; rhumb-line takes many small pulses"
-        )
-    return TooShort(
-        f"{fewest} half cones are needed at least, each half a nutation turn long; "
-        f"the {spacecraft.horizon:.4g} s up to limits.horizon do not suffice for them"
-    )
 
 
 def _row(builder: FlownBuilder, cones: int) -> Schedule:

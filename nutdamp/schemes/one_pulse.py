@@ -14,7 +14,7 @@ from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
 
 TRAIN_SHARE = 0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
 
@@ -72,7 +72,12 @@ def _train(spacecraft: Spacecraft, actuator: Channel | Steerable) -> ImpulseBuil
     def fired(count: int) -> ImpulseBuilder:
         builder = ImpulseBuilder(spacecraft)
         for remaining in range(count, 0, -1):
-            pulse = _next_pulse(builder, actuator, min(builder.left / remaining, strongest))
+            impulse = min(builder.left / remaining, strongest)
+            if isinstance(actuator, Steerable):
+                pulse = builder.steer(actuator, impulse)
+            else:  # at its next alignment, as long as it can where that is too short
+                on_time, most = builder.on_time_for(actuator, impulse), longest_useful(max_on_time, builder.period)
+                pulse = builder.align(actuator, most if on_time is None else on_time)
             if builder.full or pulse is None or not builder.helps(pulse):
                 break
             builder.fire(pulse)
@@ -85,28 +90,17 @@ def _train(spacecraft: Spacecraft, actuator: Channel | Steerable) -> ImpulseBuil
     return train
 
 
-def _next_pulse(builder: ImpulseBuilder, actuator: Channel | Steerable, impulse: float) -> Pulse | None:
-    """Pulse like ``impulse`` N m s: a torquer fires at once, a channel at its next alignment, as long as it can."""
-    if isinstance(actuator, Steerable):
-        return builder.steer(actuator, impulse)
-    on_time = builder.on_time_for(actuator, impulse)
-    return builder.align(actuator, longest_useful(actuator.max_on_time, builder.period) if on_time is None else on_time)
-
-
 def damped(start: FlownBuilder) -> FlownBuilder:
     """The ``start``, after the damping by one pulse or a train, from which the rest of the way costs least.
 
     H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
-    C|ω3| times its angle, differs by the cone.
-    Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
+    C|ω3| times its angle, differs by the cone. Raises Infeasible where no channel can damp, or the budget ends before.
     """
-    here = start.here
-    h = abs(here.axial)
+    here, steps = start.here, 0
     # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
     span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
     best: tuple[float, FlownBuilder] | None = None
     reason: Infeasible | None = None
-    steps = 0
     moments = 16  # earliest starts that are tried
     for number in range(moments):
         earliest = here.limits.earliest + number * span / moments
@@ -123,7 +117,7 @@ def damped(start: FlownBuilder) -> FlownBuilder:
         except Infeasible as why:
             reason = why
             break
-        cost = damping.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        cost = damping.total_impulse + abs(here.axial) * (builder.here.to_turn + 2.0 * builder.here.nutation)
         if best is None or cost < best[0]:
             best = cost, builder
         steps += builder.steps

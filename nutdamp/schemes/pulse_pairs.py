@@ -271,9 +271,6 @@ def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     )
 
 
-# --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
 def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
     search = _PairSearch(spacecraft, channels)
@@ -308,14 +305,6 @@ class _PairSearch:
         self.floor = max(spacecraft.least_impulse, spacecraft.turning_impulse)
         self.arc = Arc.of(inertia, spacecraft.initial)
         self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
-
-    def times(self) -> Vector:
-        """Moments (n,) s of the first pulse that are looked at."""
-        turn, first = 2.0 * math.pi / self.spacecraft.fastest, self.spacecraft.limits.earliest
-        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
-        span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
-        times = np.unique(np.concatenate([end + span for end in ends]))
-        return np.asarray(times[times <= self.windows.horizon])
 
     def after(self, channel: Channel, times: Vector) -> tuple[TwoJumps, NDArray[np.complex128]]:
         """Jumps, the first by ``channel`` at ``times`` (n,) s, and the second in the body after the wait, J1 + iJ2."""
@@ -353,10 +342,14 @@ class _PairSearch:
 
     def candidates(self) -> Iterator[PairCandidate]:
         """Pairs that close and keep the limits, the cheapest of each first channel."""
-        times = self.times()
+        turn, first = 2.0 * math.pi / self.spacecraft.fastest, self.spacecraft.limits.earliest
+        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
+        span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
+        times = np.unique(np.concatenate([end + span for end in ends]))  # of the first pulse, s
+        times = np.asarray(times[times <= self.windows.horizon])
         if len(times) < 2:
             return
-        adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / self.spacecraft.fastest / BODY_SAMPLES
+        adjoining = np.diff(times) < 1.5 * turn / BODY_SAMPLES
         for one in self.channels:
             if work.exhausted():
                 break

@@ -85,22 +85,7 @@ class Train:
         self.widest = min(self.longest, WIDEST * self.turn)  # s, that is worth firing unless a longer one is given
         given = options.on_time
         self.on_time = max(min(self.longest, TURN_SHARE * self.turn), self.shortest) if given is None else given
-        self._check()
-        self.ahead, self.way = precession.course(here.momentum, here.target_axis, here.goal.sun)
-        self.needed = self.h * self.way  # turn of H, N m s
-        self.strongest = self.turns_by(STEP * self.h if self.ideal else self.on_time)  # turn by a full pulse, N m s
-        most = here.limits.max_pulses
-        self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
-        if self.shortest > 0.0:
-            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
-
-    def turns_by(self, size: float) -> float:
-        """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
-        return size if self.ideal else self.torque * size * precession.arc_efficiency(self.here.spin, size)
-
-    def _check(self) -> None:
-        """Raises Infeasible where no pulse can be as long as requested, or should."""
-        given, name = self.options.on_time, f"the shortest pulse, {self.shortest:.4g} s,"
+        name = f"the shortest pulse, {self.shortest:.4g} s,"
         if given is not None:
             name = f"an on-time of {given:.4g} s"
             if self.ideal:
@@ -118,6 +103,17 @@ class Train:
                 f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s), after which a torque fixed in the "
                 "body undoes its work"
             )
+        self.ahead, self.way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        self.needed = self.h * self.way  # turn of H, N m s
+        self.strongest = self.turns_by(STEP * self.h if self.ideal else self.on_time)  # turn by a full pulse, N m s
+        most = here.limits.max_pulses
+        self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
+        if self.shortest > 0.0:
+            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
+
+    def turns_by(self, size: float) -> float:
+        """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
+        return size if self.ideal else self.torque * size * precession.arc_efficiency(self.here.spin, size)
 
     def size(self, count: int, bent: float = 1.0) -> float:
         """Size of ``count`` pulses with ``bent`` times those to spare, on ticks; not a number where it is too far."""
@@ -130,20 +126,15 @@ class Train:
         return self.windows.tick_after(width) if math.isfinite(width) else math.nan
 
     def _spare(self, count: int) -> float:
-        """Spare pulses of a train of ``count``, which leaves nutation if it is not corrected.
+        """Spare pulses of a train of ``count`` that is corrected.
 
-        A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
-        of its square.
+        A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of its square.
         """
         ratio = abs(self.here.nutation_rate / self.here.spin)
         return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(count, LAST)
 
-    def attempts(self) -> list[Attempt]:
-        """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
-        return self._free() if self.options.on_time is None else self._held(self.on_time)
-
-    def _free(self) -> list[Attempt]:
-        """Trains of pulses of any length."""
+    def free(self) -> list[Attempt]:
+        """Trains of any length to fly, the most promising first; raises Infeasible where there is none."""
         left, fewest = self.left, self._fewest(self.strongest)
         if fewest > len(left):
             fewest = self._fewest(self.turns_by(STEP * self.h if self.ideal else self.widest))
@@ -161,7 +152,7 @@ class Train:
         free = self.here.limits.tick is None
         tried = [Attempt(count, self.size(count), True, free) for count in near]
         tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size)
-        tried = tried[:TRIES]
+        del tried[TRIES:]
         tried += [Attempt(count, self.size(count, BENT), False, free) for count, *_ in tried[:2]]
         widest = math.inf if self.ideal else max(self.on_time, self.widest) + TOUCHING
         possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
@@ -169,17 +160,16 @@ class Train:
             raise self._too_few(most + 1)
         return possible
 
-    def _held(self, given: float) -> list[Attempt]:
-        """Trains of pulses ``given`` s long, the fewest first, the spare ones bent away."""
+    def held(self) -> list[Attempt]:
+        """Trains of the length requested, the fewest pulses first; raises Infeasible where there is none."""
         left, fewest = self.left, self._fewest(self.strongest)
         most = min(self.most, len(left))
         if fewest > most:
             raise self._too_few(fewest)
         counts = range(fewest, min(most, fewest + 2 * TRIES) + 1)
-        needed = self.needed / self.turns_by(given)
         closing = [count for count in counts if left[count - 1] <= OPEN]
-        enough = [count for count in closing if count - needed >= 0.5 * self._spare(count)]
-        tried = [Attempt(count, given, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
+        enough = [count for count in closing if count - self.needed / self.strongest >= 0.5 * self._spare(count)]
+        tried = [Attempt(count, self.on_time, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
         if not tried:
             raise self._in_phase(fewest, counts[-1])
         return tried[: 2 * TRIES]
@@ -241,7 +231,13 @@ class Train:
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
-        ahead, ready = self._heading(here, remaining, attempt), here.limits.earliest
+        ahead, way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        share = self.h * way / (remaining * self.turns_by(attempt.size))
+        if share < 1.0:  # equal pulses would turn H too far: to one side of the target, a spiral
+            bend = math.acos(max(share, math.cos(WIDEST_BEND)))
+            aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
+            ahead = np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
+        ready = here.limits.earliest
         on_time = 0.0 if self.ideal else attempt.size
         if here is not self.here:  # no two in the same passage of the phase
             turn = self.turn / self.options.per_turn
@@ -255,14 +251,6 @@ class Train:
         assert here.torquer is not None
         angle = cmath.phase(_in_body(here, ahead, centre))
         return steerable_pulse(here.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
-
-    def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
-        """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
-        ahead, way = precession.course(here.momentum, here.target_axis, here.goal.sun)
-        share = self.h * way / (remaining * self.turns_by(attempt.size))
-        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
-        aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
-        return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
 
     def _passing(self, here: Spacecraft, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
         """First firing of a channel at the required phase within the limits."""
@@ -417,7 +405,7 @@ def _best(builder: FlownBuilder, train: Train) -> Schedule:
     floor = train.needed / precession.arc_efficiency(
         train.here.spin, train.shortest if requested is None else requested
     )
-    for attempt in train.attempts():
+    for attempt in train.free() if requested is None else train.held():
         # What the rounding of the start of one pulse to a tick leaves counts as nothing.
         rounding = train.turns_by(attempt.size) / train.h * abs(train.here.spin) * (train.here.limits.tick or 0.0)
         nothing = max(EXACT, rounding)

@@ -100,11 +100,6 @@ class ImpulseBuilder:
         size = axial + across
         return self.spacecraft.growth, *((math.sqrt(axial / size), across / size) if size > 0.0 else (1.0, 0.0))
 
-    def _turned(self, time: float) -> float:
-        """Time, s, in which the present spin turns the body as far as it turns from now to ``time`` s."""
-        since = time - self.now
-        return since if self._even else energy_sink.course(*self._sink(), since).turned
-
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
         free, _ = self._coast(time)
@@ -167,7 +162,9 @@ class ImpulseBuilder:
 
         def alignment(ready: float) -> float:
             """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
-            return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
+            since = ready + 0.5 * on_time - slack - self.now
+            turned = since if self._even else energy_sink.course(*self._sink(), since).turned
+            return math.ceil((turned - first) / self.period)
 
         turns = alignment(self.ready)
         for _ in range(len(self.windows.limits.blackout) + MISSED):

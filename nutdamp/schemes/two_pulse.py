@@ -16,7 +16,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from nutdamp.common.results import Note, note
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import energy_sink, response
@@ -72,12 +72,18 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     channels = at_hand(spacecraft, for_pairs(spacecraft))
     best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
     schedule = best or broken
-    if schedule is None:
-        raise Infeasible(_nothing_closes(spacecraft, channels))
-    return schedule
-
-
-# --- steerable torquer -----------------------------------------------------------------------------------------------
+    if schedule is not None:
+        return schedule
+    names = ", ".join(channel.name for channel in channels)
+    if spacecraft.nutation_rate == 0.0:
+        raise Infeasible(
+            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
+            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
+        )
+    if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
+        raise Infeasible(f"dissipation takes the nutation out before the channels ({names}) come to oppose it")
+    bounds = bounded_by(spacecraft)
+    raise Infeasible(f"no two of the channels ({names}) bring H back and oppose the nutation within {bounds}")
 
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
@@ -132,9 +138,6 @@ def _starts(windows: Windows, on_times: list[float], wait: float) -> list[float]
     return [float(start) for start in starts[allowed]]
 
 
-# --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
     """Schedules of channels among which `schedule` chooses, within the limits; none where there is no nutation."""
     if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
@@ -147,30 +150,25 @@ def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
     """Most promising candidates, commandable and corrected on the real widths, each with its flown residual (rad)."""
-    pairs = itertools.product(channels, channels)
+    inertia, pairs = spacecraft.inertia, itertools.product(channels, channels)
+    spin = inertia.equivalent(spacecraft.spin)
+    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
     candidates = (candidate for pair in pairs for candidate in _candidates(spacecraft, *pair, options.literal))
     for candidate in correction.shortlist(candidates, SHORTLIST, SHORTLIST):
         schedule = candidate.fired(spacecraft)
         if not options.literal:
             schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-        left = correction.left(spacecraft, schedule)
-        yield Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
-
-
-def _remark(spacecraft: Spacecraft, candidate: PairCandidate, schedule: Schedule) -> tuple[Note, ...]:
-    inertia, (first, second) = spacecraft.inertia, schedule.pulses
-    spin = inertia.equivalent(spacecraft.spin)
-    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
-    apart = note(
-        "half-turns-apart",
-        first=candidate.channels[0].name,
-        second=candidate.channels[1].name,
-        half_turns=f"{(second.t - first.t) / halves.wait:.2f}",
-        off_deg=abs(math.degrees(candidate.miss)),
-        ratio=f"{candidate.factor:.3f}",
-    )
-    missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (candidate.short > 1e-9)
-    return (apart, *missed)
+        first, second = schedule.pulses
+        apart = note(
+            "half-turns-apart",
+            first=candidate.channels[0].name,
+            second=candidate.channels[1].name,
+            half_turns=f"{(second.t - first.t) / halves.wait:.2f}",
+            off_deg=abs(math.degrees(candidate.miss)),
+            ratio=f"{candidate.factor:.3f}",
+        )
+        missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (candidate.short > 1e-9)
+        yield Schedule(schedule.pulses, (apart, *missed)), correction.left(spacecraft, schedule)
 
 
 def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[PairCandidate]:
@@ -201,9 +199,14 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
         waits = halves.wait * odd
     miss = np.angle(np.exp(1j * (turn + turning * waits)))
     factor = 1.0 / np.cos(0.5 * miss)
+    # Worth placing: each wait clearly cheaper than all before it, and the cheapest few.
+    before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
+    better = np.flatnonzero(factor * CLOSE_IN_COST < before)
+    cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
     placed = (
         _place(spacecraft, (one, two), halves, float(waits[index]), float(miss[index]), literal)
-        for index in _promising(factor)
+        for index in sorted({*better.tolist(), *cheapest.tolist()})
+        if factor[index] <= DEAREST
     )
     return [candidate for candidate in placed if candidate is not None]
 
@@ -219,15 +222,6 @@ def _turns(count: int, miss: float, step: float) -> Vector:
     crossings = (2 * math.pi * np.arange(MANY) - math.copysign(1.0, step) * miss) / abs(step)
     near = np.round(crossings)[:, None] + np.array([-1.0, 0.0, 1.0])
     return np.union1d(first, near[(near >= 0) & (near < count)])
-
-
-def _promising(factor: Vector) -> Vector:
-    """Indices of the waits worth placing: each one clearly cheaper than all before it, and the cheapest few."""
-    before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
-    better = np.flatnonzero(factor * CLOSE_IN_COST < before)
-    cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
-    chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
-    return np.asarray(chosen[factor[chosen] <= DEAREST])  # beyond, the second pulse would mostly undo the first
 
 
 def _place(
@@ -295,15 +289,3 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
     omega = complex(first, second)
     effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, omega, spin, time, inertia.wheel)
     return float(effect.transverse)
-
-
-def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
-    names = ", ".join(channel.name for channel in channels)
-    if spacecraft.nutation_rate == 0.0:
-        return (
-            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
-            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
-        )
-    if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
-        return f"dissipation takes the nutation out before the channels ({names}) come to oppose it"
-    return f"no two of the channels ({names}) bring H back and oppose the nutation within {bounded_by(spacecraft)}"
