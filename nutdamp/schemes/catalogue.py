@@ -282,10 +282,7 @@ def expect_names(values: Iterable[str]) -> tuple[str, ...]:
 
 
 def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = None) -> Options | SchemeOptions | None:
-    """Options of one scheme or several, or those ``chosen`` by keyword, which the ``scheme`` must have.
-
-    Raises BadRequest.
-    """
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises BadRequest."""
     if not (value is None or isinstance(value, Options | SchemeOptions)) or (value is not None and chosen):
         raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
     if not chosen:

@@ -81,10 +81,7 @@ def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
-    """Choice among schedules with residuals (rad), the preferred first; and the first that breaks a limit.
-
-    The first that is exact is taken, else the first that none behind it beats clearly.
-    """
+    """First schedule that is exact, else that none behind beats clearly, by residuals (rad); first to break a limit."""
     least, best, broken = math.inf, None, None
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
@@ -331,10 +328,7 @@ class FlownBuilder:
         return other
 
     def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
-        """Take ``pulses``, in order and with times from ``now``, into the schedule and fly them.
-
-        Raises Infeasible where they are ``bounded`` by the budget of work and it ends before them.
-        """
+        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are ``bounded`` by work left."""
         base = self.now
         for pulse in pulses:
             if bounded and work.exhausted():

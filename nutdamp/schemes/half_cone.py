@@ -127,10 +127,8 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
 
 
 def _fixed(here: Spacecraft, cones: int) -> Pulse:
-    """Earliest firing of a channel from which the row costs hardly more than from the best one.
-
-    Seldom is one in phase at the far end of the cone: what it misses is made up for by the cones that follow.
-    """
+    """Earliest firing of a channel from which the row costs hardly more than from the best one."""
+    # Seldom is one in phase at the far end of its cone: what it misses is made up for by the cones that follow.
     windows, channels = Windows(here), usable(here)
     step = 2.0 * math.pi / here.fastest / SAMPLES  # so many moments in each turn of the body
     room = windows.horizon - here.limits.earliest

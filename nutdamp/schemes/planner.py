@@ -20,7 +20,6 @@ from nutdamp.units import as_given
 
 LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
 
-
 Choice = Options | SchemeOptions | None  # options of one scheme, of several, or None for the defaults
 
 

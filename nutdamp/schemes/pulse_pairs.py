@@ -237,13 +237,7 @@ BODY_SAMPLES, BODY_TURNS = 96, 24
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
-    """Two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
-
-    Raises Infeasible with the reason.
-    """
-    most = spacecraft.limits.max_pulses
-    if most is not None and most < 2:
-        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
+    """Two pulses, where so many are allowed; ``straight``: by one half cone, of a torquer. Raises Infeasible."""
     torquer = spacecraft.torquer
     if torquer is not None:
         schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
@@ -251,29 +245,7 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         if kept and (torquer.torque is not None or not model_of(spacecraft).exact):
             schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
         return _checked(spacecraft, schedule)
-    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
-
-
-def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
-    """Schedule, if it keeps the limits and comes near the target."""
-    if not keeps_limits(spacecraft, schedule.pulses):
-        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
-    if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
-        return schedule
-    widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
-    if widest == 0.0:
-        raise Infeasible(
-            "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
-        )
-    raise Infeasible(
-        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
-        "target; half-cone with more cones or rhumb-line take smaller ones"
-    )
-
-
-def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
-    """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
-    search = _PairSearch(spacecraft, channels)
+    search = _PairSearch(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
 
     def corrected() -> Iterator[tuple[Schedule, float]]:
         """Candidates with the residual (rad) of each."""
@@ -291,6 +263,23 @@ def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
     wait, ratio = second.t - first.t, f"{schedule.total_impulse / search.floor:.3f}"
     told = note("pulse-pair", first=first.channel, second=second.channel, wait_s=wait, ratio=ratio)
     return Schedule(schedule.pulses, (told,))
+
+
+def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
+    """Schedule, if it keeps the limits and comes near the target."""
+    if not keeps_limits(spacecraft, schedule.pulses):
+        raise Infeasible("with commands on the ticks of limits.tick the two pulses touch another limit")
+    if correction.left(spacecraft, schedule) <= tolerable(spacecraft):
+        return schedule
+    widest = max((abs(spacecraft.spin) * pulse.on_time for pulse in schedule), default=0.0)
+    if widest == 0.0:
+        raise Infeasible(
+            "placed for free motion of a symmetric body, two impulses could not be corrected to end on the target"
+        )
+    raise Infeasible(
+        f"two pulses as wide as these (the body turns by {math.degrees(widest):.3g}° during one) do not end on the "
+        "target; half-cone with more cones or rhumb-line take smaller ones"
+    )
 
 
 class _PairSearch:

@@ -350,10 +350,7 @@ EXACT, CLEARLY = 1e-10, 0.01
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """Train, after one pulse (or a train against ω) where there is more nutation than it can absorb.
-
-    Raises Infeasible with the reason.
-    """
+    """Train, after one pulse (or a train against ω) where nutation is more than it can absorb; raises Infeasible."""
     expect_aim(spacecraft)
     try:
         return _train(spacecraft, options)

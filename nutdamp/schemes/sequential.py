@@ -150,11 +150,12 @@ class ImpulseBuilder:
 
     def align(self, channel: Channel, on_time: float) -> Pulse | None:
         """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
-        on_time = self.windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
+        windows = self.windows
+        on_time = windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
         probe = channel_pulse(channel, self.now, on_time)
         turn = rigid_body.phase_to_oppose(self.omega, self.acts(probe))
         if math.isinf(self.period):
-            start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
+            start = windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
         first = turn / self.turning  # and the times below: as long as it takes at the present spin
         # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
@@ -167,7 +168,7 @@ class ImpulseBuilder:
             return math.ceil((turned - first) / self.period)
 
         turns = alignment(self.ready)
-        for _ in range(len(self.windows.limits.blackout) + MISSED):
+        for _ in range(len(windows.limits.blackout) + MISSED):
             turned = first + turns * self.period
             centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
             if math.isinf(centre):  # dissipation stops the spin before
@@ -175,14 +176,13 @@ class ImpulseBuilder:
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
                 centre = self._opposed_near(channel, centre, on_time)
             start = centre - 0.5 * on_time
-            if self.windows.limits.tick is not None:
-                start = self.windows.nearest_tick(start)
+            if windows.limits.tick is not None:
+                start = windows.nearest_tick(start)
                 centre = start + 0.5 * on_time
-            free = self.windows.blocked_until(start, on_time)
+            free = windows.blocked_until(start, on_time)
             later = not self.pulses or centre > self.now  # also where the clock cannot tell so short a time
             if start >= self.ready - slack and later and free is None:
-                allowed = self.windows.allows(start, on_time, self.ready)
-                return channel_pulse(channel, centre, on_time) if allowed else None
+                return channel_pulse(channel, centre, on_time) if windows.allows(start, on_time, self.ready) else None
             # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
             turns = max(turns + 1, alignment(self.ready if free is None else free))
         return None

@@ -42,6 +42,9 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     ``options.literal``: equal halves and the wait as printed, not corrected, and the target left alone. Raises
     Infeasible with the reason.
     """
+    most = spacecraft.limits.max_pulses
+    if most is not None and most < 2:
+        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
     if spacecraft.goal.axis is None or options.literal:
         return _damping(spacecraft, options)
     try:
@@ -60,13 +63,7 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 
 def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """Two pulses that leave H where it was, but for the correction to a target.
-
-    Where all of channels break a limit, the first of them: the judge says which.
-    """
-    most = spacecraft.limits.max_pulses
-    if most is not None and most < 2:
-        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
+    """Two pulses that leave H where it was; where all break a limit, the first of them: the judge says which."""
     if spacecraft.torquer is not None:
         return _steered(spacecraft, spacecraft.torquer, options)
     channels = at_hand(spacecraft, for_pairs(spacecraft))
@@ -88,10 +85,8 @@ def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
-    inertia, windows, on_times = spacecraft.inertia, Windows(spacecraft), list[float]()
-    form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
-    halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
-    for half in (halves.first, halves.second):
+    windows, halves, on_times = Windows(spacecraft), _halves(spacecraft, options.literal), list[float]()
+    for half in halves[:2]:
         on_time = ImpulseBuilder(spacecraft).on_time_to_steer(torquer, half)
         if on_time is None:
             times = 0.5 * abs(spacecraft.nutation_rate) * half / (torquer.torque or math.inf)
@@ -150,9 +145,7 @@ def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
     """Most promising candidates, commandable and corrected on the real widths, each with its flown residual (rad)."""
-    inertia, pairs = spacecraft.inertia, itertools.product(channels, channels)
-    spin = inertia.equivalent(spacecraft.spin)
-    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
+    halves, pairs = _halves(spacecraft), itertools.product(channels, channels)
     candidates = (candidate for pair in pairs for candidate in _candidates(spacecraft, *pair, options.literal))
     for candidate in correction.shortlist(candidates, SHORTLIST, SHORTLIST):
         schedule = candidate.fired(spacecraft)
@@ -173,12 +166,10 @@ def _shortlist(
 
 def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[PairCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
-    inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    A, C, turning, spin = inertia.A, inertia.C, spacecraft.nutation_rate, inertia.equivalent(spacecraft.spin)
-    theta = spacecraft.nutation
+    inertia, turning = spacecraft.inertia, spacecraft.nutation_rate
     turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
-    rate = turning + C / A * spin / math.cos(0.5 * theta)
+    rate = turning + inertia.C / inertia.A * inertia.equivalent(spacecraft.spin) / math.cos(0.5 * spacecraft.nutation)
     to_go = math.pi - turn
     still = 0.1  # rad; channels that turn no further stand still in space: they close at any time, or never
     if abs(rate) * spacecraft.horizon < still:
@@ -191,9 +182,8 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
     turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns
-    halves = rigid_body.half_pulses(A, C, abs(omega0), spin)
+    halves = _halves(spacecraft, literal)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
-        halves = rigid_body.half_pulses_as_printed(A, C, abs(omega0), spin)
         count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
         odd = 2 * _turns(count, turn + turning * halves.wait, 2 * turning * halves.wait) + 1
         waits = halves.wait * odd
@@ -209,6 +199,12 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
         if factor[index] <= DEAREST
     )
     return [candidate for candidate in placed if candidate is not None]
+
+
+def _halves(spacecraft: Spacecraft, literal: bool = False) -> rigid_body.HalfPulses:
+    """Half pulses and the wait between them, ``literal``: as printed."""
+    form, inertia = rigid_body.half_pulses_as_printed if literal else rigid_body.half_pulses, spacecraft.inertia
+    return form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
 
 
 def _turns(count: int, miss: float, step: float) -> Vector:
