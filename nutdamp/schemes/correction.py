@@ -341,10 +341,7 @@ class FlownBuilder:
             self.now = timed.over
 
     def correct(self, last: int, *, resized: int = 0) -> None:
-        """Move the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
-
-        Their sizes stay, but that of the last ``resized`` pulses, which are equal, may change as one.
-        """
+        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized`` equal ones, as one."""
         taken = min(max(last, resized), len(self.pulses))
         if last == 0 or taken == 0:
             return

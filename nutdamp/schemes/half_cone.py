@@ -40,10 +40,7 @@ MOST_CONES = 60  # cones tried at most where their number is not given
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
-    """Schedule of ``options.cones`` half cones; if None the fewest of which one more would save less than 1 %.
-
-    Raises Infeasible with the reason.
-    """
+    """So many half cones as requested, or the fewest of which one more saves less than 1 %; raises Infeasible."""
     expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / abs(spacecraft.axial):
