@@ -49,17 +49,16 @@ TIME = OptionKind("a time above zero, in s", "time")
 ANGLE = OptionKind("an angle of at least 0, in rad", "angle")
 
 
-def _option(default: Any, kind: OptionKind, text: str) -> Any:
-    return dataclasses.field(default=default, metadata={"kind": kind, "help": text})
+def _option(default: Any, kind: OptionKind, text: str, *, as_is: bool = False) -> Any:
+    """Field of an option; ``as_is``: where it is on, the schedule is not corrected."""
+    return dataclasses.field(default=default, metadata={"kind": kind, "help": text, "as_is": as_is})
 
 
 @dataclass(frozen=True, kw_only=True)
 class SchemeOptions:
     """Options of every scheme. Raises SenselessOption for an invalid value."""
 
-    equal: ClassVar[bool] = False
-    """True if the pulses are of one size, which corrections keep."""
-
+    equal: ClassVar[bool] = False  # whether the pulses are of one size, which corrections keep
     with_disturbances: bool = _option(False, FLAG, "Plan on the motion with the disturbances of the file.")
 
     def __post_init__(self) -> None:
@@ -75,29 +74,19 @@ class SchemeOptions:
     @property
     def uncorrected(self) -> bool:
         """True if the schedule is to stay as the scheme gives it, whatever nutation the true motion leaves."""
-        return False
-
-    @property
-    def frees_axis(self) -> bool:
-        """True if H may end anywhere."""
-        return False
+        return any(field.metadata["as_is"] and getattr(self, field.name) for field in dataclasses.fields(self))
 
     @property
     def resizable(self) -> bool:
-        """True if corrections may change the length of pulses."""
-        return True
+        """True if corrections may change the length of pulses: none was requested."""
+        return getattr(self, "on_time", None) is None
 
 
 @dataclass(frozen=True, kw_only=True)
 class TwoPulseOptions(SchemeOptions):
     """Options of two-pulse."""
 
-    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.")
-
-    @property
-    def uncorrected(self) -> bool:
-        """True as printed."""
-        return self.literal
+    literal: bool = _option(False, FLAG, "As printed by Magnus: equal halves, small-angle wait.", as_is=True)
 
 
 DEFAULT_SHARE = 0.125  # default on-time of four-pulse as a share of T_ω: 2.6 % of the impulse is lost to the width
@@ -108,12 +97,7 @@ class FourPulseOptions(SchemeOptions):
     """Options of four-pulse; ``on_time`` None: min(max_on_time, T_ω/8)."""
 
     on_time: float | None = _option(None, TIME, "Pulse length, such as 200ms.")
-    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.")
-
-    @property
-    def uncorrected(self) -> bool:
-        """True for full pulses only."""
-        return self.coarse
+    coarse: bool = _option(False, FLAG, "Full pulses only, no shorter one at the end.", as_is=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,11 +127,6 @@ class RhumbLineOptions(SchemeOptions):
     on_time: float | None = _option(None, TIME, "Length of every pulse, such as 200ms.")
     per_turn: int = _option(1, dataclasses.replace(COUNT, none=False), "Pulses in each spin turn.")
 
-    @property
-    def resizable(self) -> bool:
-        """False where a length was requested."""
-        return self.on_time is None
-
 
 @dataclass(frozen=True, kw_only=True)
 class OptimalOptions(SchemeOptions):
@@ -165,11 +144,6 @@ class OptimalOptions(SchemeOptions):
         if self.shift is not None and self.free_axis:
             problem = "expected none beside a free axis, where H may end anywhere"
             raise SenselessOption("shift", as_given(self.shift), problem)
-
-    @property
-    def frees_axis(self) -> bool:
-        """True if H may end anywhere."""
-        return bool(self.free_axis)
 
     def settled(self, *, keeps_axis: bool) -> Self:
         """Copy with the default freedom of H; no ``shift`` at all is none."""
@@ -199,17 +173,15 @@ class Options:
 
     def __init__(self, **chosen: Any) -> None:
         self.chosen: Mapping[str, Any] = chosen
-        unknown = next((name for name in chosen if not any(name in names_of(kind) for kind in KINDS)), None)
-        if unknown is not None:
-            known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
-            raise BadRequest(f"options: no scheme has {unknown!r}; there are {', '.join(known)}")
+        known = dict.fromkeys(name for kind in KINDS for name in names_of(kind))
+        if unknown := [name for name in chosen if name not in known]:
+            raise BadRequest(f"options: no scheme has {unknown[0]!r}; there are {', '.join(known)}")
         for kind in KINDS:
             self.of(kind)
 
     def of(self, kind: type[Chosen]) -> Chosen:
         """Options of one scheme."""
-        names = names_of(kind)
-        return kind(**{name: value for name, value in self.chosen.items() if name in names})
+        return kind(**{name: value for name, value in self.chosen.items() if name in names_of(kind)})
 
     @property
     def with_disturbances(self) -> bool:
@@ -235,32 +207,23 @@ def names_of(kind: type[SchemeOptions]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme: its ``name`` and the class of its ``options``.
-
-    ``classic``: of Magnus 1970. ``points``: can turn the spin axis to a target, and is planned when there is one and
-    none is named; ``only_points``: does nothing else, and needs one. ``reads_sun``: keeps its pulses at a fixed phase
-    to the Sun. ``sets_spin``: can change the spin rate. ``weighs_alternatives``: has a function ``alternatives`` too,
-    of schedules about as good. ``body_fixed``: fires channels of the file only, no steerable torquer.
-    ``reads_commands``: makes blocks of the ``commands`` of the file, and is planned where there are some.
-    ``on_true_body``: needs no symmetric model. ``slow``: may take seconds. ``by_turns``: fires at one phase of each
-    spin turn, so that the body has to spin. ``home``: its module, where that has another name.
-    """
+    """A scheme, and what it can do."""
 
     name: str
     options: type[SchemeOptions] = SchemeOptions
     fires: bool = True
-    classic: bool = False
-    points: bool = False
-    only_points: bool = False
-    reads_sun: bool = False
-    sets_spin: bool = False
-    weighs_alternatives: bool = False
-    body_fixed: bool = False
-    reads_commands: bool = False
-    on_true_body: bool = False
-    slow: bool = False
-    by_turns: bool = False
-    home: str = ""
+    classic: bool = False  # of Magnus 1970
+    points: bool = False  # can turn the spin axis to a target, and is planned when there is one and none is named
+    only_points: bool = False  # does nothing else, and needs a target
+    reads_sun: bool = False  # keeps its pulses at a fixed phase to the Sun
+    sets_spin: bool = False  # can change the spin rate
+    weighs_alternatives: bool = False  # has a function ``alternatives`` too, of schedules about as good
+    body_fixed: bool = False  # fires channels of the file only, no steerable torquer
+    reads_commands: bool = False  # makes blocks of the ``commands`` of the file, and is planned where there are some
+    on_true_body: bool = False  # needs no symmetric model
+    slow: bool = False  # may take seconds
+    by_turns: bool = False  # fires at one phase of each spin turn, so that the body has to spin
+    home: str = ""  # its module, where that has another name
 
     @property
     def module(self) -> str:
@@ -276,13 +239,7 @@ OPTIMAL = Scheme(
 )
 HALF_CONE = Scheme("half-cone", HalfConeOptions, points=True, only_points=True, body_fixed=True)
 RHUMB_LINE = Scheme(
-    "rhumb-line",
-    RhumbLineOptions,
-    points=True,
-    only_points=True,
-    reads_sun=True,
-    body_fixed=True,
-    by_turns=True,
+    "rhumb-line", RhumbLineOptions, points=True, only_points=True, reads_sun=True, body_fixed=True, by_turns=True
 )
 COMMAND_BLOCK = Scheme(
     "command-block",
@@ -304,8 +261,8 @@ NAMES = tuple(SCHEMES)
 PLANNED = tuple(name for name, scheme in SCHEMES.items() if scheme.fires)
 CLASSIC = tuple(name for name, scheme in SCHEMES.items() if scheme.classic)
 COMPARED = (*CLASSIC, OPTIMAL.name)  # default schemes without a target
+# in the order in which they are shown: those that take seconds last
 POINTING = tuple(scheme.name for scheme in sorted(SCHEMES.values(), key=lambda scheme: scheme.slow) if scheme.points)
-"""In the order in which they are shown: those that take seconds last."""
 SPINNING = tuple(name for name, scheme in SCHEMES.items() if scheme.sets_spin)
 SUNLIT = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_sun)
 COMMANDED = tuple(name for name, scheme in SCHEMES.items() if scheme.reads_commands)
@@ -325,16 +282,14 @@ def expect_names(values: Iterable[str]) -> tuple[str, ...]:
 
 
 def expect_options(value: Any, chosen: Mapping[str, Any], scheme: str | None = None) -> Options | SchemeOptions | None:
-    """Options of one scheme or several, or those ``chosen`` by keyword, which the ``scheme`` must have.
-
-    Raises BadRequest.
-    """
+    """Options of schemes, or those ``chosen`` by keyword, which the ``scheme`` must have; raises BadRequest."""
     if not (value is None or isinstance(value, Options | SchemeOptions)) or (value is not None and chosen):
         raise BadRequest(f"options: expected nutdamp.Options(…) or keywords, got {as_given(value)}")
     if not chosen:
         return value
-    own = [] if scheme is None else [SCHEMES[scheme].options]
-    if unread := [*Options(**chosen).without_effect(own)] if own else []:
-        has = ", ".join(names_of(own[0]))
-        raise BadRequest(f"options: {scheme} has no {unread[0]!r}; there are {has}")
-    return Options(**chosen)
+    options = Options(**chosen)
+    if scheme is not None:
+        own = SCHEMES[scheme].options
+        for unread in options.without_effect([own]):
+            raise BadRequest(f"options: {scheme} has no {unread!r}; there are {', '.join(names_of(own))}")
+    return options

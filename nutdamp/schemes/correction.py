@@ -2,7 +2,7 @@
 
 Moments, on-times and directions are adjusted by a damped Gauss-Newton iteration with bounds for a handful of unknowns.
 scipy.optimize would do it too, but loading it takes longer than a whole plan. Schemes that point the spin axis lay
-their schedules stage by stage along the flown motion, after damping at a time at which H ends near the target.
+their schedules stage by stage along the flown motion.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy as np
 
 from nutdamp.common import work
 from nutdamp.common.results import Note
-from nutdamp.errors import Infeasible, TooShort
+from nutdamp.errors import Infeasible
 from nutdamp.flight import propagation
 from nutdamp.flight.dynamics import make_dynamics, supplied
-from nutdamp.physics import attitude
-from nutdamp.schemes.catalogue import Scheme, SchemeOptions
+from nutdamp.physics import attitude, precession
+from nutdamp.schemes.catalogue import OptimalOptions, Scheme, SchemeOptions
 from nutdamp.schemes.sequential import steady_omega
 from nutdamp.spacecraft.constraints import channel_of, commandable, effective_on_times, keeps_limits, longest_on_time
 from nutdamp.spacecraft.equipment import Channel
@@ -39,8 +39,6 @@ CLEARLY = 0.5  # largest residual, over that of an earlier candidate, with which
 MOST_CORRECTED = 1_000
 LEFT_OVER = 0.05  # largest residual, over nutation and turn together, of a schedule that reaches the target
 LEFT_OVER_BY_TICKS = 0.5  # largest residual where the resolution of commands may be to blame
-PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
-IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
 
 TAIL = 4  # last pulses that are corrected, and rounded to ticks one after the other: as many as there are equations
 
@@ -49,7 +47,6 @@ MOVED, BEFORE, AFTER = 8, 12, 24
 before the equal ones, which damp the nutation, and at the end."""
 
 EXACT = 1e-11  # rad of flown residual below which a corrected candidate is as good as exact (6e-10 deg)
-
 
 CLOSE_IN_COST, CLOSE_IN_SHORT = 1.02, 1.1
 """Factors of cost and miss within which candidates count as equal: of those the one that ends first is preferred."""
@@ -62,12 +59,9 @@ class PairCandidate(NamedTuple):
     end: float
     channels: tuple[Channel, Channel]
     timing: tuple[tuple[float, float], tuple[float, float]]
-    short: float = 0.0
-    """Part of the impulse out of reach."""
-    miss: float = 0.0
-    """ψ, rad."""
-    factor: float = 1.0
-    """Impulse over A|ω0|."""
+    short: float = 0.0  # part of the impulse out of reach
+    miss: float = 0.0  # ψ, rad
+    factor: float = 1.0  # impulse over A|ω0|
 
     def fired(self, spacecraft: Spacecraft) -> Schedule:
         """The two pulses, commandable."""
@@ -87,54 +81,41 @@ def shortlist(candidates: Iterable[PairCandidate], near: int, most: int) -> list
 
 
 def best_of(spacecraft: Spacecraft, tried: Iterable[tuple[Schedule, float]]) -> tuple[Schedule | None, Schedule | None]:
-    """Choice among schedules with residuals (rad), the preferred first; and the first that breaks a limit.
-
-    The first that is exact is taken, else the first that none behind it beats clearly.
-    """
-    best: tuple[float, Schedule] | None = None
-    broken: Schedule | None = None
+    """First schedule that is exact, else that none behind beats clearly, by residuals (rad); first to break a limit."""
+    least, best, broken = math.inf, None, None
     for schedule, left in tried:
         if not keeps_limits(spacecraft, schedule.pulses):
             broken = broken or schedule
-        elif best is None or left < CLEARLY * best[0]:
-            best = left, schedule
+        elif left < CLEARLY * least:
+            least, best = left, schedule
             if left <= EXACT:
                 break
-    return None if best is None else best[1], broken
+    return best, broken
 
 
-def misses(spacecraft: Spacecraft, schedule: Schedule) -> Vector:
-    """Residual of the flown schedule, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
-
-    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
-    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
-    """
-    return _missed(propagation.flown(spacecraft, schedule))
-
-
-def left(spacecraft: Spacecraft, schedule: Schedule) -> float:
-    """Size of what a flown schedule `misses`, rad."""
-    return float(np.linalg.norm(misses(spacecraft, schedule)))
+def left(spacecraft: Spacecraft, schedule: Schedule, *, momentum: bool = True) -> float:
+    """Size of the residual of a flown schedule, rad; without ``momentum`` of the nutation alone."""
+    missed = _missed(propagation.flown(spacecraft, schedule))
+    return float(np.linalg.norm(missed if momentum else missed[:2]))
 
 
 def _missed(flight_: propagation.Flight, *, spin: bool = False) -> Vector:
-    """`misses` of a flight; ``spin`` adds a fifth, the relative error of the final spin."""
+    """Residual of a flight, (4,) rad: tilt of H from the spin axis in body axes 1, 2; H off target in two.
+
+    The four are zero exactly when no nutation is left and H lies along the target axis, without one where it was.
+    Under disturbances the tilt counts from the steady response to them, about which nothing is to be damped.
+    ``spin`` adds a fifth, the relative error of the final spin.
+    """
     spacecraft, schedule = flight_.spacecraft, flight_.schedule
     inertia = replace(spacecraft.inertia, moments=flight_.last_moments)
     body, after = inertia.momentum(flight_.settled.rates), flight_.last_momentum
     steady = steady_omega(spacecraft, schedule.end)
     body[:2] -= np.array(inertia.moments[:2]) * (steady.real, steady.imag)
-    left = np.concatenate([body[:2], _across(spacecraft.target_axis, after)]) / float(np.linalg.norm(body))
+    aside = precession.square_to(spacecraft.target_axis)
+    across = np.array([aside @ after, np.cross(spacecraft.target_axis, aside) @ after])
+    left = np.concatenate([body[:2], across]) / float(np.linalg.norm(body))
     final = spacecraft.goal.spin
     return left if not spin or final is None else np.append(left, flight_.settled.spin / final - 1.0)
-
-
-def _across(axis: Vector, vector: Vector) -> Vector:
-    """Components of ``vector`` perpendicular to the unit vector ``axis``."""
-    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(axis, other)
-    first /= float(np.linalg.norm(first))
-    return np.array([first @ vector, np.cross(axis, first) @ vector])
 
 
 def correct(
@@ -156,21 +137,28 @@ def correct(
     """
     if not schedule.pulses:
         return schedule
-    chosen = sorted({index % len(schedule) for index in chosen})
-    kept = tuple(pulse for index, pulse in enumerate(schedule) if index not in chosen)
-    moving = [schedule.pulses[index] for index in chosen]
-    pulses = [_Movable(spacecraft, pulse, sized=not (equal and alike(schedule, pulse))) for pulse in moving]
-    ends = np.cumsum([len(part.free) for part in pulses])
-    together = equal and resizable and spacecraft.limits.tick is None and _size(schedule.pulses[-1]) > 0.0
-    common = [_Common(spacecraft, schedule)] if together else []
+    indices = {index % len(schedule) for index in chosen}
+    size = _size(schedule.pulses[-1])
+    together = equal and resizable and spacecraft.limits.tick is None and size > 0.0
+    kept, parts = list[Pulse](), list[_Movable]()
+    for index, pulse in enumerate(schedule):
+        same = equal and alike(schedule, pulse)
+        if index in indices or (together and same):
+            parts.append(_Movable(spacecraft, pulse, moves=index in indices, sized=not same))
+        else:
+            kept.append(pulse)
+    free = np.concatenate([part.free for part in parts])
+    if together:  # and the common factor of the equal ones
+        bounds = np.array([part.bounds for part in parts if not part.sized]) / size
+        free = np.concatenate([free, [(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())]])
+    ends = np.cumsum([len(part.free) for part in parts])
     steps, dynamics = 0, make_dynamics(spacecraft).remembering()
 
     def build(x: Vector) -> Schedule:
-        parts = np.split(x, ends)
-        factor = float(parts[-1][0]) if common else 1.0
-        others = common[0].resized(kept, factor) if common else kept
-        moved = (one.turn(part, factor) for one, part in zip(pulses, parts[:-1], strict=True))
-        return Schedule(supplied(spacecraft, (*others, *moved)), schedule.notes, schedule.bounds)
+        *own, common = np.split(x, ends)
+        factor = float(common[0]) if together else 1.0
+        turned = (part.turn(one, factor) for part, one in zip(parts, own, strict=True))
+        return Schedule(supplied(spacecraft, (*kept, *turned)), schedule.notes, schedule.bounds)
 
     def left(schedule: Schedule) -> Vector:
         nonlocal steps
@@ -179,8 +167,6 @@ def correct(
         missed = _missed(flown, spin=spin)
         return missed if momentum else np.delete(missed, [2, 3])
 
-    free = np.concatenate([*(pulse.free for pulse in pulses), *(factor.free for factor in common)])
-    # 50,000 steps of integration take some seconds.
     x = solve(lambda x: left(build(x)), free, lambda: steps > INTEGRATED or work.exhausted())
     rounded = supplied(spacecraft, (commandable(spacecraft, pulse) for pulse in build(x)))
     corrected = Schedule(rounded, schedule.notes, schedule.bounds)
@@ -198,13 +184,10 @@ class Correction:
     @property
     def momentum(self) -> bool:
         """True if H too has an end condition."""
-        return self.scheme.points and not self.options.frees_axis
+        return self.scheme.points and not (isinstance(self.options, OptimalOptions) and self.options.free_axis)
 
     def __call__(self, spacecraft: Spacecraft, schedule: Schedule, free: int = TAIL) -> Schedule:
-        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts.
-
-        One of more than 1000 pulses stays as it is: a correction flies all of them some twenty times.
-        """
+        """``schedule`` with its last pulse corrected; with up to the last ``free`` ones where H counts."""
         if self.options.uncorrected or not 0 < len(schedule) <= MOST_CORRECTED or work.exhausted():
             return schedule
         # The last pulses, which know what the others did on the model, undo what the true motion made of them.
@@ -230,63 +213,43 @@ def alike(schedule: Schedule, pulse: Pulse) -> bool:
 
 
 class _Movable:
-    """Free parameters of a pulse: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
+    """Pulse with free parameters: (start, on-time) of a channel, (start, angle, impulse) of a steerable torquer.
 
-    Without the last of them where it is not ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper bound.
+    The last one only if it is ``sized`` for itself. ``free`` (n, 4): start, scale, lower and upper bound.
     """
 
-    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, sized: bool) -> None:
+    def __init__(self, spacecraft: Spacecraft, pulse: Pulse, *, moves: bool, sized: bool) -> None:
         pace, earliest = 1.0 / spacecraft.fastest, spacecraft.limits.earliest + (pulse.start - pulse.loaded[0])
         latest = max(spacecraft.horizon - pulse.on_time - (pulse.over - pulse.end), pulse.start)
-        self.channel, self.torquer = channel_of(spacecraft, pulse), spacecraft.torquer
-        self.sized, self.size = sized, _size(pulse)
-        free = [(pulse.start, pace, earliest, latest)]
+        self.pulse, self.channel, self.torquer = pulse, channel_of(spacecraft, pulse), spacecraft.torquer
+        self.moves, self.sized, self.size = moves, sized, _size(pulse)
+        self.bounds = 0.0, math.inf
+        self.given = [(pulse.start, pace, earliest, latest)]
         if self.channel is None:
-            free.append((math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf))
+            self.given.append((math.atan2(pulse.impulse[1], pulse.impulse[0]), 1.0, -math.inf, math.inf))
+        else:
+            longest = max(longest_on_time(spacecraft, self.channel), pulse.on_time)
+            self.bounds = effective_on_times(self.channel)[0], longest
         if sized:
-            free.append((self.size, self.size, *_bounds(spacecraft, pulse)))
-        self.free = np.array(free)
+            self.given.append((self.size, self.size, *self.bounds))
+        self.free = np.array(self.given if moves else []).reshape(-1, 4)
 
     def turn(self, x: Vector, factor: float) -> Pulse:
-        """Pulse with these settings; ``factor`` times as large where it is not sized for itself."""
-        size = float(x[-1]) if self.sized else factor * self.size
+        """Pulse with these settings; ``factor`` times as large, about its centre, where it is not sized for itself."""
+        start, *others = x if self.moves else [start for start, *_ in self.given]
+        size = float(others[-1]) if self.sized else factor * self.size
         if self.channel is not None:
-            return channel_pulse(self.channel, x[0] + 0.5 * size, size)
-        assert self.torquer is not None
-        torque = self.torquer.torque
-        on_time = 0.0 if torque is None else size / torque
-        return steerable_pulse(self.torquer, x[0] + 0.5 * on_time, float(x[1]), impulse=size)
-
-
-class _Common:
-    """Common factor of equal pulses, on the size of all that are as large as the last one: ``free`` as of a pulse."""
-
-    def __init__(self, spacecraft: Spacecraft, schedule: Schedule) -> None:
-        self.spacecraft, self.made, last = spacecraft, schedule, schedule.pulses[-1]
-        bounds = np.array([_bounds(spacecraft, pulse) for pulse in schedule if alike(schedule, pulse)]) / _size(last)
-        self.free = np.array([(1.0, 1.0, bounds[:, 0].max(), bounds[:, 1].min())])
-
-    def resized(self, pulses: Iterable[Pulse], factor: float) -> list[Pulse]:
-        """Copy of the ``pulses`` about their centres, equal ones ``factor`` times as large."""
-        resized = list(pulses)
-        for index, pulse in enumerate(resized):
-            if alike(self.made, pulse):
-                moved = _Movable(self.spacecraft, pulse, sized=False)
-                resized[index] = replace(moved.turn(moved.free[:, 0], factor), t=pulse.t)
-        return resized
+            pulse = channel_pulse(self.channel, start + 0.5 * size, size)
+        else:
+            assert self.torquer is not None
+            on_time = 0.0 if self.torquer.torque is None else size / self.torquer.torque
+            pulse = steerable_pulse(self.torquer, start + 0.5 * on_time, float(others[0]), impulse=size)
+        return pulse if self.moves else replace(pulse, t=self.pulse.t)
 
 
 def _size(pulse: Pulse) -> float:
     """Size of a pulse: on-time of a channel, s, impulse of a steerable torquer, N m s."""
     return pulse.magnitude if pulse.channel == STEERABLE else pulse.on_time
-
-
-def _bounds(spacecraft: Spacecraft, pulse: Pulse) -> tuple[float, float]:
-    """Least and largest size of a pulse."""
-    channel = channel_of(spacecraft, pulse)
-    if channel is None:
-        return 0.0, math.inf
-    return effective_on_times(channel)[0], max(longest_on_time(spacecraft, channel), pulse.on_time)
 
 
 def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[], bool]) -> Vector:
@@ -301,15 +264,10 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
     value = residual(x)
     norm = float(np.linalg.norm(value))
     for _ in range(STEPS):
-        if norm <= CONVERGED or enough():  # rad; a few roundings of the integration
+        if norm <= CONVERGED or enough():
             break
-        columns = []
-        for index, size in enumerate(scale):
-            moved = x.copy()
-            moved[index] += difference * size
-            columns.append((residual(moved) - value) / difference)
-        jacobian = np.column_stack(columns)
-        step = bounded_step(jacobian, value, x, scale, lower, upper)
+        columns = [(residual(x + moved) - value) / difference for moved in np.diag(difference * scale)]
+        step = bounded_step(np.column_stack(columns), value, x, scale, lower, upper)
         before = norm
         for shrink in range(8):
             trial = np.clip(x + step * 0.5**shrink, lower, upper)
@@ -318,7 +276,6 @@ def solve(residual: Callable[[Vector], Vector], free: Vector, enough: Callable[[
             if trial_norm < before:
                 x, value, norm = trial, trial_value, trial_norm
                 break
-        # Near a solution each step gains many digits: less than a hundredth means a bound in the way.
         if norm > before * (1.0 - PROGRESS):
             break
     return np.asarray(x)
@@ -344,9 +301,8 @@ ROUNDING = 1e-12  # rad; where the spin axis is that near the target already, no
 class FlownBuilder:
     """Pulses chosen so far, and the spacecraft after them.
 
-    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there: attitude, rates,
-    limits and disturbances are those of that moment, its goal is where the builder is to end. ``steps``: of integration
-    that the flight took so far.
+    ``here`` is the spacecraft at ``now`` s, the end of the last pulse, as if its time began there, with the goal of the
+    whole. ``steps``: of integration that the flight took so far.
     """
 
     def __init__(self, spacecraft: Spacecraft) -> None:
@@ -372,10 +328,7 @@ class FlownBuilder:
         return other
 
     def fire(self, pulses: Iterable[Pulse], *, bounded: bool = False) -> None:
-        """Take ``pulses``, in order and with times from ``now``, into the schedule and fly them.
-
-        Raises Infeasible where they are ``bounded`` by the budget of work and it ends before them.
-        """
+        """Take and fly ``pulses``, in order, timed from ``now``; Infeasible where they are ``bounded`` by work left."""
         base = self.now
         for pulse in pulses:
             if bounded and work.exhausted():
@@ -388,10 +341,7 @@ class FlownBuilder:
             self.now = timed.over
 
     def correct(self, last: int, *, resized: int = 0) -> None:
-        """Move the ``last`` pulses on the flown motion until neither nutation nor distance from the target is left.
-
-        Their sizes stay, but that of the last ``resized`` pulses, which are equal, may change as one.
-        """
+        """Move the ``last`` pulses until nothing is left; sizes stay, but those of ``resized`` equal ones, as one."""
         taken = min(max(last, resized), len(self.pulses))
         if last == 0 or taken == 0:
             return
@@ -435,46 +385,3 @@ def _after(spacecraft: Spacecraft, pulse: Pulse) -> tuple[Spacecraft, int]:
         ),
     )
     return after, flown.steps
-
-
-def damped(start: FlownBuilder, scheme: Callable[[Spacecraft, SchemeOptions], Schedule]) -> FlownBuilder:
-    """The ``start``, after the damping by a ``scheme``, such as one-pulse, from which the rest of the way costs least.
-
-    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
-    C|ω3| times its angle, differs by the cone.
-    Raises Infeasible where no channel can damp, or where the budget ends while the damping is flown.
-    """
-    here = start.here
-    h = abs(here.axial)
-    # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
-    span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
-    best: tuple[float, FlownBuilder] | None = None
-    reason: Infeasible | None = None
-    steps = 0
-    moments = 16  # earliest starts that are tried
-    for number in range(moments):
-        earliest = here.limits.earliest + number * span / moments
-        if number > 0 and earliest > IN_REACH * here.horizon:  # the rest is for the turn
-            break
-        try:
-            damping = scheme(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
-        except Infeasible as why:
-            reason = why
-            continue
-        builder = start.fork()
-        try:
-            builder.fire(damping, bounded=True)
-        except Infeasible as why:
-            reason = why
-            break
-        cost = damping.total_impulse + h * (builder.here.to_turn + 2.0 * builder.here.nutation)
-        if best is None or cost < best[0]:
-            best = cost, builder
-        steps += builder.steps
-        if steps > PREDAMPING_INTEGRATED or work.exhausted():
-            break
-    if best is None:
-        text = "the nutation is to be taken out first, and"
-        # Its cure, where it has one, is for the damping alone.
-        raise TooShort(f"{text} {reason.why}") if isinstance(reason, TooShort) else Infeasible(f"{text} {reason}")
-    return best[1]

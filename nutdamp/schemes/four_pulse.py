@@ -18,17 +18,25 @@ def schedule(spacecraft: Spacecraft, options: FourPulseOptions) -> Schedule:
     """Fire each channel whenever it opposes ω and firing helps, until it no longer does.
 
     Coarse: equal pulses leave at most J/(2A). Fine: a last, shorter pulse leaves nothing, or at most J_min/(2A) where
-    the rest is below the smallest pulse. The sign rule holds for both signs of a ω3.
-
-    Raises Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
+    the rest is below the smallest pulse. The sign rule holds for both signs of a ω3. Raises
+    Infeasible where no pulse fits or helps, or ``options.on_time`` is not within a channel's bounds.
     """
     channels = at_hand(spacecraft, usable(spacecraft))
     builder = ImpulseBuilder(spacecraft)
     on_times = {channel.name: _on_time(builder, channel, options.on_time) for channel in channels}
-    if spacecraft.nutation_rate == 0.0:
+    turns = spacecraft.nutation_rate != 0.0
+    if not turns:
         _standing(builder, channels, options)
-    else:
-        _turning(builder, channels, on_times, options)
+    while turns and not builder.full and not builder.settled:  # whichever helpful channel comes first
+        pulses = []
+        for channel in channels:  # a full one, or in fine damping one of the remaining size
+            full = on_times[channel.name]
+            just_enough = None if options.coarse else builder.on_time_for(channel, builder.left, full)
+            pulses.append(builder.align(channel, full if just_enough is None else just_enough))
+        helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
+        if not helpful:
+            break
+        builder.fire(min(helpful, key=lambda pulse: pulse.t))
     if not builder.pulses:
         raise no_alignment(spacecraft, channels)
     return builder.schedule()
@@ -44,22 +52,6 @@ def _on_time(builder: ImpulseBuilder, channel: Channel, requested: float | None)
             f"{span(channel.min_on_time, channel.max_on_time, 's')}"
         )
     return requested
-
-
-def _turning(
-    builder: ImpulseBuilder, channels: list[Channel], on_times: dict[str, float], options: FourPulseOptions
-) -> None:
-    """Alignment after alignment, whichever helpful channel comes first."""
-    while not builder.full and not builder.settled:
-        pulses = []
-        for channel in channels:  # a full one, or in fine damping one of the remaining size
-            full = on_times[channel.name]
-            just_enough = None if options.coarse else builder.on_time_for(channel, builder.left, full)
-            pulses.append(builder.align(channel, full if just_enough is None else just_enough))
-        helpful = [pulse for pulse in pulses if pulse is not None and builder.helps(pulse)]
-        if not helpful:
-            return
-        builder.fire(min(helpful, key=lambda pulse: pulse.t))
 
 
 def _standing(builder: ImpulseBuilder, channels: list[Channel], options: FourPulseOptions) -> None:

@@ -16,7 +16,7 @@ from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
-from nutdamp.schemes import correction, one_pulse, pulse_pairs
+from nutdamp.schemes import one_pulse, pulse_pairs
 from nutdamp.schemes.catalogue import HalfConeOptions
 from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.pulse_pairs import SteerablePair
@@ -40,37 +40,49 @@ MOST_CONES = 60  # cones tried at most where their number is not given
 
 
 def schedule(spacecraft: Spacecraft, options: HalfConeOptions) -> Schedule:
-    """Schedule of ``options.cones`` half cones; if None the fewest of which one more would save less than 1 %.
-
-    Raises Infeasible with the reason.
-    """
+    """So many half cones as requested, or the fewest of which one more saves less than 1 %; raises Infeasible."""
     expect_aim(spacecraft)
     builder = FlownBuilder(spacecraft)
     if math.tan(spacecraft.nutation) > _reach(spacecraft) / abs(spacecraft.axial):
-        builder = correction.damped(builder, one_pulse.schedule)
+        builder = one_pulse.damped(builder)
     if options.cones is not None:
         return _row(builder, options.cones)
-    here = builder.here
     best: Schedule | None = None
     reasons = list[Infeasible]()
-    cones, most = _fewest(here), _most(here)
-    while cones <= most:
+    here = builder.here
+    cones = fewest = _fewest(here)
+    allowed, horizon = here.limits.max_pulses, here.horizon
+    half_turns = int(max(horizon - here.limits.earliest, 0.0) / (math.pi * here.inertia.A / abs(here.axial)))
+    while cones <= min(MOST_CONES, half_turns + 1, MOST_CONES if allowed is None else allowed - 1):
         try:
             row = _row(builder.fork(), cones)
+            if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
+                break
+            best = row
         except Infeasible as why:
             reasons.append(why)
             if best is not None or len(reasons) > PATIENCE:
                 break
-        else:
-            if best is not None and row.cost > 0.99 * best.cost:  # fewer cones end earlier
-                break
-            best = row
         if work.exhausted():
             break
         cones += 1 + cones // 6  # where there are many, in steps of a sixth
-    if best is None:
-        raise reasons[-1] if reasons else _no_time(here)
-    return best
+    if best is not None:
+        return best
+    if reasons:
+        raise reasons[-1]
+    if allowed is not None and allowed < fewest + 1:
+        raise Infeasible(
+            f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {allowed}"
+        )
+    if fewest >= MOST_CONES:
+        raise Infeasible(
+            f"one pulse turns H by {turn_of(here, _reach(here))} at most, so more than {MOST_CONES} half "
+            "cones would be needed; rhumb-line takes many small pulses"
+        )
+    raise TooShort(
+        f"{fewest} half cones are needed at least, each half a nutation turn long; "
+        f"the {horizon:.4g} s up to limits.horizon do not suffice for them"
+    )
 
 
 def _reach(spacecraft: Spacecraft) -> float:
@@ -92,30 +104,6 @@ def _fewest(spacecraft: Spacecraft) -> int:
     return MOST_CONES
 
 
-def _most(spacecraft: Spacecraft) -> int:
-    """Largest number of cones for which there are time and pulses."""
-    half_turn = math.pi * spacecraft.inertia.A / abs(spacecraft.axial)
-    room = int(max(spacecraft.horizon - spacecraft.limits.earliest, 0.0) / half_turn) + 1
-    most = spacecraft.limits.max_pulses
-    return min(MOST_CONES, room, MOST_CONES if most is None else most - 1)
-
-
-def _no_time(spacecraft: Spacecraft) -> Infeasible:
-    most = spacecraft.limits.max_pulses
-    fewest = _fewest(spacecraft)
-    if most is not None and most < fewest + 1:
-        return Infeasible(f"{fewest} half cones take {fewest + 1} pulses at least, and limits.max_pulses allows {most}")
-    if fewest >= MOST_CONES:
-        return Infeasible(
-            f"one pulse turns H by {turn_of(spacecraft, _reach(spacecraft))} at most, so more than {MOST_CONES} half "
-            "cones would be needed; rhumb-line takes many small pulses"
-        )
-    return TooShort(
-        f"{fewest} half cones are needed at least, each half a nutation turn long; "
-        f"the {spacecraft.horizon:.4g} s up to limits.horizon do not suffice for them"
-    )
-
-
 def _row(builder: FlownBuilder, cones: int) -> Schedule:
     """Row of half cones, each planned from the motion that the one before leaves."""
     spacecraft, damped = builder.here, len(builder.pulses)
@@ -127,30 +115,24 @@ def _row(builder: FlownBuilder, cones: int) -> Schedule:
         steered = None if here.torquer is None else SteerablePair(here, here.torquer).one(remaining)
         builder.fire(steered or (_fixed(here, remaining),))
     builder.fire(pulse_pairs.schedule(builder.here, straight=True))
-    angle = spacecraft.to_turn
-    ideal = precession.half_cones_impulse(abs(spacecraft.axial), angle, cones) if angle < cones * math.pi else math.inf
-    schedule = builder.schedule()
-    plain = len(schedule) == cones + 1 and spacecraft.nutation < 1e-9 and math.isfinite(ideal) and ideal > 0.0
-    if plain and not damped:
+    angle, schedule = spacecraft.to_turn, builder.schedule()
+    if len(schedule) == cones + 1 and not damped and spacecraft.nutation < 1e-9 and 0.0 < angle < cones * math.pi:
+        ideal = precession.half_cones_impulse(abs(spacecraft.axial), angle, cones)
         ratio = f"{schedule.total_impulse / ideal:.4f}"
         return builder.schedule(note("half-cones-ideal", cones=cones, ideal_Nms=ideal, ratio=ratio))
     return builder.schedule(note("half-cones", cones=cones, damping=damped))
 
 
 def _fixed(here: Spacecraft, cones: int) -> Pulse:
-    """Earliest firing of a channel from which the row costs hardly more than from the best one.
-
-    A channel is seldom in phase when the spin axis is at the far end of its cone: it waits for a turn at which it is,
-    and what it misses then is made up for by the cones that follow.
-    """
+    """Earliest firing of a channel from which the row costs hardly more than from the best one."""
+    # Seldom is one in phase at the far end of its cone: what it misses is made up for by the cones that follow.
     windows, channels = Windows(here), usable(here)
     step = 2.0 * math.pi / here.fastest / SAMPLES  # so many moments in each turn of the body
-    share = (windows.horizon - here.limits.earliest) / (cones + 1)
-    span = min(max(share, here.inertial_period), windows.horizon - here.limits.earliest)
+    room = windows.horizon - here.limits.earliest
+    span = min(max(room / (cones + 1), here.inertial_period), room)
     count = min(int(max(span, 0.0) / step) + 1, LONGEST_SEARCH)
     times = np.asarray(here.limits.earliest + np.arange(count) * step, dtype=np.float64)
     _, quaternions = Arc.of(here.inertia, here.initial).motion(times)
-    best: tuple[float, float, Pulse] | None = None
     choices: list[tuple[Vector, Vector, Channel]] = []
     work.spend(PLACE * count * len(channels))
     for channel in channels:
@@ -161,19 +143,19 @@ def _fixed(here: Spacecraft, cones: int) -> Pulse:
         costs[~windows.allowed(times - 0.5 * on_times, on_times, here.limits.earliest)] = np.inf
         choices.append((costs, on_times, channel))
     least = min((float(costs.min(initial=np.inf)) for costs, _, _ in choices), default=math.inf)
-    worth_waiting = WORTH_WAITING * _equal(here, cones)[1]
-    for costs, on_times, channel in choices:
-        for row in np.flatnonzero(costs <= least + worth_waiting)[:1]:
-            pulse = channel_pulse(channel, float(times[row]), float(on_times[row]))
-            if best is None or (pulse.end, costs[row]) < best[:2]:
-                best = pulse.end, float(costs[row]), pulse
-    if best is None or not math.isfinite(least):
+    if not math.isfinite(least):
         names = ", ".join(channel.name for channel in channels)
         raise Infeasible(
             f"with {cones} half cones to go, no channel ({names}) comes into phase with a pulse that its on-times and "
             f"the blackout windows allow in the {span:.4g} s left; --cones with another number, or rhumb-line, can help"
         )
-    return commandable(here, best[2])
+    near = least + WORTH_WAITING * _equal(here, cones)[1]
+    pulses = [
+        (float(costs[row]), channel_pulse(channel, float(times[row]), float(on_times[row])))
+        for costs, on_times, channel in choices
+        for row in np.flatnonzero(costs <= near)[:1]
+    ]
+    return commandable(here, min(pulses, key=lambda choice: (choice[1].end, choice[0]))[1])
 
 
 def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
@@ -184,10 +166,7 @@ def _equal(here: Spacecraft, cones: int) -> tuple[float, float]:
 
 
 def _costs(here: Spacecraft, channel: Channel, push: Vector, cones: int) -> tuple[Vector, Vector]:
-    """Cost of the rest of the row, (n,) N m s, after pushes of H along ``push`` (n, 3), and their sizes, (n,) N m s.
-
-    The rest is the row of cones - 1 half cones from the far end of the cone that the push makes.
-    """
+    """Cost of the row, (n,) N m s, that begins with a push of H along ``push`` (n, 3), and the size of that, N m s."""
     equal, nominal = _equal(here, cones)
     h, reach = abs(here.axial), _reach(here)
     best, chosen = np.full(len(push), np.inf), np.zeros(len(push))

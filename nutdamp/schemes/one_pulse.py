@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import replace
 
-from nutdamp.errors import TooShort
+from nutdamp.common import work
+from nutdamp.errors import Infeasible, TooShort
 from nutdamp.physics import response
 from nutdamp.schemes.catalogue import SchemeOptions
+from nutdamp.schemes.correction import FlownBuilder
 from nutdamp.schemes.sequential import ImpulseBuilder, at_hand, no_alignment
 from nutdamp.spacecraft.constraints import longest_useful, usable
-from nutdamp.spacecraft.equipment import Channel
+from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft
-from nutdamp.spacecraft.schedule import Pulse, Schedule
+from nutdamp.spacecraft.schedule import Schedule
 
 TRAIN_SHARE = 0.25  # longest pulse of a train, as a share of T_ω: it loses 10 % of its impulse to its width
+
+PREDAMPING_INTEGRATED = 20_000  # steps of integration after which no more of them are tried
+IN_REACH = 0.5  # share of the horizon within which the damping begins: the rest is for the turn
 
 LEFT_OVER = 0.01  # share of A|ω0| from which a remainder counts against a channel
 
@@ -27,77 +32,99 @@ def schedule(spacecraft: Spacecraft, options: SchemeOptions) -> Schedule:  # noq
     """
     torquer = spacecraft.torquer
     if torquer is not None:
-        torque = math.inf if torquer.torque is None else torquer.torque
-        builder = _train(spacecraft, torque, 0.0, math.inf, lambda builder, impulse: builder.steer(torquer, impulse))
-        if builder.pulses:
-            return builder.schedule()
+        train = _train(spacecraft, torquer)
+        if train.pulses:
+            return train.schedule()
         raise TooShort(f"no pulse of the steerable torquer fits before the horizon of {spacecraft.horizon:.4g} s")
     channels = at_hand(spacecraft, usable(spacecraft))
-    trains = [builder for builder in (_fixed(spacecraft, channel) for channel in channels) if builder.pulses]
+    trains = [train for train in (_train(spacecraft, channel) for channel in channels) if train.pulses]
     if not trains:
         raise no_alignment(spacecraft, channels)
-    return min(trains, key=_preference).schedule()
+    lacking = LEFT_OVER * spacecraft.least_impulse
+    choices = [(not train.settled and train.left > lacking, train.schedule()) for train in trains]
+    return min(choices, key=lambda choice: (choice[0], len(choice[1]), choice[1].cost, choice[1].end))[1]
 
 
-def _preference(builder: ImpulseBuilder) -> tuple[bool, int, float, float]:
-    chosen = builder.schedule()
-    lacks = not builder.settled and builder.left > LEFT_OVER * builder.spacecraft.least_impulse
-    return lacks, len(chosen), chosen.cost, chosen.end
-
-
-def _fixed(spacecraft: Spacecraft, channel: Channel) -> ImpulseBuilder:
-    """Pulses of one channel at its successive alignments."""
-
-    def fire(builder: ImpulseBuilder, impulse: float) -> Pulse | None:
-        on_time = builder.on_time_for(channel, impulse)
-        longest = longest_useful(channel.max_on_time, builder.period)
-        return builder.align(channel, longest if on_time is None else on_time)
-
-    slope = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C
-    return _train(spacecraft, abs(channel.transverse), slope, channel.max_on_time, fire)
-
-
-def _train(
-    spacecraft: Spacecraft,
-    torque: float,
-    slope: float,
-    max_on_time: float,
-    fire: Callable[[ImpulseBuilder, float], Pulse | None],
-) -> ImpulseBuilder:
+def _train(spacecraft: Spacecraft, actuator: Channel | Steerable) -> ImpulseBuilder:
     """The fewest equal pulses that take out what is left; fewer where the limits end it or nothing is gained."""
-    start = ImpulseBuilder(spacecraft)
+    start, slope, max_on_time = ImpulseBuilder(spacecraft), 0.0, math.inf
+    if isinstance(actuator, Channel):
+        torque, max_on_time = abs(actuator.transverse), actuator.max_on_time
+        slope = spacecraft.inertia.a * actuator.axial / spacecraft.inertia.C
+    else:
+        torque = math.inf if actuator.torque is None else actuator.torque
 
     def capacity(on_time: float) -> float:
         if math.isinf(torque) or math.isinf(on_time):
             return math.inf
         return torque * on_time * abs(response.width_factor(start.turning, slope, on_time))
 
-    longest = longest_useful(max_on_time, start.period)
-    count = 1
+    longest, most, count = longest_useful(max_on_time, start.period), start.most, 1
     single = math.isinf(torque) or response.on_time_for(start.left, torque, start.turning, slope, longest)
-    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))  # a pulse as wide as that loses 10 % of its impulse
+    share = capacity(min(max_on_time, TRAIN_SHARE * start.period))
     if not single and share > 0.0:
-        most = start.most
         count = math.ceil(min(start.left / share, most + 1.0))
         if count > most:  # rather longer pulses than too many
             count = max(math.ceil(min(start.left / max(capacity(longest), share), most)), 1)
     # A channel that also spins up takes out less the longer it is on: one pulse may do what the longest cannot.
     strongest = math.inf if single else capacity(longest)
-    builder = _fire_train(spacecraft, count, strongest, fire)
-    if spacecraft.growth > 0.0 and builder.pulses and builder.left > LEFT_OVER * start.left:
+
+    def fired(count: int) -> ImpulseBuilder:
+        builder = ImpulseBuilder(spacecraft)
+        for remaining in range(count, 0, -1):
+            impulse = min(builder.left / remaining, strongest)
+            if isinstance(actuator, Steerable):
+                pulse = builder.steer(actuator, impulse)
+            else:  # at its next alignment, as long as it can where that is too short
+                on_time, most = builder.on_time_for(actuator, impulse), longest_useful(max_on_time, builder.period)
+                pulse = builder.align(actuator, most if on_time is None else on_time)
+            if builder.full or pulse is None or not builder.helps(pulse):
+                break
+            builder.fire(pulse)
+        return builder
+
+    train = fired(count)
+    if spacecraft.growth > 0.0 and train.pulses and train.left > LEFT_OVER * start.left:
         # The nutation grows while the train waits for its moments: a pulse more than it takes now.
-        longer = _fire_train(spacecraft, count + 1, strongest, fire)
-        builder = min(builder, longer, key=lambda train: train.left)
-    return builder
+        train = min(train, fired(count + 1), key=lambda train: train.left)
+    return train
 
 
-def _fire_train(
-    spacecraft: Spacecraft, count: int, strongest: float, fire: Callable[[ImpulseBuilder, float], Pulse | None]
-) -> ImpulseBuilder:
-    builder = ImpulseBuilder(spacecraft)
-    for remaining in range(count, 0, -1):
-        pulse = fire(builder, min(builder.left / remaining, strongest))
-        if builder.full or pulse is None or not builder.helps(pulse):
+def damped(start: FlownBuilder) -> FlownBuilder:
+    """The ``start``, after the damping by one pulse or a train, from which the rest of the way costs least.
+
+    H then goes to the momentary spin axis. Its pulses cost A|ω0| whenever they come, but the turn that is left,
+    C|ω3| times its angle, differs by the cone. Raises Infeasible where no channel can damp, or the budget ends before.
+    """
+    here, steps = start.here, 0
+    # A torquer can fire at any point of the cone; channels at their alignments, which come by the body period.
+    span = here.inertial_period if here.torquer is not None else 4.0 * min(here.body_period, 0.1 * here.horizon)
+    best: tuple[float, FlownBuilder] | None = None
+    reason: Infeasible | None = None
+    moments = 16  # earliest starts that are tried
+    for number in range(moments):
+        earliest = here.limits.earliest + number * span / moments
+        if number > 0 and earliest > IN_REACH * here.horizon:  # the rest is for the turn
             break
-        builder.fire(pulse)
-    return builder
+        try:
+            damping = schedule(replace(here, limits=replace(here.limits, earliest=earliest)), SchemeOptions())
+        except Infeasible as why:
+            reason = why
+            continue
+        builder = start.fork()
+        try:
+            builder.fire(damping, bounded=True)
+        except Infeasible as why:
+            reason = why
+            break
+        cost = damping.total_impulse + abs(here.axial) * (builder.here.to_turn + 2.0 * builder.here.nutation)
+        if best is None or cost < best[0]:
+            best = cost, builder
+        steps += builder.steps
+        if steps > PREDAMPING_INTEGRATED or work.exhausted():
+            break
+    if best is None:
+        text = "the nutation is to be taken out first, and"
+        # Its cure, where it has one, is for the damping alone.
+        raise TooShort(f"{text} {reason.why}") if isinstance(reason, TooShort) else Infeasible(f"{text} {reason}")
+    return best[1]

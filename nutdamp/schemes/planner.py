@@ -1,7 +1,4 @@
-"""Interface of the schemes: options, planning, correction.
-
-A scheme's module has ``schedule(spacecraft, options) -> Schedule``; `catalogue` lists the schemes.
-"""
+"""Interface of the schemes: a scheme's module has ``schedule(spacecraft, options)``; `catalogue` lists them."""
 
 from __future__ import annotations
 
@@ -9,21 +6,19 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, cast
 
 from nutdamp.common import work
 from nutdamp.common.results import note
 from nutdamp.errors import BadRequest, Infeasible, TooShort
+from nutdamp.schemes import valve_commands
 from nutdamp.schemes.catalogue import POINTING, SCHEMES, Options, Scheme, SchemeOptions
+from nutdamp.schemes.correction import Correction
+from nutdamp.schemes.sequential import SymmetricModel, model_of
+from nutdamp.spacecraft.model import Spacecraft
 from nutdamp.spacecraft.schedule import Schedule
 from nutdamp.units import as_given
 
-if TYPE_CHECKING:
-    from nutdamp.schemes.sequential import SymmetricModel
-    from nutdamp.spacecraft.model import Spacecraft
-
 LONGER = 4.0  # multiple of the horizon, and of the default one, up to which a sufficient horizon is sought
-
 
 Choice = Options | SchemeOptions | None  # options of one scheme, of several, or None for the defaults
 
@@ -53,36 +48,29 @@ def schedule(name: str, spacecraft: Spacecraft, options: Choice = None) -> Sched
     last pulse (the last four of schemes that keep or turn H) is corrected on the true motion. Raises Infeasible with
     the reason where the scheme cannot work within the limits, and KeyError for a name not in `NAMES`.
     """
-    from nutdamp.schemes.sequential import model_of
-
     scheme = SCHEMES[name]
     chosen = settled(scheme, options, spacecraft)
     if not scheme.fires:
         return Schedule()
     if scheme.by_turns and spacecraft.spin == 0.0:
         raise Infeasible("the body does not turn about axis 3: there is no spin turn to fire once in")
+    planned: Callable[[Spacecraft, SchemeOptions], Schedule] = import_module(scheme.module).schedule
     if scheme.on_true_body:
-        return cast("Schedule", import_module(scheme.module).schedule(spacecraft, chosen))
+        return planned(spacecraft, chosen)
     if spacecraft.thrust_laws:
-        from nutdamp.schemes import correction, valve_commands
-
         on_plain = valve_commands.options(spacecraft, chosen)
-        on_true_body = correction.Correction(scheme, on_plain)
-        return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), on_true_body)
-    model, module = model_of(spacecraft, turning=chosen.equal), import_module(scheme.module)
+        correct = Correction(scheme, on_plain)
+        return valve_commands.planned(spacecraft, lambda body: schedule(name, body, on_plain), correct)
+    model = model_of(spacecraft, turning=chosen.equal)
     try:
-        planned: Schedule = module.schedule(model.body, chosen)
+        return _corrected(scheme, model, planned(model.body, chosen), chosen)
     except TooShort as short:
-        cure = short.cure or _longer_horizon(model.body, lambda body: module.schedule(body, chosen))
+        cure = short.cure or _longer_horizon(model.body, lambda body: planned(body, chosen))
         raise TooShort(short.why, cure) from None
-    return _corrected(scheme, model, planned, chosen)
 
 
 def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Schedule]) -> str:
-    """Message on a horizon within which the whole schedule was ``planned``; else that none was found.
-
-    Empty where the budget of work ends before that is known.
-    """
+    """Message on a horizon that suffices, or that none was found; empty where the budget of work ends before."""
 
     def end(horizon: float) -> float | None:
         """End of the schedule within a horizon; None where there is none."""
@@ -99,9 +87,7 @@ def _longer_horizon(spacecraft: Spacecraft, planned: Callable[[Spacecraft], Sche
             shortest = math.ceil(over / step) * step  # four digits, rounded up
             needed = shortest if end(shortest) is not None else horizon
             return f"limits.horizon = {needed:.4g} s is long enough"
-    if work.exhausted():
-        return ""
-    return f"not even limits.horizon = {horizon:.4g} s is long enough"
+    return "" if work.exhausted() else f"not even limits.horizon = {horizon:.4g} s is long enough"
 
 
 def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> list[Schedule]:
@@ -112,12 +98,8 @@ def alternatives(name: str, spacecraft: Spacecraft, options: Choice = None) -> l
     scheme = SCHEMES[name]
     if not scheme.weighs_alternatives:
         return []
-    from nutdamp.schemes.sequential import model_of
-
     chosen = settled(scheme, options, spacecraft)
     if spacecraft.thrust_laws:
-        from nutdamp.schemes import valve_commands
-
         schedules = alternatives(name, valve_commands.plain(spacecraft), valve_commands.options(spacecraft, chosen))
         return [as_commands(name, spacecraft, schedule, chosen) for schedule in schedules]
     model = model_of(spacecraft)
@@ -130,11 +112,9 @@ def as_commands(name: str, spacecraft: Spacecraft, schedule: Schedule, options: 
 
     Raises KeyError for a name not in `NAMES`.
     """
-    from nutdamp.schemes import correction, valve_commands
-
     scheme = SCHEMES[name]
     chosen = valve_commands.options(spacecraft, settled(scheme, options, spacecraft))
-    return valve_commands.as_commands(spacecraft, schedule, correction.Correction(scheme, chosen))
+    return valve_commands.as_commands(spacecraft, schedule, Correction(scheme, chosen))
 
 
 def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, options: SchemeOptions) -> Schedule:
@@ -147,6 +127,4 @@ def _corrected(scheme: Scheme, model: SymmetricModel, schedule: Schedule, option
         schedule = replace(schedule, notes=(*schedule.notes, aside))
     if model.exact:
         return schedule
-    from nutdamp.schemes import correction
-
-    return correction.Correction(scheme, options)(model.spacecraft, schedule)
+    return Correction(scheme, options)(model.spacecraft, schedule)

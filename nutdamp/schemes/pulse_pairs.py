@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.flight.dynamics import Arc
 from nutdamp.physics import attitude, precession
+from nutdamp.physics.precession import TwoJumps
 from nutdamp.schemes import correction
 from nutdamp.schemes.correction import PairCandidate, shortlist, tolerable
 from nutdamp.schemes.sequential import at_hand, model_of, turn_of
@@ -69,9 +71,8 @@ class SteerablePair:
 
     def on_times(self, jumps: Vector) -> Vector:
         """On-times (n,) s of pulses that turn H by ``jumps`` (n,) N m s; not a number where no pulse can."""
-        if self.torquer.torque is None:
-            return np.zeros_like(jumps)
-        return precession.on_times_to_turn(jumps, self.torquer.torque, self.spacecraft.spin)
+        torque, spin = self.torquer.torque, self.spacecraft.spin
+        return np.zeros_like(jumps) if torque is None else precession.on_times_to_turn(jumps, torque, spin)
 
     def spent(self, jumps: Vector) -> Vector:
         """Impulse (n,) N m s that ``jumps`` (n,) of H take: more where the pulse is wide."""
@@ -87,9 +88,8 @@ class SteerablePair:
             push = complex(body[0], body[1])
             if abs(push) > NOTHING * self.h:
                 on_time = float(self.on_times(np.array([abs(push)]))[0])
-                requested = {"impulse": abs(push)} if self.torquer.torque is None else {"on_time": on_time}
                 angle = math.atan2(push.imag, push.real)
-                pulse = steerable_pulse(self.torquer, moment, angle, **requested)
+                pulse = steerable_pulse(self.torquer, moment, angle, impulse=abs(push), on_time=on_time)
                 pulses.append(commandable(self.spacecraft, pulse))
             state = SpinState(complex(rates[0, 0], rates[0, 1]) + push / self.A, float(rates[0, 2]), quaternions[0])
             now, momentum = moment, after
@@ -116,18 +116,16 @@ class SteerablePair:
 
         times = self.moments()
         costs, _ = cost(times)
-        if len(times) == 0 or not np.isfinite(costs.min()):
+        least = float(costs.min(initial=np.inf))
+        if not np.isfinite(least):
             raise Infeasible(self.no_room(cones))
-        best = float(times[np.flatnonzero(costs <= costs.min() * (1.0 + EQUAL))[0]])
-        point = _descend(lambda points: cost(points[:, 0])[0], np.array([best]), np.array([self.step]))
-        moment = float(point[0])
-        return self.pulses([(moment, cost(np.array([moment]))[1][0])])
+        best = times[np.flatnonzero(costs <= least * (1.0 + EQUAL))[:1]]
+        moment = _descend(lambda points: cost(points[:, 0])[0], best, np.array([self.step]))
+        return self.pulses([(float(moment[0]), cost(moment)[1][0])])
 
     def two(self, straight: bool = False) -> tuple[Pulse, ...]:
         """Two pulses that end on the target with least impulse; ``straight``: by a half cone, without choice."""
         times = self.moments()
-        if len(times) == 0:
-            raise Infeasible(self.no_room(1))
         free = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target)
         least = float(np.nanmin(self.spent(free.first) + self.spent(free.second), initial=np.inf))
         if not np.isfinite(least):
@@ -144,15 +142,13 @@ class SteerablePair:
             raise Infeasible(self.no_room(1))
         point = _descend(
             lambda points: self._costs(points[:, 0], points[:, 1], choice.further, straight)[0],
-            np.array([choice.moment, choice.aside]),
+            choice.point,
             np.array([self.step, 0.0 if straight else 0.02 * choice.jumps]),
         )
         _, second, jumps = self._costs(point[:1], point[1:], choice.further, straight)
         return self.pulses([(float(point[0]), jumps.middle[0]), (float(second[0]), self.h * self.target)])
 
-    def _costs(
-        self, times: Vector, aside: Vector, further: int, straight: bool
-    ) -> tuple[Vector, Vector, precession.TwoJumps]:
+    def _costs(self, times: Vector, aside: Vector, further: int, straight: bool) -> tuple[Vector, Vector, TwoJumps]:
         """Impulse (n,) of first pulses at ``times`` (n,) s, infinite where not allowed; moment of the second."""
         jumps = precession.two_jumps(self.A, self.h, self.momentum, self.axes(times), self.target, aside, straight)
         second = times + jumps.wait + further * jumps.turn
@@ -176,8 +172,8 @@ class SteerablePair:
             if np.isfinite(least) and (best is None or least < best.cost * (1.0 - EQUAL)):
                 near = np.flatnonzero(costs <= least * (1.0 + EQUAL))
                 index = near[np.argmin(second[near])]
-                size = float(jumps.cost[index])
-                best = _Placement(least, float(times[index]), float(aside[index]), further, size)
+                point = np.array([times[index], aside[index]])
+                best = _Placement(least, point, further, float(jumps.cost[index]))
             if not (second < self.windows.horizon).any() or (best is not None and not self.spacecraft.limits.blackout):
                 break
         return best
@@ -210,8 +206,7 @@ class SteerablePair:
 
 class _Placement(NamedTuple):
     cost: float
-    moment: float
-    aside: float
+    point: Vector  # moment of the first pulse, s, and how far aside H goes, N m s
     further: int
     jumps: float
 
@@ -222,8 +217,8 @@ def _descend(cost: Callable[[Vector], Vector], point: Vector, steps: Vector) -> 
     rose = rose[np.any(rose != 0.0, axis=1)]
     best = float(cost(point[None, :])[0])
     narrowed = 1.0
-    for _ in range(COMPASS_STEPS if len(rose) else 0):
-        if narrowed <= NARROWEST:  # the cost is flat there to its square
+    for _ in range(COMPASS_STEPS):
+        if narrowed <= NARROWEST:
             break
         around = point + narrowed * rose
         costs = cost(around)
@@ -242,13 +237,7 @@ BODY_SAMPLES, BODY_TURNS = 96, 24
 
 
 def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
-    """Two pulses; ``straight``: by one half cone on the great circle, where a torquer leaves the choice.
-
-    Raises Infeasible with the reason.
-    """
-    most = spacecraft.limits.max_pulses
-    if most is not None and most < 2:
-        raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
+    """Two pulses, where so many are allowed; ``straight``: by one half cone, of a torquer. Raises Infeasible."""
     torquer = spacecraft.torquer
     if torquer is not None:
         schedule = Schedule(SteerablePair(spacecraft, torquer).two(straight))
@@ -256,7 +245,24 @@ def schedule(spacecraft: Spacecraft, *, straight: bool = False) -> Schedule:
         if kept and (torquer.torque is not None or not model_of(spacecraft).exact):
             schedule = correction.correct(spacecraft, schedule, chosen=range(len(schedule)), momentum=True)
         return _checked(spacecraft, schedule)
-    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
+    search = _PairSearch(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)))
+
+    def corrected() -> Iterator[tuple[Schedule, float]]:
+        """Candidates with the residual (rad) of each."""
+        for candidate in shortlist(search.all_candidates(), 4, SHORTLIST):
+            schedule = candidate.fired(spacecraft)
+            if spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses):
+                schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
+                yield schedule, correction.left(spacecraft, schedule)
+
+    best, _ = correction.best_of(spacecraft, corrected())
+    if best is None:
+        raise Infeasible(search.reason())
+    schedule = _checked(spacecraft, best)
+    first, second = schedule.pulses
+    wait, ratio = second.t - first.t, f"{schedule.total_impulse / search.floor:.3f}"
+    told = note("pulse-pair", first=first.channel, second=second.channel, wait_s=wait, ratio=ratio)
+    return Schedule(schedule.pulses, (told,))
 
 
 def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
@@ -276,33 +282,6 @@ def _checked(spacecraft: Spacecraft, schedule: Schedule) -> Schedule:
     )
 
 
-# --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
-def _fixed(spacecraft: Spacecraft, channels: list[Channel]) -> Schedule:
-    """Fly and correct the most promising candidates; the smallest flown residual wins, exact ones in order."""
-    search = _PairSearch(spacecraft, channels)
-    best, _ = correction.best_of(spacecraft, _tried(spacecraft, shortlist(search.all_candidates(), 4, SHORTLIST)))
-    if best is None:
-        raise Infeasible(search.reason())
-    schedule = _checked(spacecraft, best)
-    first, two = (pulse.channel for pulse in schedule)
-    wait, ratio = schedule.pulses[1].t - schedule.pulses[0].t, f"{schedule.total_impulse / search.floor:.3f}"
-    return Schedule(schedule.pulses, (note("pulse-pair", first=first, second=two, wait_s=wait, ratio=ratio),))
-
-
-def _tried(spacecraft: Spacecraft, candidates: list[PairCandidate]) -> Iterator[tuple[Schedule, float]]:
-    """Candidates, corrected on the flown motion, with the residual (rad) of each."""
-    for candidate in candidates:
-        schedule = candidate.fired(spacecraft)
-        if spacecraft.limits.tick is None or keeps_limits(spacecraft, schedule.pulses):
-            schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-            yield schedule, correction.left(spacecraft, schedule)
-
-
-Rows = NDArray[np.intp]
-
-
 class _PairSearch:
     """Pairs of channels and moments at which ideal impulses acquire the target."""
 
@@ -316,17 +295,8 @@ class _PairSearch:
         self.arc = Arc.of(inertia, spacecraft.initial)
         self.within_reach = False  # whether a pair closed, before on-times and windows were looked at
 
-    def times(self) -> Vector:
-        """Moments (n,) s of the first pulse that are looked at."""
-        turn = 2.0 * math.pi / self.spacecraft.fastest
-        first = self.spacecraft.limits.earliest
-        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
-        span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
-        times = np.unique(np.concatenate([end + span for end in ends]))
-        return np.asarray(times[times <= self.windows.horizon])
-
-    def after(self, channel: Channel, times: Vector) -> _After:
-        """Motion after ``channel`` fires at ``times`` (n,) s as much as it must."""
+    def after(self, channel: Channel, times: Vector) -> tuple[TwoJumps, NDArray[np.complex128]]:
+        """Jumps, the first by ``channel`` at ``times`` (n,) s, and the second in the body after the wait, J1 + iJ2."""
         direction = channel.transverse / abs(channel.transverse)
         _, quaternions = self.arc.motion(times)
         push = attitude.rotate(quaternions, np.array([direction.real, direction.imag, 0.0]))
@@ -344,56 +314,59 @@ class _PairSearch:
             there = attitude.multiply(outer, quaternions)
             back = attitude.rotate(attitude.conjugate(there), jump)
             body = (back[:, 0] + 1j * back[:, 1]) * np.exp(-1j * self.turning * wait)
-        return _After(first, np.linalg.norm(jump, axis=1), wait, turn, body)
+        return TwoJumps(middle, first, np.linalg.norm(jump, axis=1), wait, turn), body
 
-    def all_candidates(self) -> list[PairCandidate]:
-        """Candidates for the target; where the first jump would be nothing, for targets beside it, to be corrected.
-
-        That is where the target lies on the cone of the spin axis itself.
-        """
+    def all_candidates(self) -> Iterator[PairCandidate]:
+        """Candidates for the target; where that lies on the cone of the spin axis, for targets beside it."""
         wide = self.spacecraft.nutation + self.spacecraft.to_turn
         if abs(self.h - self.momentum @ self.target) > ON_CONE * wide**2 * self.h:
-            return self.candidates()
-        candidates, target = [], self.target
+            yield from self.candidates()
+            return
+        target = self.target
         side = np.cross(self.momentum, target)
-        for beside in (side, np.cross(side, target)):
-            for sense in (1.0, -1.0):
-                moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
-                self.target = moved / float(np.linalg.norm(moved))
-                candidates += self.candidates()
-        self.target = target
-        return candidates
+        for beside, sense in product((side, np.cross(side, target)), (1.0, -1.0)):
+            moved = target + sense * BESIDE * wide * beside / max(float(np.linalg.norm(beside)), 1e-300)
+            self.target = moved / float(np.linalg.norm(moved))
+            yield from self.candidates()
 
-    def candidates(self) -> list[PairCandidate]:
+    def candidates(self) -> Iterator[PairCandidate]:
         """Pairs that close and keep the limits, the cheapest of each first channel."""
-        times = self.times()
-        candidates: list[PairCandidate] = []
+        turn, first = 2.0 * math.pi / self.spacecraft.fastest, self.spacecraft.limits.earliest
+        ends = [first, *(end for _, end in self.spacecraft.limits.blackout if end > first)][:BODY_TURNS]
+        span = np.arange(BODY_SAMPLES * max(BODY_TURNS // len(ends), 2)) * (turn / BODY_SAMPLES)
+        times = np.unique(np.concatenate([end + span for end in ends]))  # of the first pulse, s
+        times = np.asarray(times[times <= self.windows.horizon])
         if len(times) < 2:
-            return candidates
-        adjoining = np.diff(times) < 1.5 * 2.0 * math.pi / self.spacecraft.fastest / BODY_SAMPLES
+            return
+        adjoining = np.diff(times) < 1.5 * turn / BODY_SAMPLES
         for one in self.channels:
             if work.exhausted():
                 break
-            after = self.after(one, times)
-            promising = adjoining & (after.first + after.second <= DEAREST * self.floor)[:-1]
+            after, body = self.after(one, times)
+            promising = adjoining & (after.cost <= DEAREST * self.floor)[:-1]
             for further in range(FURTHER):
                 if not np.nanmin(times + after.wait + further * after.turn, initial=np.inf) < self.windows.horizon:
                     break
                 work.spend(PAIR * len(times) * len(self.channels))
-                needed = after.body * np.exp(-1j * self.turning * further * after.turn)
+                needed = body * np.exp(-1j * self.turning * further * after.turn)
                 for two in self.channels:
                     off = np.angle(needed * two.transverse.conjugate())
                     near = np.abs(off) < 0.5 * math.pi
                     crosses = np.flatnonzero(promising & near[:-1] & near[1:] & (off[:-1] * off[1:] <= 0.0))
-                    candidates += self._placed(one, two, further, times, after, off, crosses)
-        return candidates
+                    if len(crosses) > 0:
+                        yield from self._placed(one, two, further, times, after, off, crosses)
 
     def _placed(
-        self, one: Channel, two: Channel, further: int, times: Vector, after: _After, off: Vector, crosses: Rows
+        self,
+        one: Channel,
+        two: Channel,
+        further: int,
+        times: Vector,
+        after: TwoJumps,
+        off: Vector,
+        crosses: NDArray[np.intp],
     ) -> list[PairCandidate]:
         """Pairs at the zeros of ``off`` behind the rows ``crosses``, within on-times and limits."""
-        if len(crosses) == 0:
-            return []
         here, there = off[crosses], off[crosses + 1]
         share = np.where(here == there, 0.5, here / (here - there + (here == there)))
 
@@ -444,16 +417,3 @@ class _PairSearch:
             f"{self.windows.horizon:.4g} s up to limits.horizon; a longer horizon, a steerable torquer or rhumb-line "
             "can help"
         )
-
-
-class _After(NamedTuple):
-    """After a first jump of size ``first``: the second, N m s, the wait and one more turn, s; (n,) each.
-
-    ``body`` (n,) is the second jump in body axes, J1 + iJ2, at the end of the plain wait.
-    """
-
-    first: Vector
-    second: Vector
-    wait: Vector
-    turn: Vector
-    body: NDArray[np.complex128]

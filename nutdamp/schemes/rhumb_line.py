@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import cmath
 import math
+from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -55,16 +57,12 @@ TRIES = 4  # counts that are flown, at most
 
 
 class Attempt(NamedTuple):
-    """Train to fly: so many equal ``pulses`` of the ``size`` s, or N m s where they are ideal impulses.
-
-    ``closes``: whether they leave little nutation as they are, so that correction costs little. ``resizable``: whether
-    the size is not that of a command, and may be corrected.
-    """
+    """Train to fly."""
 
     pulses: int
-    size: float
-    closes: bool
-    resizable: bool = False
+    size: float  # of each, s; of ideal impulses N m s
+    closes: bool  # whether they leave little nutation as they are, so that correction costs little
+    resizable: bool = False  # whether the size is not that of a command, and may be corrected
 
 
 class Train:
@@ -75,184 +73,157 @@ class Train:
         self.windows = Windows(here)
         self.turn = 2.0 * math.pi / abs(here.spin)
         self.h = abs(here.axial)
-        self.sun = here.goal.sun
-        self.channels = [] if here.torquer is not None else _spread(usable(here), options.per_turn)
-        if self.channels:
+        torquer, self.channels, self.shortest, self.longest = here.torquer, list[Channel](), 0.0, math.inf
+        if torquer is not None:
+            self.torque = math.inf if torquer.torque is None else torquer.torque
+        else:
+            self.channels = _spread(usable(here), options.per_turn)
             self.torque = math.fsum(abs(channel.transverse) for channel in self.channels) / len(self.channels)
             self.shortest = max(channel.min_on_time for channel in self.channels)
             self.longest = min(channel.max_on_time for channel in self.channels)
-        else:
-            assert here.torquer is not None
-            self.torque = math.inf if here.torquer.torque is None else here.torquer.torque
-            self.shortest, self.longest = 0.0, math.inf
-        if options.on_time is not None:
-            self._check(options.on_time)
-        # By default an eighth of a spin turn: 2.6 % of the impulse is lost to the arc.
-        given = min(self.longest, TURN_SHARE * self.turn) if options.on_time is None else options.on_time
-        self.on_time = max(given, self.shortest)
-        if not math.isinf(self.torque) and self.on_time > 0.5 * self.turn:
-            raise Infeasible(f"the shortest pulse, {self.shortest:.4g} s, {_too_long(self.turn)}")
-        self.ahead, self.way = precession.course(here.momentum, here.target_axis, self.sun)
+        self.ideal = math.isinf(self.torque)
+        self.widest = min(self.longest, WIDEST * self.turn)  # s, that is worth firing unless a longer one is given
+        given = options.on_time
+        self.on_time = max(min(self.longest, TURN_SHARE * self.turn), self.shortest) if given is None else given
+        name = f"the shortest pulse, {self.shortest:.4g} s,"
+        if given is not None:
+            name = f"an on-time of {given:.4g} s"
+            if self.ideal:
+                raise Infeasible(
+                    "an on-time is for pulses that last: ideal impulses have none; give the torquer a torque"
+                )
+            if not self.shortest <= given <= self.longest:
+                allowed = span(self.shortest, self.longest, "s")
+                raise Infeasible(f"{name} is outside what the channels allow: {allowed}")
+            if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
+                tick = self.here.limits.tick
+                raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {tick:.4g} s")
+        if not self.ideal and self.on_time > 0.5 * self.turn:
+            raise Infeasible(
+                f"{name} is more than half a spin turn ({0.5 * self.turn:.4g} s), after which a torque fixed in the "
+                "body undoes its work"
+            )
+        self.ahead, self.way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        self.needed = self.h * self.way  # turn of H, N m s
+        self.strongest = self.turns_by(STEP * self.h if self.ideal else self.on_time)  # turn by a full pulse, N m s
+        most = here.limits.max_pulses
+        self.most = MOST_PULSES if most is None else most  # pulses allowed, and not shorter than they can be
+        if self.shortest > 0.0:
+            self.most = min(self.most, int(_ratio(self.needed, self.turns_by(self.shortest))))
 
     def turns_by(self, size: float) -> float:
         """Turn of H by a pulse of a ``size`` as in `Attempt`, N m s."""
-        return size if math.isinf(self.torque) else self.torque * size * precession.arc_efficiency(self.here.spin, size)
+        return size if self.ideal else self.torque * size * precession.arc_efficiency(self.here.spin, size)
 
-    @property
-    def strongest(self) -> float:
-        """Turn of H by a full pulse of the train, N m s."""
-        return self.turns_by(STEP * self.h if math.isinf(self.torque) else self.on_time)
-
-    def _check(self, given: float) -> None:
-        """Raises Infeasible where no pulse can be ``given`` s long, or should."""
-        if math.isinf(self.torque):
-            raise Infeasible("an on-time is for pulses that last: ideal impulses have none; give the torquer a torque")
-        if not self.shortest <= given <= self.longest:
-            raise Infeasible(
-                f"an on-time of {given:.4g} s is outside what the channels allow: "
-                f"{span(self.shortest, self.longest, 's')}"
-            )
-        if abs(self.windows.nearest_tick(given) - given) > TOUCHING:
-            raise Infeasible(f"an on-time of {given:.6g} s is no multiple of the tick of {self.here.limits.tick:.4g} s")
-        if given > 0.5 * self.turn:
-            raise Infeasible(f"an on-time of {given:.4g} s {_too_long(self.turn)}")
-
-    def size(self, count: int, spare: float) -> float:
-        """Size of ``count`` equal pulses that turn H all the way with so many to ``spare``; on ticks, rounded up.
-
-        Not a number where that is too far.
-        """
-        share = self.h * self.way / (count - min(spare, 0.5 * count))
-        if math.isinf(self.torque):
+    def size(self, count: int, bent: float = 1.0) -> float:
+        """Size of ``count`` pulses with ``bent`` times those to spare, on ticks; not a number where it is too far."""
+        share = self.needed / (count - min(bent * self._spare(count), 0.5 * count))
+        if self.ideal:
             return share
-        needed = max(
+        width = max(
             float(precession.on_times_to_turn(np.array([share]), self.torque, self.here.spin)[0]), self.shortest
         )
-        return self.windows.tick_after(needed) if math.isfinite(needed) else math.nan
+        return self.windows.tick_after(width) if math.isfinite(width) else math.nan
 
-    def attempts(self) -> list[Attempt]:
-        """Trains worth flying, the most promising first; raises Infeasible with the reason where there is none."""
-        return self._free(self.left()) if self.options.on_time is None else self._held(self.left(), self.on_time)
+    def _spare(self, count: int) -> float:
+        """Spare pulses of a train of ``count`` that is corrected.
 
-    def _spare(self, count: int, left: Vector) -> float:
-        """Spare pulses of a train that leaves ``left`` (n,) pulses of nutation if it is not corrected.
-
-        A pulse that is moved by an angle of the spin turns its kick to the nutation by ``a`` times that, and loses half
-        of its square.
+        A pulse moved by an angle of the spin turns its kick by ``a`` times that, and loses half of its square.
         """
         ratio = abs(self.here.nutation_rate / self.here.spin)
-        return SPARE + (float(left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(count, LAST)
+        return SPARE + (float(self.left[count - 1]) / max(ratio, LEAST_RATIO)) ** 2 / min(count, LAST)
 
-    def _free(self, left: Vector) -> list[Attempt]:
-        """Trains of pulses of any length: `left` by 1, 2, … pulses is ``left`` (n,)."""
-        fewest = self.fewest()
+    def free(self) -> list[Attempt]:
+        """Trains of any length to fly, the most promising first; raises Infeasible where there is none."""
+        left, fewest = self.left, self._fewest(self.strongest)
         if fewest > len(left):
-            wide = STEP * self.h if math.isinf(self.torque) else self.turns_by(self.widest)
-            fewest = max(math.ceil(_ratio(self.h * self.way, wide) - 1e-9), 2)
-        most = min(len(left), self._most())
+            fewest = self._fewest(self.turns_by(STEP * self.h if self.ideal else self.widest))
+        most = min(len(left), self.most)
         if fewest > most:
-            raise self._too_few(fewest, len(left))
+            raise self._too_few(fewest)
         closing = [count for count in range(fewest, most + 1) if left[count - 1] <= CLOSED]
         if not closing:
             best = int(np.argmin(left[fewest - 1 : most])) + fewest
             if left[best - 1] > OPEN:
-                raise self._in_phase(fewest, most, left)
+                raise self._in_phase(fewest, most)
             closing = [best]
         # Of the next few counts the one that closes best, or that ticks make least dear; at last with room to bend.
         near = [count for count in closing if count <= 1.25 * closing[0] + 3]
         free = self.here.limits.tick is None
-        tried = [Attempt(count, self.size(count, self._spare(count, left)), True, free) for count in near]
+        tried = [Attempt(count, self.size(count), True, free) for count in near]
         tried.sort(key=lambda attempt: float(left[attempt.pulses - 1]) if free else attempt.pulses * attempt.size)
-        tried = tried[:TRIES]
-        for count in [attempt.pulses for attempt in tried[:2]]:
-            tried.append(Attempt(count, self.size(count, BENT * self._spare(count, left)), False, free))
-        widest = math.inf if math.isinf(self.torque) else max(self.on_time, self.widest) + TOUCHING
+        del tried[TRIES:]
+        tried += [Attempt(count, self.size(count, BENT), False, free) for count, *_ in tried[:2]]
+        widest = math.inf if self.ideal else max(self.on_time, self.widest) + TOUCHING
         possible = list({attempt[:2]: attempt for attempt in reversed(tried) if attempt.size <= widest}.values())[::-1]
         if not possible:
-            raise self._too_few(most + 1, len(left))
+            raise self._too_few(most + 1)
         return possible
 
-    def _held(self, left: Vector, given: float) -> list[Attempt]:
-        """Trains of pulses ``given`` s long, the fewest first, the spare ones bent away: ``left`` as in `_free`."""
-        fewest, most = self.fewest(), self._most()
-        if fewest > min(most, len(left)):
-            raise self._too_few(fewest, len(left))
-        counts = range(fewest, min(most, len(left), fewest + 2 * TRIES) + 1)
-        needed = self.h * self.way / self.turns_by(given)
+    def held(self) -> list[Attempt]:
+        """Trains of the length requested, the fewest pulses first; raises Infeasible where there is none."""
+        left, fewest = self.left, self._fewest(self.strongest)
+        most = min(self.most, len(left))
+        if fewest > most:
+            raise self._too_few(fewest)
+        counts = range(fewest, min(most, fewest + 2 * TRIES) + 1)
         closing = [count for count in counts if left[count - 1] <= OPEN]
-        enough = [count for count in closing if count - needed >= 0.5 * self._spare(count, left)]
-        tried = [Attempt(count, given, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
+        enough = [count for count in closing if count - self.needed / self.strongest >= 0.5 * self._spare(count)]
+        tried = [Attempt(count, self.on_time, bool(left[count - 1] <= CLOSED)) for count in enough or closing]
         if not tried:
-            raise self._in_phase(fewest, counts[-1], left)
+            raise self._in_phase(fewest, counts[-1])
         return tried[: 2 * TRIES]
-
-    @property
-    def floor(self) -> float:
-        """Impulse (N m s) that no train can do without."""
-        given = self.shortest if self.options.on_time is None else self.on_time
-        return self.h * self.way / precession.arc_efficiency(self.here.spin, given)
 
     def lengths_near(self, given: float) -> list[float]:
         """On-times (s) of trains that may close, in the order of their distance from the ``given`` one."""
-        left = self.left()
-        closing = [count for count in range(2, min(len(left), self._most()) + 1) if left[count - 1] <= OPEN]
-        sizes = {self.size(count, self._spare(count, left)) for count in closing}
+        counts = range(2, min(len(self.left), self.most) + 1)
+        sizes = {self.size(count) for count in counts if self.left[count - 1] <= OPEN}
         if self.here.limits.tick is not None:
             sizes |= {self.windows.nearest_tick(given), self.windows.tick_after(given)}
         possible = [size for size in sizes if self.shortest <= size <= self.widest and size > 0.0]
         return sorted(possible, key=lambda size: abs(size - given))
 
-    @property
-    def widest(self) -> float:
-        """Longest pulse (s) worth firing, unless a longer one is given: a quarter of its impulse is lost to the arc."""
-        return min(self.longest, WIDEST * self.turn)
+    def _fewest(self, each: float) -> int:
+        """Least number of pulses that turn H by up to ``each`` N m s; two at least, to close."""
+        return max(math.ceil(_ratio(self.needed, each) - 1e-9), 2)
 
-    def fewest(self) -> int:
-        """Least number of pulses with the on-time given; two at least, to close."""
-        return max(math.ceil(_ratio(self.h * self.way, self.strongest) - 1e-9), 2)
-
-    def _most(self) -> int:
-        """Pulses that are allowed, and not shorter than they can be."""
-        most = self.here.limits.max_pulses
-        allowed = MOST_PULSES if most is None else most
-        if self.shortest > 0.0:
-            allowed = min(allowed, int(_ratio(self.h * self.way, self.turns_by(self.shortest))))
-        return allowed
-
+    @cached_property
     def left(self) -> Vector:
         """Sum of the phasors of the first 1, 2, … pulses and the nutation at the start, in pulses, (n,)."""
-        start, A, shots = self.here.initial, self.here.inertia.A, self._shots()
-        pushes = np.array(
-            [_in_body(self.here, self.ahead, t) if channel is None else channel.transverse for t, channel in shots]
-        )
+        shots = self._shots()
         turned = self.here.nutation_rate * np.array([t for t, _ in shots])
-        sums = np.cumsum(np.exp(1j * (np.angle(pushes) + turned)))
+        sums = np.cumsum(np.exp(1j * (np.angle(np.array([push for _, push in shots])) + turned)))
         counts = np.arange(1, len(shots) + 1)
-        return np.asarray(np.abs(A * start.omega * counts / (self.h * self.way) + sums))
+        return np.asarray(np.abs(self.here.inertia.A * self.here.initial.omega * counts / self.needed + sums))
 
-    def _shots(self) -> list[tuple[float, Channel | None]]:
-        """Moments (s) of right phase of a channel, or with None of the torquer, within the limits; undisturbed."""
-        shots: list[tuple[float, Channel | None]] = []
-        ready, on_time = self.here.limits.earliest, 0.0 if math.isinf(self.torque) else self.on_time
-        firsts = [(_aligned(self.here, channel, self.ahead, ready), channel) for channel in self.channels]
+    def _shots(self) -> list[tuple[float, complex]]:
+        """Moments (s) of right phase within the limits, undisturbed, and the direction in the body of each push."""
+        shots: list[tuple[float, complex]] = []
+        ready, on_time = self.here.limits.earliest, 0.0 if self.ideal else self.on_time
+        firsts = [(_aligned(self.here, channel, self.ahead, ready), channel.transverse) for channel in self.channels]
         gap = max(self.here.limits.gap, 0.5 * self.turn / self.options.per_turn - on_time)
+
+        def after(first: float, time: float) -> float:
+            """Moment of the phase of ``first`` from ``time`` s on."""
+            return first + max(math.ceil((time - first) / self.turn - 1e-9), 0) * self.turn
+
         for _ in range(MOST_PULSES + len(self.here.limits.blackout)):
             start = self.windows.earliest_start(on_time, ready)
             if start is None or len(shots) == MOST_PULSES:
                 break
             centre = start + 0.5 * on_time
-            moments: list[tuple[float, Channel | None]] = [
-                (first + max(math.ceil((centre - first) / self.turn - 1e-9), 0) * self.turn, channel)
-                for first, channel in firsts
-            ]
-            t, channel = min(moments, key=lambda moment: moment[0], default=(centre, None))
+            if firsts:
+                first, push = min(firsts, key=lambda shot: after(shot[0], centre))
+                t = after(first, centre)
+            else:
+                t, push = centre, _in_body(self.here, self.ahead, centre)
             if t + 0.5 * on_time > self.windows.horizon:
                 break
             free = self.windows.blocked_until(t - 0.5 * on_time, on_time)
             if free is not None:
                 ready = max(free, ready + 0.25 * self.turn)
                 continue
-            shots.append((t, channel))
+            shots.append((t, push))
             ready = t + 0.5 * on_time + gap
             if not firsts:
                 ready = max(t + self.turn / self.options.per_turn - 0.5 * on_time, ready)
@@ -260,33 +231,30 @@ class Train:
 
     def next_pulse(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Pulse | None:
         """Next pulse of ``remaining`` ones from the motion of ``here``; None where the limits leave no time."""
-        windows, limits = Windows(here), here.limits
-        ahead = self._heading(here, remaining, attempt)
-        on_time = 0.0 if math.isinf(self.torque) else attempt.size
-        ready, turn = limits.earliest, self.turn / self.options.per_turn
-        begun = here is not self.here
-        if self.channels:  # no two in the same passage of the phase
-            return self._passing(here, windows, ahead, on_time, max(ready, 0.5 * turn - on_time) if begun else ready)
-        if begun:
-            ready = max(ready, turn - on_time)
-        start = windows.earliest_start(on_time, ready)
+        ahead, way = precession.course(here.momentum, here.target_axis, here.goal.sun)
+        share = self.h * way / (remaining * self.turns_by(attempt.size))
+        if share < 1.0:  # equal pulses would turn H too far: to one side of the target, a spiral
+            bend = math.acos(max(share, math.cos(WIDEST_BEND)))
+            aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
+            ahead = np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
+        ready = here.limits.earliest
+        on_time = 0.0 if self.ideal else attempt.size
+        if here is not self.here:  # no two in the same passage of the phase
+            turn = self.turn / self.options.per_turn
+            ready = max(ready, (0.5 * turn if self.channels else turn) - on_time)
+        if self.channels:
+            return self._passing(here, ahead, on_time, ready)
+        start = Windows(here).earliest_start(on_time, ready)
         if start is None:
             return None
         centre = start + 0.5 * on_time
         assert here.torquer is not None
-        given = {"impulse": attempt.size} if here.torquer.torque is None else {"on_time": on_time}
-        return steerable_pulse(here.torquer, centre, cmath.phase(_in_body(here, ahead, centre)), **given)
+        angle = cmath.phase(_in_body(here, ahead, centre))
+        return steerable_pulse(here.torquer, centre, angle, impulse=attempt.size, on_time=on_time)
 
-    def _heading(self, here: Spacecraft, remaining: int, attempt: Attempt) -> Vector:
-        """Course to the target, or to one side of it where equal pulses would turn H too far: a spiral."""
-        ahead, way = precession.course(here.momentum, here.target_axis, self.sun)
-        share = self.h * way / (remaining * self.turns_by(attempt.size))
-        bend = math.acos(max(share, math.cos(WIDEST_BEND))) if share < 1.0 else 0.0
-        aside = np.cross(here.momentum / float(np.linalg.norm(here.momentum)), ahead)
-        return np.asarray(math.cos(bend) * ahead + math.sin(bend) * aside)
-
-    def _passing(self, here: Spacecraft, windows: Windows, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
+    def _passing(self, here: Spacecraft, ahead: Vector, on_time: float, ready: float) -> Pulse | None:
         """First firing of a channel at the required phase within the limits."""
+        windows = Windows(here)
         for _ in range(MOST_PULSES):
             moments = [(_aligned(here, channel, ahead, ready + 0.5 * on_time), channel) for channel in self.channels]
             t, channel = min(moments, key=lambda passage: passage[0])
@@ -299,10 +267,10 @@ class Train:
             ready = max(free or 0.0, start + 0.25 * self.turn)
         return None
 
-    def _in_phase(self, fewest: int, most: int, left: Vector) -> Infeasible:
+    def _in_phase(self, fewest: int, most: int) -> Infeasible:
         """Error where trains of ``fewest`` to ``most`` pulses leave nutation."""
         ratio = self.here.axial / (self.here.inertia.A * self.here.spin * self.options.per_turn)
-        least = math.degrees(float(left[fewest - 1 : most].min()) * self.way / most)
+        least = math.degrees(float(self.left[fewest - 1 : most].min()) * self.way / most)
         if abs(ratio - round(ratio)) * most >= 1.0:
             return Infeasible(
                 f"of {fewest} to {most} pulses, as many as limits and on-times allow, no number brings the nutation "
@@ -314,9 +282,9 @@ class Train:
             f"would leave {least:.3g}°; another --per-turn, a longer horizon, half-cone or two-pulse can help"
         )
 
-    def _too_few(self, needed: int, moments: int) -> Infeasible:
+    def _too_few(self, needed: int) -> Infeasible:
         """Message on limits that leave too few times or pulses."""
-        most = self.here.limits.max_pulses
+        most, moments = self.here.limits.max_pulses, len(self.left)
         if most is not None and most < needed:
             return Infeasible(
                 f"a train to the target takes {needed} pulses at least, and limits.max_pulses leaves {most} for it"
@@ -359,22 +327,17 @@ def _spread(channels: list[Channel], count: int) -> list[Channel]:
         raise Infeasible("once the nutation is taken out no time is left for the turn")
     chosen = [min(channels, key=lambda channel: (channel.price, -abs(channel.transverse)))]
     while len(chosen) < count:
-
-        def apart(channel: Channel) -> float:
-            return min(abs(cmath.phase(channel.transverse * other.transverse.conjugate())) for other in chosen)
-
-        farthest = max(channels, key=apart)
-        if apart(farthest) < 0.2:
+        off = [
+            min(abs(cmath.phase(channel.transverse * other.transverse.conjugate())) for other in chosen)
+            for channel in channels
+        ]
+        if max(off) < 0.2:
             raise Infeasible(
                 f"{count} pulses a spin turn need {count} channels of different directions, for each passes the "
                 f"phase once a turn; there are {len(chosen)}"
             )
-        chosen.append(farthest)
+        chosen.append(channels[off.index(max(off))])
     return chosen
-
-
-def _too_long(turn: float) -> str:
-    return f"is more than half a spin turn ({0.5 * turn:.4g} s), after which a torque fixed in the body undoes its work"
 
 
 def _ratio(whole: float, part: float) -> float:
@@ -387,10 +350,7 @@ EXACT, CLEARLY = 1e-10, 0.01
 
 
 def schedule(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
-    """Train, after one pulse (or a train against ω) where there is more nutation than it can absorb.
-
-    ``options.on_time`` and ``per_turn`` as in `RhumbLineOptions`. Raises Infeasible with the reason.
-    """
+    """Train, after one pulse (or a train against ω) where nutation is more than it can absorb; raises Infeasible."""
     expect_aim(spacecraft)
     try:
         return _train(spacecraft, options)
@@ -411,7 +371,7 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
             reason = why
     if spacecraft.least_impulse <= 1e-9 * train.h:
         raise reason
-    builder = correction.damped(builder, one_pulse.schedule)
+    builder = one_pulse.damped(builder)
     if builder.left <= ROUNDING:
         return builder.schedule(note("no-train"))
     return _best(builder, Train(builder.here, options))
@@ -420,52 +380,47 @@ def _train(spacecraft: Spacecraft, options: RhumbLineOptions) -> Schedule:
 def _another(spacecraft: Spacecraft, options: RhumbLineOptions) -> str:
     """Advice on a pulse length that works instead of the requested one, the nearest first."""
     builder, exact = FlownBuilder(spacecraft), 0.0 if spacecraft.limits.tick is None else tolerable(spacecraft)
-    try:
+    with suppress(Infeasible):
         if spacecraft.least_impulse > 1e-9 * abs(spacecraft.axial):
-            builder = correction.damped(builder, one_pulse.schedule)
+            builder = one_pulse.damped(builder)
         lengths = Train(builder.here, replace(options, on_time=None)).lengths_near(options.on_time or 0.0)
-    except Infeasible:
-        lengths = []
-    for length in lengths[:OTHERS]:
-        digits = 3 - math.floor(math.log10(length))
-        rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
-        try:
-            train = _train(spacecraft, replace(options, on_time=rounded))
-        except Infeasible:
-            continue
-        if correction.left(spacecraft, train) <= max(10.0 * EXACT, exact):
-            return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
+        for length in lengths[:OTHERS]:
+            digits = 3 - math.floor(math.log10(length))
+            rounded = math.ceil(length * 10.0**digits) / 10.0**digits  # up: so that no more pulses are needed
+            with suppress(Infeasible):
+                train = _train(spacecraft, replace(options, on_time=rounded))
+                if correction.left(spacecraft, train) <= max(10.0 * EXACT, exact):
+                    return f"--on-time {rounded:.4g}s works, with {len(train)} pulses in all"
     return "no other length was found that works"
 
 
 def _best(builder: FlownBuilder, train: Train) -> Schedule:
-    """Train of least residual from the ``builder``; raises Infeasible where that is too much.
-
-    Of those that leave nothing the first one, unless a later one costs clearly less.
-    """
-    best: tuple[float, Schedule] | None = None
+    """Train that leaves least, of those that leave nothing the first, unless a later one costs clearly less."""
+    best = math.inf, math.inf, Schedule()
     before = sum(pulse.magnitude for pulse in builder.pulses)
-    for attempt in train.attempts():
+    requested = train.options.on_time
+    floor = train.needed / precession.arc_efficiency(
+        train.here.spin, train.shortest if requested is None else requested
+    )
+    for attempt in train.free() if requested is None else train.held():
         # What the rounding of the start of one pulse to a tick leaves counts as nothing.
         rounding = train.turns_by(attempt.size) / train.h * abs(train.here.spin) * (train.here.limits.tick or 0.0)
         nothing = max(EXACT, rounding)
-        if best is not None and best[0] <= nothing and not attempt.closes:
+        if best[0] <= nothing and not attempt.closes:
             continue  # it would cost no less
         schedule, left = _flown(builder.fork(), train, attempt)
         left, cost = max(left, nothing), schedule.total_impulse - before
-        cheaper = best is not None and cost < (1.0 - CLEARLY) * (best[1].total_impulse - before)
-        if best is None or left < 0.5 * best[0] or (left <= best[0] and cheaper):
-            best = left, schedule
-        cheap = best[1].total_impulse - before <= (1.0 + CLEARLY) * train.floor
+        if left < 0.5 * best[0] or (left <= best[0] and cost < (1.0 - CLEARLY) * best[1]):
+            best = left, cost, schedule
+        cheap = best[1] <= (1.0 + CLEARLY) * floor
         # Of pulses of a given length the trains come in the order of their cost.
-        if work.exhausted() or (left <= nothing and (cheap or train.options.on_time is not None)):
+        if work.exhausted() or (left <= nothing and (cheap or requested is not None)):
             break
-    if best is None or best[0] > tolerable(train.here):
-        requested = train.options.on_time
+    if best[0] > tolerable(train.here):
         held = "" if requested is None else f" of {requested:.4g} s"
         text = f"no train of equal pulses{held} was found that ends on the target within the limits"
-        raise Infeasible(text if best is None else f"{text}; the best would leave {math.degrees(best[0]):.3g}°")
-    return best[1]
+        raise Infeasible(f"{text}; the best would leave {math.degrees(best[0]):.3g}°")
+    return best[2]
 
 
 def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Schedule, float]:
@@ -489,7 +444,7 @@ def _flown(builder: FlownBuilder, train: Train, attempt: Attempt) -> tuple[Sched
         return builder.schedule(), builder.left
     on_time = builder.pulses[-1].on_time
     description = note(
-        "great-circle-train" if train.sun is None else "rhumb-line-train",
+        "great-circle-train" if train.here.goal.sun is None else "rhumb-line-train",
         count=count,
         channels=", ".join(channel.name for channel in train.channels) or "the steerable torquer",
         on_time_s=on_time,

@@ -17,7 +17,7 @@ from nutdamp.common.results import note
 from nutdamp.errors import Infeasible, TooShort, listed
 from nutdamp.physics import attitude, energy_sink, response
 from nutdamp.physics import body as rigid_body
-from nutdamp.spacecraft.constraints import Windows, longest_useful, usable
+from nutdamp.spacecraft.constraints import Windows, channel_of, longest_useful, usable
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Attitude, Disturbance, Inertia, Spacecraft, Vector
 from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
@@ -60,7 +60,6 @@ class ImpulseBuilder:
     @property
     def settled(self) -> bool:
         """True if the residual is rounding; under dissipation, if correction of the last pulse suffices."""
-        # `response.width_factor` holds at small angles only.
         corrected = 0.0 if self.spacecraft.growth == 0.0 else CORRECTED * self.spacecraft.least_impulse
         return self.left <= max(1e-13 * abs(self.C * self.spin + self.wheel), corrected)
 
@@ -99,17 +98,7 @@ class ImpulseBuilder:
         """κ, cos θ and sin²θ of `energy_sink` just after the last pulse."""
         axial, across = (self.C * self.spin + self.wheel) ** 2, (self.A * abs(self.omega)) ** 2
         size = axial + across
-        if size == 0.0:
-            return self.spacecraft.growth, 1.0, 0.0
-        return self.spacecraft.growth, math.sqrt(axial / size), across / size
-
-    def _turned(self, time: float) -> float:
-        """Time, s, in which the present spin turns the body as far as it turns from now to ``time`` s.
-
-        Nearly so with a wheel under dissipation.
-        """
-        since = time - self.now
-        return since if self._even else energy_sink.course(*self._sink(), since).turned
+        return self.spacecraft.growth, *((math.sqrt(axial / size), across / size) if size > 0.0 else (1.0, 0.0))
 
     def omega_at(self, time: float) -> complex:
         """ω at ``time`` s if nothing more is fired."""
@@ -161,11 +150,12 @@ class ImpulseBuilder:
 
     def align(self, channel: Channel, on_time: float) -> Pulse | None:
         """Next pulse of ``channel`` against ω that the limits allow, ``on_time`` s long (made commandable)."""
-        on_time = self.windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
+        windows = self.windows
+        on_time = windows.on_time(on_time, channel.min_on_time, channel.max_on_time)
         probe = channel_pulse(channel, self.now, on_time)
         turn = rigid_body.phase_to_oppose(self.omega, self.acts(probe))
         if math.isinf(self.period):
-            start = self.windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
+            start = windows.earliest_start(on_time, self.ready) if abs(turn) <= ALIGNED else None
             return None if start is None else channel_pulse(channel, start + 0.5 * on_time, on_time)
         first = turn / self.turning  # and the times below: as long as it takes at the present spin
         # Rounding may put a pulse just before it may start, but not on the one before it, nor before t = 0.
@@ -173,11 +163,12 @@ class ImpulseBuilder:
 
         def alignment(ready: float) -> float:
             """Whole turns from ``first`` to the alignment at which a pulse starts at ``ready`` s or next."""
-            return math.ceil((self._turned(ready + 0.5 * on_time - slack) - first) / self.period)
+            since = ready + 0.5 * on_time - slack - self.now
+            turned = since if self._even else energy_sink.course(*self._sink(), since).turned
+            return math.ceil((turned - first) / self.period)
 
         turns = alignment(self.ready)
-        # Rounding to ticks or a disturbance may move 50 in a row to before the actuators are ready.
-        for _ in range(len(self.windows.limits.blackout) + MISSED):
+        for _ in range(len(windows.limits.blackout) + MISSED):
             turned = first + turns * self.period
             centre = self.now + (turned if self._even else energy_sink.time_to_turn(*self._sink(), turned))
             if math.isinf(centre):  # dissipation stops the spin before
@@ -185,23 +176,19 @@ class ImpulseBuilder:
             if self.spacecraft.disturbances or self.spacecraft.growth != 0.0:
                 centre = self._opposed_near(channel, centre, on_time)
             start = centre - 0.5 * on_time
-            if self.windows.limits.tick is not None:
-                start = self.windows.nearest_tick(start)
+            if windows.limits.tick is not None:
+                start = windows.nearest_tick(start)
                 centre = start + 0.5 * on_time
-            free = self.windows.blocked_until(start, on_time)
+            free = windows.blocked_until(start, on_time)
             later = not self.pulses or centre > self.now  # also where the clock cannot tell so short a time
             if start >= self.ready - slack and later and free is None:
-                allowed = self.windows.allows(start, on_time, self.ready)
-                return channel_pulse(channel, centre, on_time) if allowed else None
+                return channel_pulse(channel, centre, on_time) if windows.allows(start, on_time, self.ready) else None
             # Rounded to a tick before the actuators are ready, opposed earlier by a disturbance, or blacked out.
             turns = max(turns + 1, alignment(self.ready if free is None else free))
         return None
 
     def _opposed_near(self, channel: Channel, centre: float, on_time: float) -> float:
-        """Time near ``centre`` at which ω opposes the pulse where it does not turn evenly.
-
-        Each step mends the angle still missing, by the rate at which ω turns there.
-        """
+        """Time near ``centre`` at which ω opposes the pulse where it does not turn evenly, by Newton steps."""
         for _ in range(20):
             turn = rigid_body.phase_to_oppose(self.omega_at(centre), self.acts(channel_pulse(channel, centre, on_time)))
             _, spin = self._coast(centre)
@@ -212,18 +199,24 @@ class ImpulseBuilder:
 
     def steer(self, steerable: Steerable, impulse: float) -> Pulse | None:
         """Earliest pulse of a steerable torquer that acts against ω like ``impulse`` N m s; None if none can."""
-        on_time, given = 0.0, {"impulse": impulse}
-        if steerable.torque is not None:
-            needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
-            if needed is None:
-                return None
-            on_time = self.windows.on_time(needed, 0.0, math.inf)
-            given = {"on_time": on_time}
-        start = self.windows.earliest_start(on_time, self.ready)
-        if start is None:
+        on_time = self.on_time_to_steer(steerable, impulse)
+        if on_time is None:
             return None
+        start = self.windows.earliest_start(on_time, self.ready)
+        return None if start is None else self.steered(steerable, start, impulse, on_time)
+
+    def on_time_to_steer(self, steerable: Steerable, impulse: float) -> float | None:
+        """Commandable on-time in s of a pulse like ``impulse`` N m s, 0 of an ideal one; None if it is too weak."""
+        if steerable.torque is None:
+            return 0.0
+        needed = response.on_time_for(impulse, steerable.torque, self.turning, 0.0, math.inf)
+        return None if needed is None else self.windows.on_time(needed, 0.0, math.inf)
+
+    def steered(self, steerable: Steerable, start: float, impulse: float, on_time: float) -> Pulse:
+        """Pulse against ω from ``start`` s on, of an ``impulse`` N m s where it is ideal."""
         centre = start + 0.5 * on_time
-        return steerable_pulse(steerable, centre, cmath.phase(-self.omega_at(centre)), **given)
+        angle = cmath.phase(-self.omega_at(centre))
+        return steerable_pulse(steerable, centre, angle, impulse=impulse, on_time=on_time)
 
 
 FADED = 1e-6  # fraction of the nutation below which pulses have nothing to do: dissipation has removed it
@@ -249,13 +242,13 @@ def bounded_by(spacecraft: Spacecraft) -> str:
     """Limits on a schedule of its channels, by name: the horizon, and those that the file sets."""
     limits, channels = spacecraft.limits, spacecraft.channels
     there = {
+        f"the horizon of {spacecraft.horizon:.4g} s": True,
         "on-times": any(channel.min_on_time > 0.0 or math.isfinite(channel.max_on_time) for channel in channels),
         "gap": limits.gap > 0.0,
         "ticks": limits.tick is not None,
         "blackout windows": bool(limits.blackout),
     }
-    names = [f"the horizon of {spacecraft.horizon:.4g} s", *(name for name in there if there[name])]
-    return listed(names)
+    return listed([name for name in there if there[name]])
 
 
 NO_AXIAL = "no channel has a torque about axis 3, so none can set the spin; leave --spin out"
@@ -288,14 +281,22 @@ def no_alignment(spacecraft: Spacecraft, channels: list[Channel]) -> Infeasible:
             f"nearest is {nearest}, {math.degrees(off[nearest]):.4g}° off. four-pulse combines channels"
         )
     builder = ImpulseBuilder(spacecraft, endless=True)
-    pulses = [(each, builder.align(each, max(each.min_on_time, 1e-6 * builder.period))) for each in channels]
-    there = [(channel, pulse) for channel, pulse in pulses if pulse is not None]
-    if not there:
+    pulses, ends = [], []
+    for channel in channels:
+        shortest = builder.align(channel, max(channel.min_on_time, 1e-6 * builder.period))
+        if shortest is None:
+            continue
+        pulses.append(shortest)
+        if builder.helps(shortest):
+            most = longest_useful(channel.max_on_time, builder.period)
+            needed = builder.on_time_for(channel, builder.left)
+            pulse = builder.align(channel, most if needed is None else min(needed, most))
+            ends.append(shortest.end if pulse is None else max(pulse.end, shortest.end))
+    if not pulses:
         flat = ": dissipation brings the body into flat spin before, where ω does not turn in it"
         return Infeasible(f"no channel ever opposes the nutation{flat * (spacecraft.growth > 0.0)}")
-    ends = [_end(builder, channel, pulse) for channel, pulse in there if builder.helps(pulse)]
     if not ends:
-        best = min((pulse for _, pulse in there), key=builder.left_after)
+        best = min(pulses, key=builder.left_after)
         left = builder.A * abs(builder.omega_at(best.t))
         if left < FADED * builder.left:
             return Infeasible(
@@ -318,14 +319,6 @@ def turn_of(spacecraft: Spacecraft, impulse: float) -> str:
     return f"{math.degrees(math.atan2(impulse, abs(spacecraft.axial))):.4g} deg"
 
 
-def _end(builder: ImpulseBuilder, channel: Channel, shortest: Pulse) -> float:
-    """End in s of the first pulse of a channel that is as long as it takes; of the ``shortest`` where none has room."""
-    needed = builder.on_time_for(channel, builder.left)
-    most = longest_useful(channel.max_on_time, builder.period)
-    pulse = builder.align(channel, most if needed is None else min(needed, most))
-    return shortest.end if pulse is None else max(pulse.end, shortest.end)
-
-
 @dataclass(frozen=True, eq=False)
 class SymmetricModel:
     """``body`` is planned on for ``spacecraft``; ``stretch`` (2,) leads from the ellipse of (ω1, ω2) to the circle."""
@@ -343,35 +336,31 @@ class SymmetricModel:
         """Schedule with the true actuators."""
         if self.spacecraft.inertia.symmetric:
             return schedule
-        channels = {channel.name: channel for channel in self.spacecraft.channels}
-        windows, ready, pulses = Windows(self.spacecraft), self.spacecraft.limits.earliest, []
+        ready, pulses = self.spacecraft.limits.earliest, list[Pulse]()
         for pulse in schedule:
-            if pulse.channel in channels:
-                pulses.append(channel_pulse(channels[pulse.channel], pulse.t, pulse.on_time))
-            else:
-                pulses.append(self._steered(pulse, windows, ready))
-            ready = pulses[-1].end + self.spacecraft.limits.gap
+            channel = channel_of(self.spacecraft, pulse)
+            true = self._steered(pulse, ready) if channel is None else channel_pulse(channel, pulse.t, pulse.on_time)
+            pulses.append(true)
+            ready = true.end + self.spacecraft.limits.gap
         return Schedule(tuple(pulses), schedule.notes, schedule.bounds)
 
-    def _steered(self, pulse: Pulse, windows: Windows, ready: float) -> Pulse:
+    def _steered(self, pulse: Pulse, ready: float) -> Pulse:
         """Steerable pulse of the true torquer: longer or shorter, and so moved where the limits require it."""
-        torquer = self.spacecraft.torquer
+        torquer, windows = self.spacecraft.torquer, Windows(self.spacecraft)
         assert torquer is not None
         first, second = pulse.impulse[:2] / self.stretch
-        impulse, angle = math.hypot(first, second), math.atan2(second, first)
-        if torquer.torque is None:
-            return steerable_pulse(torquer, pulse.t, angle, impulse=impulse)
-        on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
-        start = windows.earliest_start(on_time, max(pulse.start, ready))
-        t = pulse.t if start is None else start + 0.5 * on_time
-        return steerable_pulse(torquer, t, angle, on_time=on_time)
+        impulse, t, on_time = math.hypot(first, second), pulse.t, 0.0
+        if torquer.torque is not None:
+            on_time = windows.on_time(impulse / torquer.torque, 0.0, math.inf)
+            start = windows.earliest_start(on_time, max(pulse.start, ready))
+            t = t if start is None else start + 0.5 * on_time
+        return steerable_pulse(torquer, t, math.atan2(second, first), impulse=impulse, on_time=on_time)
 
 
 def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel:
-    """Model of a spacecraft; of a symmetric body without disturbances it is the spacecraft itself.
+    """Model of a spacecraft, whose torques change ω as the true ones do.
 
-    Its torques change ω as the true ones do; ``turning``: they turn H as the true ones do, and ω at t = 0 is as much
-    larger or smaller on average, as the circle may be of any size.
+    ``turning``: they turn H so, and ω at t = 0 is as much larger or smaller on average: the circle may be of any size.
     """
     undisturbed = _without_steady(spacecraft)
     inertia = spacecraft.inertia
@@ -383,15 +372,20 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel
     circle = (first * (first * spin - axial) / (second * (second * spin - axial))) ** 0.25
     scale = np.array([circle, 1.0 / circle])
     stretch = scale * A / np.array([first, second])  # for torques and impulses
-    size = float(np.mean(stretch)) if turning else 1.0
+    mean = float(np.mean(stretch))
     torquer = undisturbed.steerable
     if torquer is not None and torquer.torque is not None:  # the stretch differs by direction: near enough for a plan
-        torquer = replace(torquer, torque=torquer.torque * float(np.mean(stretch)))
+        torquer = replace(torquer, torque=torquer.torque * mean)
+    factors = np.ones(3) if turning else np.array([*stretch, 1.0])
+    channels = []
+    for channel in undisturbed.channels:
+        thrusters = tuple(replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters)
+        channels.append(replace(channel, thrusters=thrusters, spends=channel.strength))
     body = replace(
         undisturbed,
         inertia=Inertia((A, A, C), inertia.axes, inertia.wheel),
-        omega0=np.array([*(scale * undisturbed.omega0[:2] / size), undisturbed.omega0[2]]),
-        channels=tuple(_stretched(channel, stretch if not turning else np.ones(2)) for channel in undisturbed.channels),
+        omega0=np.array([*(scale * undisturbed.omega0[:2] / (mean if turning else 1.0)), undisturbed.omega0[2]]),
+        channels=tuple(channels),
         steerable=torquer,
         limits=replace(spacecraft.limits, horizon=spacecraft.horizon),
     )
@@ -399,10 +393,7 @@ def model_of(spacecraft: Spacecraft, *, turning: bool = False) -> SymmetricModel
 
 
 def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
-    """Copy of the ``body`` with the attitude of the ``spacecraft``, and the target axis at its true distance from H.
-
-    Both have other rates, and so another H; what a plan has to do is the turn from H to the target.
-    """
+    """Copy of the ``body``, which has another H, with the target axis at its distance from H of the ``spacecraft``."""
     if spacecraft.goal.axis is None or body is spacecraft:
         return body
     quaternion = spacecraft.initial.quaternion
@@ -416,30 +407,22 @@ def _aimed(body: Spacecraft, spacecraft: Spacecraft) -> Spacecraft:
     return replace(held, goal=replace(spacecraft.goal, axis=axis - 2.0 * (after @ axis) * after))
 
 
-def _stretched(channel: Channel, stretch: Vector) -> Channel:
-    factors = np.array([*stretch, 1.0])
-    thrusters = tuple(replace(thruster, torque=thruster.torque * factors) for thruster in channel.thrusters)
-    return replace(channel, thrusters=thrusters, spends=channel.strength)
-
-
 def _without_steady(spacecraft: Spacecraft) -> Spacecraft:
-    """Spacecraft with ω counted from the steady response to its disturbances, which are removed.
-
-    Axial disturbances stay, and transverse ones too slow against the nutation to be steady within the horizon.
-    """
+    """Spacecraft with ω counted from the steady response to its disturbances; those without one stay."""
     if not spacecraft.disturbances:
         return spacecraft
     steady = steady_omega(spacecraft, 0.0)
-    left = [replace(each, transverse=0j) if settles(spacecraft, each) else each for each in spacecraft.disturbances]
-    lasting = tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse)
-    omega0 = spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0])
-    return replace(spacecraft, omega0=omega0, disturbances=lasting)
+    left = (replace(each, transverse=0j) if settles(spacecraft, each) else each for each in spacecraft.disturbances)
+    return replace(
+        spacecraft,
+        omega0=spacecraft.omega0 - np.array([steady.real, steady.imag, 0.0]),
+        disturbances=tuple(disturbance for disturbance in left if disturbance.axial or disturbance.transverse),
+    )
 
 
 def settles(spacecraft: Spacecraft, disturbance: Disturbance) -> bool:
     """True if ω beats against the disturbance at least once within the horizon; else it counts as resonant."""
-    detuning = abs(spacecraft.nutation_rate + disturbance.rate)
-    return detuning * spacecraft.horizon > 2.0 * math.pi
+    return abs(spacecraft.nutation_rate + disturbance.rate) * spacecraft.horizon > 2.0 * math.pi
 
 
 def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
@@ -447,7 +430,6 @@ def steady_omega(spacecraft: Spacecraft, time: float) -> complex:
     A, nutation_rate, steady = spacecraft.inertia.A, spacecraft.nutation_rate, 0.0 + 0.0j
     for disturbance in spacecraft.disturbances:
         if disturbance.transverse and settles(spacecraft, disturbance):
-            torque, rate = disturbance.transverse, disturbance.rate
-            turned = complex(math.cos(rate * time), math.sin(rate * time))
-            steady += response.steady_response(A, nutation_rate, torque, rate) * turned
+            turned = cmath.rect(1.0, disturbance.rate * time)
+            steady += response.steady_response(A, nutation_rate, disturbance.transverse, disturbance.rate) * turned
     return steady

@@ -12,10 +12,11 @@ import cmath
 import itertools
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
-from nutdamp.common.results import Note, note
+from nutdamp.common.results import note
 from nutdamp.errors import Infeasible
 from nutdamp.physics import body as rigid_body
 from nutdamp.physics import energy_sink, response
@@ -26,7 +27,7 @@ from nutdamp.schemes.sequential import ALIGNED, FADED, ImpulseBuilder, at_hand, 
 from nutdamp.spacecraft.constraints import Windows, for_pairs, keeps_limits, longest_useful
 from nutdamp.spacecraft.equipment import Channel, Steerable
 from nutdamp.spacecraft.model import Spacecraft, Vector
-from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse, steerable_pulse
+from nutdamp.spacecraft.schedule import TOUCHING, Pulse, Schedule, channel_pulse
 
 # pairs that cost more than this times A|ω0| are not looked at: the second pulse would mostly undo the first
 DEAREST = 2.0
@@ -41,96 +42,86 @@ def schedule(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
     ``options.literal``: equal halves and the wait as printed, not corrected, and the target left alone. Raises
     Infeasible with the reason.
     """
-    if spacecraft.goal.axis is not None and not options.literal:
-        try:
-            from nutdamp.schemes import pulse_pairs  # here, because few plans have a target
-
-            return pulse_pairs.schedule(spacecraft)
-        except Infeasible:
-            damping = _wide(spacecraft)
-            if damping is None:
-                raise
-            return damping
-    return _damping(spacecraft, options)
-
-
-def _wide(spacecraft: Spacecraft) -> Schedule | None:
-    """Pulses that damp without drift, corrected to a target nearby; None where they do not reach it.
-
-    A pulse over a large part of a spin turn hardly turns H and still takes nutation out, so where pulses as wide as
-    that are all there is, this finds what an acquisition, which plans for the turn, does not.
-    """
-    if not 0.0 <= spacecraft.to_turn < spacecraft.nutation:
-        return None
-    try:
-        schedule = _damping(spacecraft, TwoPulseOptions())
-    except Infeasible:
-        return None
-    return schedule if correction.left(spacecraft, schedule) <= tolerable(spacecraft) else None
-
-
-def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
-    """Two pulses that leave H where it was, but for the correction to a target."""
     most = spacecraft.limits.max_pulses
     if most is not None and most < 2:
         raise Infeasible(f"two pulses are needed, and limits.max_pulses allows {most}")
-    torquer = spacecraft.torquer
-    if torquer is not None:
-        return _steered(spacecraft, torquer, options)
-    return _fixed(spacecraft, at_hand(spacecraft, for_pairs(spacecraft)), options)
+    if spacecraft.goal.axis is None or options.literal:
+        return _damping(spacecraft, options)
+    try:
+        from nutdamp.schemes import pulse_pairs  # here, because few plans have a target
+
+        return pulse_pairs.schedule(spacecraft)
+    except Infeasible:
+        # A pulse over a large part of a spin turn hardly turns H and still takes nutation out: where pulses as wide as
+        # that are all there is, damping corrected to a target nearby finds what an acquisition, for the turn, does not.
+        if spacecraft.to_turn < spacecraft.nutation:
+            with suppress(Infeasible):
+                damping = _damping(spacecraft, options)
+                if correction.left(spacecraft, damping) <= tolerable(spacecraft):
+                    return damping
+        raise
 
 
-# --- steerable torquer -----------------------------------------------------------------------------------------------
+def _damping(spacecraft: Spacecraft, options: TwoPulseOptions) -> Schedule:
+    """Two pulses that leave H where it was; where all break a limit, the first of them: the judge says which."""
+    if spacecraft.torquer is not None:
+        return _steered(spacecraft, spacecraft.torquer, options)
+    channels = at_hand(spacecraft, for_pairs(spacecraft))
+    best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
+    schedule = best or broken
+    if schedule is not None:
+        return schedule
+    names = ", ".join(channel.name for channel in channels)
+    if spacecraft.nutation_rate == 0.0:
+        raise Infeasible(
+            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
+            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
+        )
+    if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
+        raise Infeasible(f"dissipation takes the nutation out before the channels ({names}) come to oppose it")
+    bounds = bounded_by(spacecraft)
+    raise Infeasible(f"no two of the channels ({names}) bring H back and oppose the nutation within {bounds}")
 
 
 def _steered(spacecraft: Spacecraft, torquer: Steerable, options: TwoPulseOptions) -> Schedule:
     """Try every start that touches the limits and every odd number of half turns; the earliest end wins."""
-    inertia, windows, earliest = spacecraft.inertia, Windows(spacecraft), spacecraft.limits.earliest
-    form = rigid_body.half_pulses_as_printed if options.literal else rigid_body.half_pulses
-    halves = form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
-    on_times = tuple(_on_time(spacecraft, torquer, impulse) for impulse in (halves.first, halves.second))
+    windows, halves, on_times = Windows(spacecraft), _halves(spacecraft, options.literal), list[float]()
+    for half in halves[:2]:
+        on_time = ImpulseBuilder(spacecraft).on_time_to_steer(torquer, half)
+        if on_time is None:
+            times = 0.5 * abs(spacecraft.nutation_rate) * half / (torquer.torque or math.inf)
+            raise Infeasible(
+                f"half the nutation needs more than {times:.4g} times the torque of the torquer to be taken out within "
+                "half a body nutation period"
+            )
+        on_times.append(on_time)
     turns = range(1, min(max(int(windows.horizon / halves.wait), 1), 2 * MANY) + 1, 2)
 
-    def pair(start: float, wait: float) -> tuple[Pulse, ...]:
+    def pair(start: float, wait: float) -> list[Pulse]:
         """The two pulses against ω, the first from ``start`` s on."""
         builder = ImpulseBuilder(spacecraft)
         for later, on_time, half in zip((0.0, wait), on_times, halves[:2], strict=True):
             begin = windows.nearest_tick(start + 0.5 * on_times[0] + later - 0.5 * on_time)
-            centre = begin + 0.5 * on_time
-            requested = {"impulse": half} if torquer.torque is None else {"on_time": on_time}
-            builder.fire(steerable_pulse(torquer, centre, cmath.phase(-builder.omega_at(centre)), **requested))
-        return tuple(builder.pulses)
+            builder.fire(builder.steered(torquer, begin, half, on_time))
+        return builder.pulses
 
     waits = [number * halves.wait for number in turns]
-    starts = ((start, wait) for wait in waits for start in _starts(windows, earliest, on_times, wait))
+    starts = ((start, wait) for wait in waits for start in _starts(windows, on_times, wait))
     best = next((pulses for pulses in itertools.starmap(pair, starts) if keeps_limits(spacecraft, pulses)), None)
     if best is None:
         raise Infeasible(
             f"the pulses come {halves.wait:.4g} s apart or an odd multiple of that and are {sum(on_times):.4g} s long "
             f"together; no room for both within {bounded_by(spacecraft)}"
         )
+    schedule = Schedule(tuple(best))
     if options.literal or (torquer.torque is None and model_of(spacecraft).exact):
-        return Schedule(best)
-    return correction.correct(spacecraft, Schedule(best), chosen=(0, 1), momentum=True)
+        return schedule
+    return correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
 
 
-def _on_time(spacecraft: Spacecraft, torquer: Steerable, impulse: float) -> float:
-    """On-time in s of one half pulse; raises Infeasible where the torque is too weak for it."""
-    if torquer.torque is None:
-        return 0.0
-    on_time = response.on_time_for(impulse, torquer.torque, spacecraft.nutation_rate, 0.0, math.inf)
-    if on_time is None:
-        needed = 0.5 * abs(spacecraft.nutation_rate) * impulse
-        raise Infeasible(
-            f"half the nutation needs more than {needed / torquer.torque:.4g} times the torque of the torquer to be "
-            "taken out within half a body nutation period"
-        )
-    return Windows(spacecraft).on_time(on_time, 0.0, math.inf)
-
-
-def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait: float) -> list[float]:
+def _starts(windows: Windows, on_times: list[float], wait: float) -> list[float]:
     """Starts of the first pulse with which both find room, in order: at once, or as a window ends for either pulse."""
-    to_second = wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
+    earliest, to_second = windows.limits.earliest, wait + 0.5 * (on_times[0] - on_times[1])  # from start to start
     ends = np.array([end for _, end in windows.limits.blackout])
     tried = np.sort(np.concatenate([[earliest], ends, ends - to_second]))
     starts, tick = tried[tried >= earliest], windows.limits.tick
@@ -142,71 +133,43 @@ def _starts(windows: Windows, earliest: float, on_times: tuple[float, ...], wait
     return [float(start) for start in starts[allowed]]
 
 
-# --- body-fixed channels ---------------------------------------------------------------------------------------------
-
-
 def alternatives(spacecraft: Spacecraft, options: TwoPulseOptions) -> Iterator[Schedule]:
-    """Schedules among which `schedule` chooses, each within the limits; none for a steerable torquer.
-
-    None either where there is no nutation: these damp, and nothing else.
-    """
+    """Schedules of channels among which `schedule` chooses, within the limits; none where there is no nutation."""
     if spacecraft.torquer is None and spacecraft.least_impulse > 0.0 and (spacecraft.limits.max_pulses or 2) >= 2:
         for schedule, _ in _shortlist(spacecraft, for_pairs(spacecraft), options):
             if keeps_limits(spacecraft, schedule.pulses):
                 yield schedule
 
 
-def _fixed(spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions) -> Schedule:
-    """Candidate of least flown residual; exact ones in order.
-
-    Where every one breaks a limit, the first of them: the judge says which.
-    """
-    best, broken = correction.best_of(spacecraft, _shortlist(spacecraft, channels, options))
-    schedule = best or broken
-    if schedule is None:
-        raise Infeasible(_nothing_closes(spacecraft, channels))
-    return schedule
-
-
 def _shortlist(
     spacecraft: Spacecraft, channels: list[Channel], options: TwoPulseOptions
 ) -> Iterator[tuple[Schedule, float]]:
     """Most promising candidates, commandable and corrected on the real widths, each with its flown residual (rad)."""
-    pairs = (_candidates(spacecraft, one, two, options.literal) for one in channels for two in channels)
-    for candidate in correction.shortlist(itertools.chain.from_iterable(pairs), SHORTLIST, SHORTLIST):
+    halves, pairs = _halves(spacecraft), itertools.product(channels, channels)
+    candidates = (candidate for pair in pairs for candidate in _candidates(spacecraft, *pair, options.literal))
+    for candidate in correction.shortlist(candidates, SHORTLIST, SHORTLIST):
         schedule = candidate.fired(spacecraft)
         if not options.literal:
             schedule = correction.correct(spacecraft, schedule, chosen=(0, 1), momentum=True)
-        left = correction.left(spacecraft, schedule)
-        yield Schedule(schedule.pulses, _remark(spacecraft, candidate, schedule)), left
-
-
-def _remark(spacecraft: Spacecraft, candidate: PairCandidate, schedule: Schedule) -> tuple[Note, ...]:
-    inertia = spacecraft.inertia
-    spin = inertia.equivalent(spacecraft.spin)
-    halves = rigid_body.half_pulses(inertia.A, inertia.C, spacecraft.transverse_rate, spin)
-    first, second = schedule.pulses
-    turns = (second.t - first.t) / halves.wait
-    apart = note(
-        "half-turns-apart",
-        first=candidate.channels[0].name,
-        second=candidate.channels[1].name,
-        half_turns=f"{turns:.2f}",
-        off_deg=abs(math.degrees(candidate.miss)),
-        ratio=f"{candidate.factor:.3f}",
-    )
-    missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (candidate.short > 1e-9)
-    return (apart, *missed)
+        first, second = schedule.pulses
+        apart = note(
+            "half-turns-apart",
+            first=candidate.channels[0].name,
+            second=candidate.channels[1].name,
+            half_turns=f"{(second.t - first.t) / halves.wait:.2f}",
+            off_deg=abs(math.degrees(candidate.miss)),
+            ratio=f"{candidate.factor:.3f}",
+        )
+        missed = [note("on-times-miss", short_percent=100.0 * candidate.short)] * (candidate.short > 1e-9)
+        yield Schedule(schedule.pulses, (apart, *missed)), correction.left(spacecraft, schedule)
 
 
 def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: bool) -> list[PairCandidate]:
     """Closings of H for this pair within the horizon, the most promising first."""
-    inertia, omega0 = spacecraft.inertia, complex(spacecraft.omega0[0], spacecraft.omega0[1])
-    A, C, turning, spin = inertia.A, inertia.C, spacecraft.nutation_rate, inertia.equivalent(spacecraft.spin)
-    theta = spacecraft.nutation
+    inertia, turning = spacecraft.inertia, spacecraft.nutation_rate
     turn = cmath.phase(two.transverse * one.transverse.conjugate())  # arg d2 - arg d1
     # Rate of d as seen from H while half the nutation is left: ω3 at small angles, exact for the aligned pair.
-    rate = turning + C / A * spin / math.cos(0.5 * theta)
+    rate = turning + inertia.C / inertia.A * inertia.equivalent(spacecraft.spin) / math.cos(0.5 * spacecraft.nutation)
     to_go = math.pi - turn
     still = 0.1  # rad; channels that turn no further stand still in space: they close at any time, or never
     if abs(rate) * spacecraft.horizon < still:
@@ -219,19 +182,29 @@ def _candidates(spacecraft: Spacecraft, one: Channel, two: Channel, literal: boo
     count = int(max(spacecraft.horizon - first_wait, 0.0) * abs(rate) / (2 * math.pi)) + 1
     turns = _turns(count, turn + turning * first_wait, 2 * math.pi * turning / abs(rate))
     waits = first_wait + 2 * math.pi / abs(rate) * turns
-    halves = rigid_body.half_pulses(A, C, abs(omega0), spin)
+    halves = _halves(spacecraft, literal)
     if literal:  # halves and wait as printed; the pair must do with the direction it finds
-        halves = rigid_body.half_pulses_as_printed(A, C, abs(omega0), spin)
         count = max(int(spacecraft.horizon / halves.wait), 1) // 2 + 1
         odd = 2 * _turns(count, turn + turning * halves.wait, 2 * turning * halves.wait) + 1
         waits = halves.wait * odd
     miss = np.angle(np.exp(1j * (turn + turning * waits)))
     factor = 1.0 / np.cos(0.5 * miss)
+    # Worth placing: each wait clearly cheaper than all before it, and the cheapest few.
+    before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
+    better = np.flatnonzero(factor * CLOSE_IN_COST < before)
+    cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
     placed = (
-        _place(spacecraft, one, two, halves, float(waits[index]), float(miss[index]), literal)
-        for index in _promising(factor)
+        _place(spacecraft, (one, two), halves, float(waits[index]), float(miss[index]), literal)
+        for index in sorted({*better.tolist(), *cheapest.tolist()})
+        if factor[index] <= DEAREST
     )
     return [candidate for candidate in placed if candidate is not None]
+
+
+def _halves(spacecraft: Spacecraft, literal: bool = False) -> rigid_body.HalfPulses:
+    """Half pulses and the wait between them, ``literal``: as printed."""
+    form, inertia = rigid_body.half_pulses_as_printed if literal else rigid_body.half_pulses, spacecraft.inertia
+    return form(inertia.A, inertia.C, spacecraft.transverse_rate, inertia.equivalent(spacecraft.spin))
 
 
 def _turns(count: int, miss: float, step: float) -> Vector:
@@ -247,19 +220,9 @@ def _turns(count: int, miss: float, step: float) -> Vector:
     return np.union1d(first, near[(near >= 0) & (near < count)])
 
 
-def _promising(factor: Vector) -> Vector:
-    """Indices of the waits worth placing: each one clearly cheaper than all before it, and the cheapest few."""
-    before = np.concatenate([[np.inf], np.minimum.accumulate(factor)[:-1]])
-    better = np.flatnonzero(factor * CLOSE_IN_COST < before)
-    cheapest = np.argsort(factor, kind="stable")[:SHORTLIST]
-    chosen = np.array(sorted({*better.tolist(), *cheapest.tolist()}), dtype=int)  # np.union1d loads numpy.ma
-    return np.asarray(chosen[factor[chosen] <= DEAREST])  # beyond, the second pulse would mostly undo the first
-
-
 def _place(
     spacecraft: Spacecraft,
-    one: Channel,
-    two: Channel,
+    pair: tuple[Channel, Channel],
     halves: rigid_body.HalfPulses,
     wait: float,
     miss: float,
@@ -270,45 +233,41 @@ def _place(
     omega0 = complex(spacecraft.omega0[0], spacecraft.omega0[1])
     factor = 1.0 if literal else 1.0 / math.cos(0.5 * miss)
     # Both together oppose ω0 where the middle between their directions does.
-    phase = rigid_body.phase_to_oppose(omega0, one.transverse * cmath.exp(0.5j * miss))
+    phase = rigid_body.phase_to_oppose(omega0, pair[0].transverse * cmath.exp(0.5j * miss))
     if turning == 0.0 and abs(phase) > ALIGNED:
         return None
     period = 2 * math.pi / abs(turning) if turning != 0.0 else math.inf
 
     def opposed_from(time: float) -> float:
-        if turning == 0.0:
-            return time
-        return phase / turning + max(math.ceil((time - phase / turning) / period), 0) * period
+        aligned = phase / turning if turning != 0.0 else time
+        return aligned + max(math.ceil((time - aligned) / period), 0) * period if turning != 0.0 else time
 
     grown = 1.0 if literal else _grown(spacecraft, opposed_from(spacecraft.limits.earliest) + 0.5 * wait)
     if grown < FADED:
         return None
-    long, lacks = _nearest(spacecraft, one, grown * halves.first * factor)
-    longer, more = _nearest(spacecraft, two, grown * halves.second * factor)
-    on_times, short = (long, longer), (lacks + more) / factor
-    if short >= 1.0:
+    (long, lacks), (longer, more) = (
+        _nearest(spacecraft, channel, grown * half * factor) for channel, half in zip(pair, halves[:2], strict=True)
+    )
+    short = (lacks + more) / factor
+    if short >= 1.0 or wait - 0.5 * (long + longer) < spacecraft.limits.gap:
         return None
-    first = opposed_from(spacecraft.limits.earliest + 0.5 * on_times[0])
-    if wait - 0.5 * sum(on_times) < spacecraft.limits.gap:
-        return None
-    while first + wait + 0.5 * on_times[1] <= windows.horizon:
-        starts = (first - 0.5 * on_times[0], first + wait - 0.5 * on_times[1])
-        free = (windows.blocked_until(start, on_time) for start, on_time in zip(starts, on_times, strict=True))
-        delay = max((end - start for end, start in zip(free, starts, strict=True) if end is not None), default=0.0)
+    first = opposed_from(spacecraft.limits.earliest + 0.5 * long)
+    while first + wait + 0.5 * longer <= windows.horizon:
+        timing = ((first, long), (first + wait, longer))
+        starts = [(centre - 0.5 * on_time, on_time) for centre, on_time in timing]
+        free = [(windows.blocked_until(*start), start[0]) for start in starts]
+        delay = max((end - start for end, start in free if end is not None), default=0.0)
         if delay == 0.0:
-            timing = ((first, on_times[0]), (first + wait, on_times[1]))
-            schedule = Schedule((channel_pulse(one, *timing[0]), channel_pulse(two, *timing[1])))
-            short = short if short > 1e-9 else 0.0
-            return PairCandidate(schedule.cost, schedule.end, (one, two), timing, short, miss, factor)
+            schedule = Schedule((channel_pulse(pair[0], *timing[0]), channel_pulse(pair[1], *timing[1])))
+            return PairCandidate(
+                schedule.cost, schedule.end, pair, timing, short if short > 1e-9 else 0.0, miss, factor
+            )
         first += delay if turning == 0.0 else max(math.ceil(delay / period), 1) * period
     return None
 
 
 def _nearest(spacecraft: Spacecraft, channel: Channel, needed: float) -> tuple[float, float]:
-    """On-time in s with which a channel comes nearest to the effective impulse ``needed`` N m s, and what is missing.
-
-    The latter over the impulse for all nutation.
-    """
+    """On-time in s with which a channel comes nearest to ``needed`` N m s, and what is missing, over A|ω0|."""
     slope, longest = spacecraft.inertia.a * channel.axial / spacecraft.inertia.C, channel.max_on_time
     on_time = response.on_time_for(needed, abs(channel.transverse), spacecraft.nutation_rate, slope, longest)
     if on_time is None:
@@ -326,15 +285,3 @@ def _grown(spacecraft: Spacecraft, time: float) -> float:
     omega = complex(first, second)
     effect = energy_sink.coast(inertia.A, inertia.C, spacecraft.growth, omega, spin, time, inertia.wheel)
     return float(effect.transverse)
-
-
-def _nothing_closes(spacecraft: Spacecraft, channels: list[Channel]) -> str:
-    names = ", ".join(channel.name for channel in channels)
-    if spacecraft.nutation_rate == 0.0:
-        return (
-            "in a sphere (a = 0) ω does not turn in the body, and no two of the channels "
-            f"({names}) have it opposite to the middle between them; a steerable torquer or four-pulse can work"
-        )
-    if _grown(spacecraft, spacecraft.limits.earliest + 0.25 * spacecraft.body_period) < FADED:
-        return f"dissipation takes the nutation out before the channels ({names}) come to oppose it"
-    return f"no two of the channels ({names}) bring H back and oppose the nutation within {bounded_by(spacecraft)}"

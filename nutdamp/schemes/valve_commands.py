@@ -17,8 +17,9 @@ from nutdamp.common import work
 from nutdamp.common.results import Note, note
 from nutdamp.errors import Infeasible, TooShort
 from nutdamp.flight.dynamics import Supply, lightened, shed, supplied
+from nutdamp.schemes import correction
 from nutdamp.schemes.catalogue import SchemeOptions
-from nutdamp.schemes.correction import TAIL, Correction, misses
+from nutdamp.schemes.correction import TAIL, Correction
 from nutdamp.spacecraft.constraints import (
     commandable,
     effective_on_time,
@@ -142,8 +143,7 @@ def planned(spacecraft: Spacecraft, plan: Callable[[Spacecraft], Schedule], corr
 
 def _left(spacecraft: Spacecraft, schedule: Schedule, correct: Correction) -> float:
     """Residual of the bounded parts of a schedule, rad."""
-    missed = misses(spacecraft, schedule)
-    return float(np.linalg.norm(missed if correct.momentum else missed[:2]))
+    return correction.left(spacecraft, schedule, momentum=correct.momentum)
 
 
 def as_commands(

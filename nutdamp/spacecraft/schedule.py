@@ -196,20 +196,23 @@ def _rectangle(channel: Channel, t: float, on_time: float) -> Pulse:
 
 
 def steerable_pulse(
-    steerable: Steerable, t: float, angle: float, *, impulse: float | None = None, on_time: float = 0.0
+    steerable: Steerable, t: float, angle: float, *, impulse: float = 0.0, on_time: float | None = None
 ) -> Pulse:
     """Pulse of a steerable torquer centred at ``t`` s, about the transverse axis at ``angle`` rad.
 
-    Either ``impulse`` N m s is given, or ``on_time`` s where the torquer has a torque; else it gives ideal impulses.
+    It is ideal, of an ``impulse`` in N m s, where the torquer has no torque; else it lasts for ``on_time`` s, by
+    default as long as the impulse takes.
     """
     direction = np.array([math.cos(angle), math.sin(angle), 0.0])
     torque: Vector | None = None
     if steerable.torque is None:
-        on_time, impulse = 0.0, impulse or 0.0
+        on_time = 0.0
     else:
-        on_time = on_time if impulse is None else impulse / steerable.torque
-        impulse = steerable.torque * on_time if impulse is None else impulse
         torque = steerable.torque * direction
+        if on_time is None:
+            on_time = impulse / steerable.torque
+        else:
+            impulse = steerable.torque * on_time
     rate = steerable.propellant_per_impulse
     propellant = None if rate is None else rate * impulse
     return Pulse(t, on_time, STEERABLE, impulse * direction, torque, propellant=propellant)
