@@ -249,9 +249,7 @@ def _read(screen: RenderableType) -> None:
 @flown_options("Export")
 @goal_options
 @click.option(
-    "--until",
-    type=END,
-    help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse.",
+    "--until", type=END, help="Histories, spin-table: end; default last pulse + one inertial period, or last pulse."
 )
 @click.option("-o", "--output", type=OUTPUT, default="-", help="Where to write it; default standard output.")
 @quiet_option

@@ -148,20 +148,14 @@ def tell(wrong: Exception) -> None:
 
 def _explain(wrong: Exception) -> int:
     """Print an error that the user can cure, and return its exit status; a bug is raised again."""
-    from nutdamp import errors
+    from nutdamp.errors import BadRequest, FaultyFile, NutdampError
 
-    statuses: dict[type[errors.NutdampError], int] = {
-        errors.CannotRead: UNREADABLE,
-        errors.CannotWrite: UNREADABLE,
-        errors.MissingExtra: UNREADABLE,
-        errors.BadRequest: BAD_INPUT,
-        errors.FaultyFile: BAD_INPUT,
-        errors.Infeasible: INFEASIBLE,
-    }
-    if not isinstance(wrong, errors.NutdampError):
+    if not isinstance(wrong, NutdampError):
         raise wrong
     tell(wrong)
-    return next(status for kind, status in statuses.items() if isinstance(wrong, kind))
+    if isinstance(wrong, Infeasible):
+        return INFEASIBLE
+    return BAD_INPUT if isinstance(wrong, BadRequest | FaultyFile) else UNREADABLE
 
 
 COMMANDS = {  # the subcommands in the order of a first use, with their modules and their lines on the help page

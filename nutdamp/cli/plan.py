@@ -162,11 +162,7 @@ PRIMER = "primer"  # the picture of the certificate; the others are of one plan
 @click.command("plan", cls=SessionCommand)
 @spacecraft_argument
 @click.option(
-    "--scheme",
-    "names",
-    multiple=True,
-    type=SchemeName(PLANNED),
-    help=f"Repeatable: {listed(PLANNED, 'or')}.",
+    "--scheme", "names", multiple=True, type=SchemeName(PLANNED), help=f"Repeatable: {listed(PLANNED, 'or')}."
 )
 @scheme_options
 @goal_options
@@ -348,11 +344,7 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 )
 @goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
-@click.option(
-    "--until",
-    type=END,
-    help="End, of which the outcome is shown; default last pulse + one inertial period.",
-)
+@click.option("--until", type=END, help="End, of which the outcome is shown; default last pulse + one inertial period.")
 @click.option(
     "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
 )

@@ -62,10 +62,9 @@ def console() -> Console:
 
     from rich.console import Console
 
-    requested = os.environ.get("COLUMNS", "")
-    width = shutil.get_terminal_size().columns if requested.isdigit() and int(requested) < NARROWEST else None
-    if width is not None:
-        width = max(width, NARROWEST)
+    requested, width = os.environ.get("COLUMNS", ""), None
+    if requested.isdigit() and int(requested) < NARROWEST:
+        width = max(shutil.get_terminal_size().columns, NARROWEST)
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=False, width=width)
 
 
@@ -174,9 +173,5 @@ class _Progress:
         if not BELIEVED <= self.share < 1.0:
             return text
         left = (self.moment - self.began) / self.share - (now - self.began)
-        return f"{text}, about {_left(left)} left" if left > 0.0 else text
-
-
-def _left(seconds: float) -> str:
-    """A time left, s, in whole minutes where it is long."""
-    return f"{math.ceil(seconds)} s" if seconds < 120.0 else f"{math.ceil(seconds / 60.0)} min"
+        words = f"{math.ceil(left)} s" if left < 120.0 else f"{math.ceil(left / 60.0)} min"
+        return f"{text}, about {words} left" if left > 0.0 else text

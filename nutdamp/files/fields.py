@@ -7,10 +7,8 @@ in a spacecraft file follow: quantities with units and bounds, directions, lists
 
 from __future__ import annotations
 
-import datetime
 import math
 import operator
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -284,102 +282,11 @@ class Quantity(Rule):
         return {"anyOf": [number, {"type": "string", "pattern": pattern(self.kind)}]}
 
 
-class AxialShorthand(Rule):
-    """Annotation of a torque vector that may be written as a single torque, its part about axis 3."""
-
-    single = Quantity("torque")
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """Three components; raises ValueError with the form allowed."""
-        return inner(value) if isinstance(value, list) else [0.0, 0.0, self.single.read(value, inner)]
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The vector or the torque."""
-        return {"anyOf": [inner(), *self.single.schema(inner)["anyOf"]]}
-
-
-class ListOf(Rule):
-    """Annotation of a list of lists, each ``written`` so; the error for a single list shows how to nest it."""
-
-    def __init__(self, written: str) -> None:
-        self.written = written
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The list; raises ValueError where its first entry is none."""
-        if isinstance(value, list) and value and not isinstance(value[0], list):
-            text = ", ".join(str(entry) for entry in value)
-            raise ValueError(f"expected a list of {self.written}, such as [[{text}]], got [{text}]")
-        return inner(value)
-
-
-class OrWord(Rule):
-    """Annotation of a direction, two angles in a list, that may be written as one ``word`` instead."""
-
-    def __init__(self, word: str) -> None:
-        self.word = word
-
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The angles or the word; raises ValueError with the forms allowed."""
-        if value == self.word:
-            return value
-        if not isinstance(value, list):
-            raise ValueError(f"expected {self.word} or [right ascension, declination], got {shown(value)}")
-        return inner(value)
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The angles or the word."""
-        return {"anyOf": [inner(), {"const": self.word}]}
-
-
-class _DateAndTime(Rule):
-    def read(self, value: Any, inner: Callable[[Any], Any]) -> Any:
-        """The text as it is; raises ValueError unless it is a date and a time."""
-        text = inner(value)
-        try:
-            if text is not None:
-                if not re.fullmatch(_EPOCH, text):
-                    raise ValueError
-                datetime.datetime.fromisoformat(text)
-        except ValueError:
-            example = "2026-03-01T12:00:00Z"
-            raise ValueError(f"{shown(text)} is no epoch; expected ISO 8601 with date and time: {example}") from None
-        return text
-
-    def schema(self, inner: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """A text of that form."""
-        return {**inner(), "pattern": f"^{_EPOCH}$"}
-
-
-_EPOCH = r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]+)?)?(Z|[+-][0-9]{2}:[0-9]{2})?"
-
-Mass = Annotated[float, Quantity("mass", exclusiveMinimum=0)]
-Moment = Annotated[float, Quantity("inertia", exclusiveMinimum=0)]
-Rate = Annotated[float, Quantity("rate")]
-Angle = Annotated[float, Quantity("angle")]
 Nutation = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
-Tilt = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=2 * RIGHT_ANGLE)]
-Declination = Annotated[float, Quantity("angle", minimum=-RIGHT_ANGLE, maximum=RIGHT_ANGLE)]
 AcuteAngle = Annotated[float, Quantity("angle", exclusiveMinimum=0, exclusiveMaximum=RIGHT_ANGLE)]
 Time = Annotated[float, Quantity("time", minimum=0)]
 PositiveTime = Annotated[float, Quantity("time", exclusiveMinimum=0)]
-Force = Annotated[float, Quantity("force", exclusiveMinimum=0)]
-Lever = Annotated[float, Quantity("length", exclusiveMinimum=0)]
-Torque = Annotated[float, Quantity("torque", exclusiveMinimum=0)]
-Probability = Annotated[float, Quantity("ratio", exclusiveMinimum=0, exclusiveMaximum=1)]
-
-_THREE = Length(3, 3)
-Rates = Annotated[list[Rate], _THREE]
-Position = Annotated[list[Annotated[float, Quantity("length")]], _THREE]
-Travel = Annotated[list[Annotated[float, Quantity("travel")]], _THREE]
-Velocity = Annotated[list[Annotated[float, Quantity("speed")]], _THREE]
-Direction = Annotated[list[Annotated[float, Quantity("number")]], _THREE]
-Torques = Annotated[list[Annotated[float, Quantity("torque")]], _THREE]
-DisturbingTorques = Annotated[Torques, AxialShorthand()]
-Tensor = Annotated[list[Annotated[list[Annotated[float, Quantity("inertia")]], _THREE]], _THREE]
-Quaternion = Annotated[list[Annotated[float, Quantity("number")]], Length(4, 4)]
-InTheSky = Annotated[list[Angle], Length(2, 2)]
-Apart = Annotated[float, Quantity("angle", minimum=0, maximum=2 * RIGHT_ANGLE)]
-Window = Annotated[list[Time], Length(2, 2)]
+THREE = Length(3, 3)
+Position = Annotated[list[Annotated[float, Quantity("length")]], THREE]
+Direction = Annotated[list[Annotated[float, Quantity("number")]], THREE]
 Name = Annotated[str, Length(1)]
-Epoch = Annotated[str, _DateAndTime()]
-Count = Annotated[int, Within(1, 1_000_000)]

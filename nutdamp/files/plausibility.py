@@ -83,8 +83,7 @@ def reading(value: float, kind: str, meant: str) -> str:
 
 def _bare(facts: Facts, path: KeyPath) -> float | None:
     """The finite number at ``path``; None where there is none, or a text with a unit."""
-    node = facts.root.get(*path)
-    value = None if node is None else node.value
+    value = facts.value(*path)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return value
@@ -108,7 +107,7 @@ def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, floa
     for path, meant in (
         (("state", "spin"), "rpm"),
         (("goal", "spin"), "rpm"),
-        *((("omega0", axis), "deg/s") for axis, _ in facts.children("omega0")),
+        *((path, "deg/s") for path in facts.below("omega0")),
     ):
         fastest = FAST if (_bare(facts, path) or 0.0) % 1 else FAST_AND_WHOLE
         yield path, "rate", meant, -fastest, fastest, math.inf
@@ -116,8 +115,8 @@ def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, floa
         given = facts.vector(kind, 3, "orbit", key)
         if given is not None and 0.0 < math.hypot(*given) < least:
             yield ("orbit", key, int(abs(given).argmax())), kind, meant, math.inf, math.inf, math.inf
-    thrusters: list[KeyPath] = [("thrusters", index) for index, _ in facts.children("thrusters")]
-    positions = [(*path, "position", axis) for path in thrusters for axis, _ in facts.children(*path, "position")]
+    thrusters = facts.below("thrusters")
+    positions = [position for path in thrusters for position in facts.below(*path, "position")]
     for path in (*positions, *((*path, "lever_arm") for path in (*thrusters, ("steerable",)))):
         yield path, "length", "mm", -FAR, FAR, math.inf
     spin = spin_of(facts)
@@ -127,11 +126,10 @@ def _bands(facts: Facts) -> Iterator[tuple[KeyPath, str, str, float, float, floa
         yield (*path, "max_on_time"), "time", "ms", -math.inf, LASTING * turn, math.inf
     times: list[KeyPath] = [(*path, "valve", key) for path in ((), *thrusters) for key in VALVE_TIMES]
     for path in thrusters:
-        rows = [(*path, "impulse_bit", row) for row, _ in facts.children(*path, "impulse_bit")]
-        times += [(*row, column) for row in rows for column in (0, 2)]
+        times += [(*row, column) for row in facts.below(*path, "impulse_bit") for column in (0, 2)]
     for path in times:
         yield path, "time", "ms", -math.inf, SLUGGISH, math.inf
-    pressures: list[KeyPath] = [("tank", "isp", row, 0) for row, _ in facts.children("tank", "isp")]
+    pressures = [(*row, 0) for row in facts.below("tank", "isp")]
     for path in (("tank", "pressure"), ("tank", "final_pressure"), *pressures):
         yield path, "pressure", "bar", -math.inf, 0.0, THIN
 

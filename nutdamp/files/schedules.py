@@ -61,15 +61,14 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
     times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
     table.expect("channel", "first_sun_pulse", *times, "count")
     blocks: list[Block] = []
-    over = 0
     for row in table.rows:
         block = _block(row, spacecraft)
         if block is None:
             continue
+        over = blocks[-1].first + (blocks[-1].count - 1) * blocks[-1].every if blocks else 0
         if block.first <= over:
             problem = f"Sun pulse {block.first} comes before the block before is over; expected {over + 1} or later"
             row.fault("first_sun_pulse", problem)
-        over = block.first + (block.count - 1) * block.every
         _against_commands(row, block, spacecraft)
         blocks.append(block)
     total = sum(block.count for block in blocks)
@@ -91,8 +90,8 @@ def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -
             if row.get("first_utc"):
                 parsed[row.line] = Epoch.parse(row["first_utc"])
         except ValueError:
-            problem = f"{shown(row['first_utc'])} is no date and time; expected 2026-03-01T12:00:00Z"
-            row.fault("first_utc", problem)
+            example = "2026-03-01T12:00:00Z"
+            row.fault("first_utc", f"{shown(row['first_utc'])} is no date and time; expected {example}")
     table.check()
     place = spacecraft.attitude
     if not parsed or place is None or place.epoch is None:
@@ -172,24 +171,23 @@ def _against_commands(row: Row, block: Block, spacecraft: Spacecraft) -> None:
     nearest_delay = min(round(block.delay / commands.delay_step) * commands.delay_step, longest)
     nearest_width = float(commands.widths[np.abs(commands.widths - block.width).argmin()])
     allowed = ", ".join(map(str, commands.every))
-    off = {
-        "delay_s": (block.delay, nearest_delay, COUNTS * commands.delay_step),
-        "width_s": (block.width, nearest_width, COUNTS * block.width),
-    }
-    for column, (given, near, slack) in off.items():
-        if abs(given - near) > slack:
-            text = f"{column} = {given:.6g} s cannot be commanded, {near:.6g} s is the nearest: flown as given"
-            row.warn(column, text)
-    if block.count > commands.max_count:
-        text = f"count = {block.count} cannot be commanded, {commands.max_count} is the most: flown as given"
-        row.warn("count", text)
-    if block.every not in commands.every:
-        row.warn("every", f"every = {block.every} cannot be commanded, only {allowed}: flown as given")
+    off = [
+        (f"{column} = {given:.6g} s", f"{near:.6g} s is the nearest")
+        for column, given, near, slack in (
+            ("delay_s", block.delay, nearest_delay, COUNTS * commands.delay_step),
+            ("width_s", block.width, nearest_width, COUNTS * block.width),
+        )
+        if abs(given - near) > slack
+    ]
+    off += [(f"count = {block.count}", f"{commands.max_count} is the most")] * (block.count > commands.max_count)
+    off += [(f"every = {block.every}", f"only {allowed}")] * (block.every not in commands.every)
+    for given, possible in off:
+        row.warn(given.split()[0], f"{given} cannot be commanded, {possible}: flown as given")
     for name, time in zip(TIMES, (block.delay, block.width), strict=True):
         counts, right = row.get(f"{name}_counts", ""), commands.counts(name, time)
         if counts and f"{name}_s" in row and counts != str(right):
-            text = f"{name}_counts = {counts} contradicts {name}_s = {time:g}, which is {right}: ignored"
-            row.warn(f"{name}_counts", text)
+            meant = f"{name}_s = {time:g}, which is {right}"
+            row.warn(f"{name}_counts", f"{name}_counts = {counts} contradicts {meant}: ignored")
 
 
 AGREES = 1e-6  # relative difference up to which columns of a schedule agree
@@ -226,8 +224,8 @@ class _ScheduleReader:
     def read(self) -> tuple[Schedule, list[str]]:
         header = self.table.header
         if not set(STARTS) & set(header):
-            problem = f"the column is missing (or {STARTS[1]}, the centre){self.table.misspelt(STARTS[0])}"
-            self.table.fault(1, STARTS[0], problem)
+            missing = f"the column is missing (or {STARTS[1]}, the centre)"
+            self.table.fault(1, STARTS[0], missing + self.table.misspelt(STARTS[0]))
         bare = not {*TORQUE, *IMPULSE} & set(header)  # else a pulse without channel is one of the torquer
         self.table.expect("on_time_s", *["channel"] * bare)
         pulses = [(row.line, pulse) for row in self.table.rows if (pulse := self._pulse(row)) is not None]
@@ -274,8 +272,7 @@ class _ScheduleReader:
         if on_time < 0.0:
             least, most = (0.0, math.inf) if channel is None else (channel.min_on_time, channel.max_on_time)
             allowed = f"{least:g} s or more" if most == math.inf else f"{least:g} s to {most:g} s"
-            problem = f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)"
-            row.fault("on_time_s", problem)
+            row.fault("on_time_s", f"{on_time:g} s is negative; {allowed} is expected (0 for an ideal impulse)")
             return None
         lead = None if channel is None or on_time == 0.0 else self._lead(row, channel, on_time)
         centre = 0.5 * on_time if lead is None else lead
@@ -298,13 +295,13 @@ class _ScheduleReader:
         if channel.valve is None:
             return None
         least, most = channel.valve.known
+        named, thrust = shown(channel.name), channel.valve.thrust(on_time)
         if not least <= on_time <= most:
-            problem = f"{on_time:g} s is outside the impulse_bit of {shown(channel.name)}, {least:g} s to {most:g} s"
-            row.fault("on_time_s", problem)
-        thrust = channel.valve.thrust(on_time)
+            known = f"{least:g} s to {most:g} s"
+            row.fault("on_time_s", f"{on_time:g} s is outside the impulse_bit of {named}, {known}")
         if not thrust.ramps:
-            text = f"{on_time:g} s is too short for the valve of {shown(channel.name)}: it does not open"
-            row.warn(f"closed {channel.name}", text)
+            short = f"{on_time:g} s is too short for the valve of {named}: it does not open"
+            row.warn(f"closed {channel.name}", short)
         return thrust.centroid
 
     def _expect(self, row: Row, pulse: Pulse) -> None:
@@ -316,8 +313,7 @@ class _ScheduleReader:
         length = "effective_on_time_s" if pulse.through_valve else "on_time_s"
         _compare(row, IMPULSE, impulse, f"torque of {named} × {length}, {_vector(impulse)}")
         if pulse.propellant is not None:
-            used = f"{pulse.propellant:g} by the spacecraft file"
-            _compare(row, ("propellant_kg",), [pulse.propellant], used)
+            _compare(row, ("propellant_kg",), [pulse.propellant], f"{pulse.propellant:g} by the spacecraft file")
         if pulse.through_valve:
             meant = f"what the valve of {named} makes of the command"
             for column, value in zip(EFFECTIVE, (pulse.start, pulse.on_time), strict=True):
@@ -356,15 +352,16 @@ class _ScheduleReader:
 
     def _propellant(self, row: Row, name: str, impulse: Vector, torque: Vector | None) -> float | None:
         """Propellant of a pulse that flies as the schedule has it, kg; warns of differences from the file."""
+        named = shown(name)
         if name in self.channels:
-            ideal = "has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
-            row.warn(f"ideal {name}", f"{shown(name)} {ideal}")
+            ideal = f"{named} has an on-time of 0: flown as an ideal impulse, its propellant is unknown"
+            row.warn(f"ideal {name}", ideal)
             return None
         torquer = self.spacecraft.torquer
         if name != STEERABLE or torquer is None:
             known = ", ".join(map(shown, self.channels)) or STEERABLE
-            text = f"channel {shown(name)} is not in the spacecraft file ({known}): flown as given, propellant unknown"
-            row.warn(f"unknown {name}", text)
+            missing = f"channel {named} is not in the spacecraft file ({known})"
+            row.warn(f"unknown {name}", f"{missing}: flown as given, propellant unknown")
             return None
         size = 0.0 if torque is None else float(np.linalg.norm(torque))
         if torque is not None and torquer.torque is not None and abs(size - torquer.torque) > AGREES * torquer.torque:

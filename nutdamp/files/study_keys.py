@@ -12,13 +12,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from nutdamp.files.fields import (
-    RIGHT_ANGLE,
     AcuteAngle,
     Direction,
     Field,
     Key,
     Length,
     Name,
+    Nutation,
     Position,
     PositiveTime,
     Quantity,
@@ -211,7 +211,6 @@ class Reading(Quantity):
 
 Frequency = Annotated[float, Quantity("frequency", exclusiveMinimum=0)]
 Least = Annotated[float, Reading(minimum=0)]
-Threshold = Annotated[float, Quantity("angle", minimum=0, exclusiveMaximum=RIGHT_ANGLE)]
 
 
 class LoopSensorSection(Section):
@@ -262,7 +261,7 @@ class LoopSection(Section):
         default="four-pulse",
     )
     start: AcuteAngle = Field("Nutation angle from which the loop fires, rad; above stop.", "0.5 deg")
-    stop: Threshold = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
+    stop: Nutation = Field("Nutation angle down to which it fires, rad; default 0.", "0.05 deg", default=0.0)
     settle: Time = Field("Time after a firing in which samples are not used, s; default 0.", "0.2 s", default=0.0)
     min_interval: Time = Field("Least time from firing to firing, s; default 0.", "0.5 s", default=0.0)
     predict: bool = Field(

@@ -119,16 +119,9 @@ def read_history(path: str) -> History:
     if faults:
         raise FaultyFile(faults)
     first = reader.times[0]
+    times, turns = np.array([time.since(first) for time in reader.times]), np.array(reader.quaternions)
     rates = None if reader.rates is None else np.array(reader.rates)
-    return History(
-        reader.name,
-        first,
-        reader.frame,
-        np.array([time.since(first) for time in reader.times]),
-        np.array(reader.quaternions),
-        rates,
-        tuple(reader.remarks),
-    )
+    return History(reader.name, first, reader.frame, times, turns, rates, tuple(reader.remarks))
 
 
 class _HistoryReader(Frames):
@@ -148,8 +141,7 @@ class _HistoryReader(Frames):
         forward, kind = self.endpoints(block), block.text("ATTITUDE_TYPE")
         if kind is not None and kind not in COLUMNS:
             block.fault("ATTITUDE_TYPE", f"{kind!r} is not read; expected {' or '.join(COLUMNS)}")
-        axes = block.text("ANGVEL_FRAME")
-        turning = kind == QUATERNION_ANGVEL
+        axes, turning = block.text("ANGVEL_FRAME"), kind == QUATERNION_ANGVEL
         if turning and axes is None:
             block.fault("ANGVEL_FRAME", f"missing; {QUATERNION_ANGVEL} needs the frame of the rates")
         in_body = axes is None or BODY.fullmatch(axes) is not None
@@ -320,7 +312,7 @@ def _expect_whole(table: Table, columns: Mapping[str, Vector], spacecraft: Space
 
 
 def _expect_time(table: Table) -> None:
-    there = [name for name in TIMES if name in table.header]
+    there = {*TIMES} & {*table.header}
     if not there:
         table.fault(1, TIMES[0], f"the column is missing (or {TIMES[1]}){table.misspelt(TIMES[0])}")
     if len(there) == 2:
@@ -351,21 +343,15 @@ def _expect_columns(table: Table) -> None:
 
 
 def _instead(name: str) -> str:
-    lowered = name.lower()
-    rates = ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]
-    for word, columns in (
-        ("omega", rates),
-        ("rate", rates),
-        ("gyro", rates),
+    kinds: tuple[tuple[str | tuple[str, ...], Sequence[str]], ...] = (
+        (("omega", "rate", "gyro"), ["omega_1_rad_s … omega_3_rad_s or omega_1_deg_s … omega_3_deg_s"]),
         ("accel", [ACCELERATIONS]),
         ("sun", [SUN_PULSE, ASPECTS]),
         ("cross", [*CROSSED, *TOWARDS]),
-        ("q", list(QUATERNION)),
+        ("q", QUATERNION),
         ("", [*ANGLES, *AXIS]),
-    ):
-        if lowered.startswith(word):
-            return f"; expected {', '.join(columns)}"
-    return ""
+    )
+    return next(f"; expected {', '.join(columns)}" for words, columns in kinds if name.lower().startswith(words))
 
 
 def _times(table: Table, spacecraft: Spacecraft) -> Vector:
@@ -373,30 +359,24 @@ def _times(table: Table, spacecraft: Spacecraft) -> Vector:
     column = TIMES[0] if TIMES[0] in table.header else TIMES[1]
     if not table.rows:
         table.fault(1, "", "no rows of samples below the names of the columns")
-    epoch = None
-    if column == TIMES[1]:
-        given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
-        if given is None:
-            table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
-        else:
-            epoch = Epoch.parse(given)
+    given = None if spacecraft.attitude is None else spacecraft.attitude.epoch
+    if column == TIMES[1] and given is None:
+        table.fault(1, column, "the spacecraft file has no attitude.epoch to count from; expected the column t_s")
     table.check()
-    times = np.full(len(table.rows), math.nan)
-    latest = -math.inf
-    for index, row in enumerate(table.rows):
+    epoch = Epoch.parse(given) if column == TIMES[1] and given is not None else None
+    times: list[float] = []
+    for row in table.rows:
         try:
             time = row.number(column) if epoch is None else Epoch.parse(row[column]).since(epoch)
         except ValueError as wrong:
             row.fault(column, str(wrong))
             continue
-        if time is None:
-            continue
-        if time <= latest:
-            text = f"{row[column]} does not rise: the sample before is at {latest:.9g} s"
+        if time is not None and times and time <= times[-1]:
+            text = f"{row[column]} does not rise: the sample before is at {times[-1]:.9g} s"
             row.fault(column, text + (JUMPS if TRACK[-1] in table.header else ""))
-        times[index] = latest = time
+        times += [] if time is None else [time]
     table.check()
-    return times
+    return np.array(times)
 
 
 def _column(table: Table, name: str) -> Vector:
@@ -451,18 +431,15 @@ def _expect_unit(table: Table, signals: Mapping[str, Vector], spin: float) -> No
     column = next(entry for entry in table.header if RATES.get(entry, ("",))[0] == name)
     ratio = abs(float(np.nanmedian(signals[name])) / spin)
     turned, per_minute = 180.0 / math.pi, 30.0 / math.pi
-    in_radians = RATES[column][1] == 1.0
-    of_values, of_file = "are the values of this column", "is the spin of the file"
-    for size, where, unit in (
-        (turned if in_radians else 1.0 / turned, of_values, "deg/s" if in_radians else "rad/s"),
-        (per_minute if in_radians else 1.0 / 6.0, of_values, "rpm"),
-        (1.0 / turned, of_file, "deg/s"),
-        (1.0 / per_minute, of_file, "rpm"),
-    ):
-        if abs(ratio / size - 1.0) < SAME:
-            seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
-            table.fault(1, column, f"{seen}: {where} in {unit}?")
-            return
+    of_values = ((turned, "deg/s"), (per_minute, "rpm"))
+    if RATES[column][1] != 1.0:
+        of_values = ((1.0 / turned, "rad/s"), (1.0 / 6.0, "rpm"))
+    meant = [(size, f"are the values of this column in {unit}") for size, unit in of_values]
+    meant += [(1.0 / turned, "is the spin of the file in deg/s"), (1.0 / per_minute, "is the spin of the file in rpm")]
+    words = next((words for size, words in meant if abs(ratio / size - 1.0) < SAME), None)
+    if words is not None:
+        seen = f"its median is {ratio:.3g} times the spin of the spacecraft file ({spin:.4g} rad/s)"
+        table.fault(1, column, f"{seen}: {words}?")
 
 
 def _sun_column(table: Table, times: Vector, values: Vector | None) -> tuple[Vector, float]:

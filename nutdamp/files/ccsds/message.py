@@ -103,8 +103,7 @@ APM_BLOCKS: dict[str, Layout] = {
         ),
     ),
     "INERTIA": Layout(
-        "inertia",
-        (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2")),
+        "inertia", (*_text("INERTIA_REF_FRAME"), *_numbers("IXX", "IYY", "IZZ", "IXY", "IXZ", "IYZ", unit="kg*m**2"))
     ),
     "MAN": Layout(
         "maneuverParameters",

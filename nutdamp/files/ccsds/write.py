@@ -131,11 +131,7 @@ def _block(name: str, values: Values, *comments: str) -> MessageBlock:
 
 def _header(plan: Plan, created: Epoch) -> MessageBlock:
     moment = created.text.partition(".")[0]
-    values: Values = {
-        "CREATION_DATE": moment,
-        "ORIGINATOR": ORIGINATOR,
-        "MESSAGE_ID": label(f"{plan.scheme}-{moment}"),
-    }
+    values: Values = {"CREATION_DATE": moment, "ORIGINATOR": ORIGINATOR, "MESSAGE_ID": label(f"{plan.scheme}-{moment}")}
     return block("", HEADER, values, f"nutdamp {__version__}: {plan.scheme} schedule for {plan.spacecraft.name}")
 
 
@@ -144,21 +140,17 @@ def _identity(body: Spacecraft) -> Values:
 
 
 def _unsaid(body: Spacecraft) -> list[str]:
-    remarks = []
-    if body.disturbances:
-        remarks.append("The disturbances of the spacecraft file are not in this message.")
-    if body.dissipation is not None:
-        remarks.append("The energy dissipation of the spacecraft file is not in this message.")
-    if body.inertia.wheel:
-        momentum = f"{body.inertia.wheel:.9g} N*m*s along principal axis 3"
-        remarks.append(f"The wheel of the spacecraft file, {momentum}, is in no keyword of this message.")
-    per_kg = shed(body)
-    if per_kg is not None:
-        values = ", ".join(f"{moment:.9g}" for moment in per_kg)
-        remarks.append(f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.")
-    if not spinning(body.inertia):
-        remarks.append("No SPIN block: the body is not symmetric about its third axis, as the model of that block is.")
-    return remarks
+    wheel, per_kg, of_file, spins = body.inertia.wheel, shed(body), "of the spacecraft file", spinning(body.inertia)
+    momentum = f"{wheel:.9g} N*m*s along principal axis 3"
+    values = ", ".join(f"{moment:.9g}" for moment in (() if per_kg is None else per_kg))
+    remarks = {
+        f"The disturbances {of_file} are not in this message.": body.disturbances,
+        f"The energy dissipation {of_file} is not in this message.": body.dissipation is not None,
+        f"The wheel {of_file}, {momentum}, is in no keyword of this message.": wheel,
+        f"INERTIA is that at EPOCH: the principal moments fall by {values} kg*m**2 for each kg used.": values,
+        "No SPIN block: the body is not symmetric about its third axis, as the model of that block is.": not spins,
+    }
+    return [remark for remark, holds in remarks.items() if holds]
 
 
 def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
