@@ -81,12 +81,7 @@ class FileName(ParamType[str]):
     name = "file"
     completed_as = "file"
 
-    def shell_complete(
-        self,
-        ctx: click.Context,  # noqa: ARG002 - signature of click
-        param: click.Parameter,  # noqa: ARG002
-        incomplete: str,
-    ) -> list[CompletionItem]:
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Leave it to the shell to complete the name."""
         return [CompletionItem(incomplete, type=self.completed_as)]
 
@@ -212,10 +207,7 @@ class Grouped(click.Option):
 
 
 def goal_options(command: Command, *, several: bool = True) -> Command:
-    """The goal, and the options of every scheme; `Aim` and ``options`` of the job.
-
-    ``several``: the command plans any of the schemes, those that read the Sun too, and goes on where one has a bug.
-    """
+    """The goal, and the options of every scheme; ``several``: any may be planned, and one with a bug is passed over."""
     option = functools.partial(click.option, cls=Grouped, group=GOAL)
     angles = functools.partial(option, type=Direction(), metavar="ANGLE,ANGLE")
     command = debug_option(command) if several else command
@@ -268,10 +260,9 @@ def _fields() -> dict[str, tuple[dataclasses.Field[Any], list[str]]]:
 
 
 class Aim(NamedTuple):
-    """A goal as the command line gives it, in place of the one in the file.
+    """A goal as the command line gives it, in place of the one in the file; ``spin``: rad/s, or ``keep``.
 
-    ``target`` and ``sun``: two angles in rad, right ascension and declination where the file has an attitude, else tilt
-    and azimuth in the frame N. ``spin``: rad/s, or ``keep``.
+    Angles are right ascension and declination where the file has an attitude, else tilt and azimuth in the frame N.
     """
 
     target: Angles | None = None

@@ -41,11 +41,7 @@ JITTER_SEED = 1  # seed of the errors of the Sun pulses from which blocks are fi
 
 
 def flown_options(verb: str, scheme: str | None = None) -> Callable[[Command], Command]:
-    """``--scheme``, ``--schedule`` and ``--blocks``, the `FlownChoice` of the job for `plan_or_read`.
-
-    ``verb`` says how the command uses the pulses, ``scheme`` is the help of ``--scheme`` where that is longer.
-    A usage error for two of them.
-    """
+    """``--scheme`` (its help may be given), ``--schedule`` and ``--blocks``, one alone, of pulses to ``verb``."""
     default = f"{verb} this scheme with default options; without it the recommended one."
 
     def alone(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -95,8 +91,7 @@ def fronts_of(job: Job, points: int, shifts: Sequence[float], least: str) -> Tra
 def plan_or_read(job: Job, *, jitter: bool = False, judged: bool = False) -> Plan:
     """The pulses that a command flies, as a plan; raises Infeasible where there is none.
 
-    ``jitter``: the Sun pulses that fire the blocks of a file have errors, drawn with `JITTER_SEED`.
-    ``judged``: a verdict on the screen names the cones that are broken.
+    ``jitter``: that of the Sun pulses, with `JITTER_SEED`; ``judged``: a verdict names the cones that are broken.
     """
     from nutdamp import api
     from nutdamp.planning.decision import infeasibility
@@ -185,12 +180,12 @@ def plan_command(
     SPACECRAFT is a YAML file, or - for standard input; default spacecraft.yaml here, else the built-in example.
     A FILE of - is standard output.
     """
-    figure, plot = job.figure or FIGURES[0], job.written["plot"]
-    csv, blocks, certificate = (job.written[name] for name in ("csv", "blocks", "certificate"))
+    figure = job.figure or FIGURES[0]
+    csv, blocks, certificate, plot = (job.written[name] for name in ("csv", "blocks", "certificate", "plot"))
     for option, path in (("csv", csv), ("plot", plot if figure in FIGURES else None)):
         if path is not None and len(set(names)) > 1:
-            message = f"--{option} writes one schedule: name one --scheme, or none for the recommended one"
-            raise click.UsageError(message)
+            cure = "name one --scheme, or none for the recommended one"
+            raise click.UsageError(f"--{option} writes one schedule: {cure}")
     body = job.begin()
     if robust and nominal:
         raise click.UsageError("--robust goes by dispersed cases, which --nominal leaves out: name one of them")
@@ -228,10 +223,7 @@ def plan_command(
 
 
 def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
-    """The file of command blocks: of the plan to fly, or else of one that was compared; none without any plan.
-
-    Raises BadRequest where plans have pulses, but no blocks.
-    """
+    """The file of command blocks, of the plan to fly or another; raises BadRequest where plans have none."""
     plans: list[Plan] = [plan for plan in (chosen, *compared) if plan is not None and plan.feasible]
     source = next((plan for plan in plans if plan.pulses.blocks), None)
     if source is None:
@@ -246,10 +238,7 @@ def _blocks_file(job: Job, compared: Comparison, chosen: Plan | None) -> Files:
 
 
 def _expect_certified(names: Sequence[str], body: Spacecraft) -> None:
-    """Raise BadRequest, before any work, where the scheme that certificates belong to is not to be planned.
-
-    Also where it cannot plan, as without channels.
-    """
+    """Raise BadRequest where the scheme that certificates belong to is not to be planned, or cannot."""
     from nutdamp.planning.decision import usual
     from nutdamp.schemes.catalogue import OPTIMAL
 

@@ -53,10 +53,7 @@ def show(renderable: RenderableType) -> None:
 
 
 def console() -> Console:
-    """Standard output as rich sees it; NO_COLOR and COLUMNS count, names such as [red] or :rocket: stay as they are.
-
-    Fewer than `NARROWEST` characters, into which no number would fit, count as that many; COLUMNS = 0 as not set.
-    """
+    """Standard output as rich sees it, at least `NARROWEST` wide; names such as [red] or :rocket: stay as they are."""
     import os
     import shutil
 
@@ -151,8 +148,7 @@ def working(what: str, *, quiet: bool = False) -> Iterator[None]:
 class _Progress:
     """Text of ``what`` has gone on since it ``began``, s: share of the steps done, time left, and the search that runs.
 
-    The share is shown where the steps are known, the time where `BELIEVED` of them are done. The time goes by the last
-    step, ``share`` at ``moment``, and counts down; none is shown where a step takes longer than all that was left.
+    The time left goes by the last step, ``share`` at ``moment``, from `BELIEVED` on; none where a step takes longer.
     """
 
     what: str

@@ -154,10 +154,7 @@ def _each(facts: Facts, key: str) -> list[KeyPath]:
 
 
 def _size_of(facts: Facts, path: KeyPath, kind: str, nominal: float | None = None) -> tuple[str, float] | None:
-    """The kind of a tolerance and the depth of draws below its nominal value, three sigma or all, in SI of ``kind``.
-
-    One in % is that of the ``nominal`` value, where that is known.
-    """
+    """Kind of a tolerance and depth of its draws, three sigma or all, in SI; of % by a ``nominal`` value."""
     for name in KINDS:
         size = facts.number(kind, *path, name)
         share = None if size is not None or nominal is None else facts.number("ratio", *path, name)

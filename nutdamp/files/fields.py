@@ -127,10 +127,7 @@ class Section:
 
     @classmethod
     def read(cls, value: Any, problems: Problems, path: KeyPath = ()) -> Self | None:
-        """The section in ``value``, as YAML gives it; problems are added to ``problems``.
-
-        Unknown keys and empty values are not looked for here.
-        """
+        """The section in ``value``; ``problems`` get its own, but for unknown keys and empty values."""
         if not isinstance(value, dict):
             problems.append((path, _mismatch(value, cls.written)))
             return None

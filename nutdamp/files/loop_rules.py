@@ -55,10 +55,7 @@ def loop_findings(root: Node) -> Iterator[Finding]:
 
 
 def _known_channels(facts: Facts) -> list[tuple[str, bool, bool, float, float]]:
-    """The channels of the file, or its thrusters where it names none, as far as they can be read.
-
-    Each with its name, True where its torque is known, and where that is more transverse than axial, and on-times, s.
-    """
+    """Readable channels: name, whether the torque is known, and more transverse than axial, on-times, s."""
     thrusters = {facts.text(*path, "name"): path for path in facts.below("thrusters")}
     named = {str(name): [entry.value for _, entry in node.children()] for name, node in facts.children("channels")}
     named = named or {name: [name] for name in thrusters if name is not None}

@@ -27,7 +27,7 @@ from nutdamp.files.editing import Setting, overlay, settings_of, settings_within
 from nutdamp.files.fields import REQUIRED, KeyPath, Problems, Rule, Section, section_of
 from nutdamp.files.plausibility import doubts, foreign
 from nutdamp.files.rules import CANCELLED, MOMENT, Finding, Vector, disturbance_kind, findings, force_vector, symmetric
-from nutdamp.files.study_keys import LoopSection, by_name, dispersions
+from nutdamp.files.study_keys import LoopSection, by_name, dispersions, thrust_behind
 from nutdamp.files.thruster_rules import thrust_findings
 from nutdamp.files.yaml import Node, dotted, read_text, read_tree
 from nutdamp.physics import attitude, sky
@@ -81,12 +81,8 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
     root, faults = read_tree(text, name)
     root, unplaced = overlay(root, settings)
     faults += unplaced
-    faulty = [
-        *_spelling(root, keys.SpacecraftFile, ()),
-        *findings(root),
-        *dispersion_findings(root),
-        *thrust_findings(root),
-    ]
+    faulty = [*_spelling(root, keys.SpacecraftFile, ())]
+    faulty += [*findings(root), *dispersion_findings(root), *thrust_findings(root)]
     if root.get("loop") is not None:
         from nutdamp.files.loop_rules import loop_findings
 
@@ -106,21 +102,17 @@ def _contents(text: str, name: str, settings: Sequence[Setting], warn: Warn) -> 
 def _placed(finding: Finding, root: Node, name: str) -> Fault:
     """The finding with its place; a missing key is reported at the key of its parent."""
     path = finding.path
-    if finding.at_key:
-        place = root.key_place_of(path)
-    elif root.get(*path) is None:
-        place = root.key_place_of(path[:-1])
+    if finding.at_key or root.get(*path) is None:
+        place = root.key_place_of(path if finding.at_key else path[:-1])
     else:
         place = root.place_of(path)
     return place.fault(name, dotted(path), finding.problem)
 
 
 def _spelling(node: Node, model: type[Section] | None, path: KeyPath, named: bool = False) -> Iterator[Finding]:
-    """Unknown keys and empty values below ``node``, whose keys are the fields of ``model``.
+    """Unknown keys and empty values below ``node``, whose keys are fields of ``model``, or (``named``) names of such.
 
-    A misspelt key is put right in the tree, so that one slip makes one fault and its value is checked too; any
-    other unknown key is dropped, as is one that was set for a key that the file has. ``named``: the keys may also be
-    names, of entries of the ``model``.
+    A misspelt key is put right in the tree, so that its value is checked too; any other unknown key is dropped.
     """
     fields = model.fields() if model else {}
     named = named and isinstance(node.value, dict) and by_name(node.value)
@@ -161,10 +153,7 @@ def load_spacecraft(path: str | Path, settings: Sequence[Setting] = (), warn: Wa
 
 
 def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn: Warn = lambda _: None) -> Spacecraft:
-    """The spacecraft in the text of a file; ``name`` is that of the file in messages.
-
-    ``settings`` replace values of the text. Raises `FaultyFile` with all faults.
-    """
+    """The spacecraft in the text of a file ``name``, with ``settings``; raises `FaultyFile` with all faults."""
     contents = _contents(text, name, settings, warn)
     given = contents.inertia
     tensor = np.diag(np.array([given.A, given.A, given.C], dtype=float))
@@ -178,7 +167,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     torquer = steerable if thrusters else steerable or Steerable()
     asked = contents.requirement
     asks_nothing = asked is None or (asked.nutation is None and asked.momentum_shift is None)
-    loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
+    loss, per_kg, limits, orbit = contents.dissipation, contents.center_of_mass_per_kg, contents.limits, contents.orbit
     spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
@@ -187,9 +176,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         center_of_mass=None if contents.center_of_mass is None else center,
         center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
         attitude=_attitude(contents.attitude, inertia, omega0, sunward),
-        channels=tuple(
-            Channel(channel, tuple(thrusters[member] for member in members)) for channel, members in channels.items()
-        ),
+        channels=tuple(Channel(name, tuple(map(thrusters.__getitem__, members))) for name, members in channels.items()),
         steerable=steerable,
         requirement=None if asks_nothing else _part(Requirement, asked),
         limits=_part(Limits, limits, blackout=tuple(map(tuple, limits.blackout) if limits else ())) or Limits(),
@@ -198,7 +185,9 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
-        orbit=_orbit(contents.orbit),
+        orbit=None
+        if orbit is None
+        else Orbit(np.array(orbit.position), np.array(orbit.velocity), orbit.center.upper()),
         cold=_part(Cold, contents.cold),
         tank=_tank(contents.tank),
         sun=sunward,
@@ -232,10 +221,7 @@ class Source(NamedTuple):
 
 
 def source_of(path: str | PathLike[str] | Mapping[str, object], changes: Mapping[str, object] | None = None) -> Source:
-    """Source of a spacecraft in a file, or in a dict of its keys, with ``changes`` of keys.
-
-    Raises CannotRead or BadRequest.
-    """
+    """Source of a spacecraft in a file, or a dict of its keys, with ``changes``; raises CannotRead or BadRequest."""
     if isinstance(path, Mapping):
         return Source(text_of(path, "dict"), "dict", settings_of(units.changes(changes)))
     name = units.path("path", path, "the name of a file or a dict of its keys")
@@ -273,7 +259,7 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
     force = position = None
     if entry.torque is not None:
         torque = axes.T @ np.array(entry.torque)
-        thrust = None if entry.lever_arm is None else math.hypot(*entry.torque) / entry.lever_arm
+        thrust = thrust_behind(math.hypot(*entry.torque), entry.lever_arm)
     else:
         assert entry.position is not None
         assert entry.direction is not None
@@ -303,9 +289,7 @@ def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust:
 
     if entry.impulse_bit is not None:
         assert thrust is not None
-        return thruster.Measured(
-            tuple((on_time, impulse / thrust, centroid) for on_time, impulse, centroid in entry.impulse_bit)
-        )
+        return thruster.Measured(tuple((time, impulse / thrust, mean) for time, impulse, mean in entry.impulse_bit))
     section = entry.valve or every
     assert section is not None
     times = (section.open_delay, section.close_delay, section.rise_time, section.fall_time)
@@ -313,11 +297,7 @@ def _valve(entry: keys.ThrusterSection, every: keys.ValveSection | None, thrust:
 
 
 def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) -> Disturbance:
-    """A disturbance in principal axes; ``spin`` is ω3 at t = 0, rad/s.
-
-    What is fixed in space turns in the body at minus the spin, Magnus 1970 (27). Where the principal axes are
-    tilted, a transverse torque has a part about axis 3, which does not turn.
-    """
+    """A disturbance in principal axes; one fixed in space turns at minus the ``spin``, rad/s, Magnus 1970 (27)."""
     torque = np.array(entry.torque)
     if not inertia.aligned:
         torque = inertia.axes.T @ torque
@@ -381,12 +361,6 @@ def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Ke
         yield Keep(entry.name, direction, entry.min or 0.0, math.pi if entry.max is None else entry.max)
     if contents.requirement is not None and contents.requirement.nutation_during is not None:
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
-
-
-def _orbit(section: keys.OrbitSection | None) -> Orbit | None:
-    if section is None:
-        return None
-    return Orbit(np.array(section.position), np.array(section.velocity), section.center.upper())
 
 
 def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSensor | None:

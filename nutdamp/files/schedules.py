@@ -53,9 +53,8 @@ LATEST = 100_000  # number of the last Sun pulse that may fire a block
 def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, ...], list[str]]:
     """The blocks in a CSV file, and warnings: commands that the file of the spacecraft does not have.
 
-    Needed are channel, first_sun_pulse, count, delay_s and width_s; delay_counts and width_counts do for the last two
-    where the spacecraft file has the steps. every is 1 where it is left out. A first_utc must be that of a first
-    pulse. Raises CannotRead, and FaultyFile with every fault of the file.
+    delay_counts and width_counts do for delay_s and width_s where the spacecraft file has the steps; every is 1 where
+    it is left out. Raises CannotRead, and FaultyFile with every fault of the file.
     """
     table = Table(path, BLOCKS_HEADER, "blocks")
     times = [f"{name}_counts" if _counted(table, spacecraft, name) else f"{name}_s" for name in TIMES]
@@ -80,10 +79,7 @@ def read_blocks(path: str | Path, spacecraft: Spacecraft) -> tuple[tuple[Block, 
 
 
 def _expect_utc(table: Table, spacecraft: Spacecraft, blocks: Sequence[Block]) -> None:
-    """Faults of a first_utc that is no time, or more than a spin turn from when the first pulse of its block begins.
-
-    So much may a delay be edited by. Without an epoch only its form is looked at.
-    """
+    """Faults of a first_utc that is no time, or over a spin turn off its first pulse: so much may a delay be edited."""
     parsed: dict[int, Epoch] = {}
     for row in table.rows:
         try:
@@ -196,20 +192,14 @@ STARTS = ("start_s", "t_s")
 
 
 def read_pulses(path: str | Path, spacecraft: Spacecraft) -> tuple[Schedule, list[str]]:
-    """A schedule from a CSV file, and warnings of contradicting columns, which are ignored, and of unknown channels.
-
-    Raises CannotRead, and FaultyFile with every fault of the file.
-    """
+    """A schedule from a CSV file, and warnings; raises CannotRead, and FaultyFile with every fault of the file."""
     return _ScheduleReader(Table(path, (*PULSES_HEADER, *EFFECTIVE, UTC), "pulses"), spacecraft).read()
 
 
 def read_plan(
     path: str | Path, spacecraft: Spacecraft, options: SchemeOptions | None = None
 ) -> tuple[Plan, tuple[str, ...]]:
-    """A schedule file as a plan of that name, and the warnings of `read_pulses` and of limits that it breaks.
-
-    ``options``: with which disturbances it was planned. Raises as `read_pulses` does.
-    """
+    """A schedule file as a plan of that name, and warnings, of broken limits too; raises as `read_pulses` does."""
     pulses, warnings = read_pulses(path, spacecraft)
     plan = Plan(spacecraft, printable(str(path)), pulses, options=options or SchemeOptions(), from_file=True)
     return plan, (*warnings, *broken_limits(spacecraft, pulses))
@@ -258,10 +248,7 @@ class _ScheduleReader:
         return self._as_given(row, name, t, on_time)
 
     def _timing(self, row: Row, channel: Channel | None) -> tuple[float, float, float | None] | None:
-        """Centre and on-time, s; the start rules where there is one.
-
-        Through a valve the centre is the centroid of the thrust, and the third is the start of the command, s.
-        """
+        """Centre (of the thrust) and on-time, s, and through a valve the start of the command, s."""
         column = next((column for column in STARTS if row.get(column)), None)
         if column is None:
             row.fault(STARTS[0], "the time is missing")

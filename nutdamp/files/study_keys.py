@@ -41,10 +41,7 @@ ALL = ""  # name of all thrusters together, where the file gives one tolerance f
 
 
 def size_of(value: object, kind: str) -> tuple[float, bool]:
-    """The size of a tolerance of ``kind`` (a key of `units.KINDS`), SI or a fraction, and True for a fraction.
-
-    Raises ValueError with the sizes allowed.
-    """
+    """The size of a tolerance of ``kind``, SI or a fraction, and True for a fraction; raises ValueError."""
     if kind in RELATIVE and isinstance(value, str) and value.rstrip().endswith("%"):
         return parse(value, "ratio"), True
     if kind == READING:
@@ -152,10 +149,7 @@ class DispersionsSection(Section):
 def dispersions(
     section: DispersionsSection | None, thrusters: Iterable[Thruster], torquer: Steerable | None
 ) -> Dispersions | None:
-    """The tolerances of a checked file; None where it has none. A thrust in N becomes a fraction of the thruster's.
-
-    ``torquer`` is the steerable one, also where an ideal one is assumed.
-    """
+    """The tolerances of a checked file, those of thrusts as fractions; ``torquer``: also an ideal one."""
     if section is None:
         return None
     from nutdamp.spacecraft.schedule import STEERABLE

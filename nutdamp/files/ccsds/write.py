@@ -96,10 +96,7 @@ Values = dict[str, str | float]
 
 
 def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
-    """The message for a plan; ``created`` is the moment at which it is made.
-
-    Raises BadRequest for an ideal impulse, which has no duration and so no manoeuvre block.
-    """
+    """The message for a plan, made at ``created``; raises BadRequest for an ideal impulse, which has no duration."""
     body = plan.spacecraft
     frames: Values = {"REF_FRAME_A": reference.frame, "REF_FRAME_B": BODY_FRAME}
     motion = body.inertia.in_file_axes(body.initial.rates, body.initial.quaternion)
@@ -186,10 +183,9 @@ def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Refer
 def aem(
     plan: Plan, flown: Flight, until: float, reference: Reference, created: Epoch, kind: str = QUATERNION_ANGVEL
 ) -> Message:
-    """The message for the flight of a plan from 0 to ``until`` s; ``created`` is the moment at which it is made.
+    """The message for the flight of a plan from 0 to ``until`` s, in segments that end at the edges of pulses.
 
-    Nobody interpolates across the edges of pulses, where the torque jumps, because segments end there. ``kind`` is the
-    ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
+    ``kind`` is the ATTITUDE_TYPE, SPIN where the body has not the nutation of SPIN/NUTATION_MOM.
     """
     body = plan.spacecraft
     if kind == SPIN_NUTATION_MOM and not spinning(body.inertia):
@@ -242,10 +238,7 @@ KILO = 1e-3
 
 
 def opm(plan: Plan, reference: Reference, created: Epoch) -> Message:
-    """The message for a plan; ``created`` is the moment at which it is made.
-
-    Raises BadRequest where mass, forces or propellant are not known.
-    """
+    """The message for a plan, made at ``created``; raises BadRequest where mass, forces or propellant are unknown."""
     body, flown = plan.spacecraft, plan.flight
     if body.mass is None:
         raise BadRequest("an OPM needs the velocity change of each pulse; add the key mass to the spacecraft file")
