@@ -104,14 +104,8 @@ def _settings(ctx: click.Context, param: click.Parameter, texts: tuple[str, ...]
         raise click.BadParameter(str(wrong), ctx, param) from None
 
 
-set_option = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="KEY=VALUE",
-    callback=_settings,
-    help="Change a key, e.g. limits.gap=1s; repeatable.",
-)
+_CHANGE = "Change a key, e.g. limits.gap=1s; repeatable."
+set_option = click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", callback=_settings, help=_CHANGE)
 
 
 def spacecraft_argument(command: Command) -> Command:
@@ -130,6 +124,11 @@ def placed(wrong: Unsuitable, given: FileInput) -> NutdampError:
     return FaultyFile([Fault(name, place.line, place.column, dotted(wrong.where), wrong.problem)])
 
 
+def defaulted(name: str, kind: click.ParamType[Any], default: object, text: str, **more: Any) -> Callable[..., Any]:
+    """An option whose default is on the help page, where ``text`` is its line."""
+    return click.option(name, type=kind, default=default, show_default=True, help=text, **more)
+
+
 def carry_options(when: str) -> Callable[[Command], Command]:
     """``-o FILE --at TIME``: the spacecraft file carried on, by default to ``when``."""
     which = click.option("--at", type=END, help=f"Its t = 0; default {when}.")
@@ -139,9 +138,7 @@ def carry_options(when: str) -> Callable[[Command], Command]:
 
 def plot_options(names: tuple[str, ...]) -> Callable[[Command], Command]:
     """``--plot FILE`` and the choice of the picture among ``names``, the default first."""
-    which = click.option(
-        "--figure", type=NameType(names), default=names[0], show_default=True, help="What --plot draws."
-    )
+    which = defaulted("--figure", NameType(names), names[0], "What --plot draws.")
     where = click.option("--plot", type=OutputName(), help="Draw it (.png, .svg, .pdf; needs extra plot).")
     return lambda command: where(which(command))
 

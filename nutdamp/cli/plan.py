@@ -14,6 +14,7 @@ from nutdamp.cli.job import (
     Job,
     SessionCommand,
     carry_options,
+    defaulted,
     deliver,
     plot_options,
     quiet_option,
@@ -291,10 +292,8 @@ def _screen(
 @click.option("-o", "--output", type=OUTPUT, required=True, help="The film: .gif, or .mp4 where ffmpeg is installed.")
 @click.option("--until", type=END, help="End of the motion; default soon after the last pulse.")
 @click.option("--seconds", type=click.FloatRange(0.2, 600.0), help="Length of the film; default 6 s to 30 s.")
-@click.option("--fps", type=click.IntRange(1, 50), default=20, show_default=True, help="Frames a second.")
-@click.option(
-    "--width", type=click.IntRange(320, 3840), default=800, show_default=True, help="Width in pixels; height 0.6 of it."
-)
+@defaulted("--fps", click.IntRange(1, 50), 20, "Frames a second.")
+@defaulted("--width", click.IntRange(320, 3840), 800, "Width in pixels; height 0.6 of it.")
 @quiet_option
 def animate_command(job: Job, until: float | None, seconds: float | None, fps: int, width: int) -> None:
     """Film the body cone rolling on the space cone through the pulses, flown with their real widths.
@@ -334,9 +333,7 @@ def animate_command(job: Job, until: float | None, seconds: float | None, fps: i
 @goal_options
 @click.option("--flown", "real", is_flag=True, help="Propagate real pulse widths instead of the impulse sum (17).")
 @click.option("--until", type=END, help="End, of which the outcome is shown; default last pulse + one inertial period.")
-@click.option(
-    "--samples", type=click.IntRange(2, 10_000_000), default=1000, show_default=True, help="Rows of the track."
-)
+@defaulted("--samples", click.IntRange(2, 10_000_000), 1000, "Rows of the track.")
 @click.option("--csv", type=OUTPUT, help="Write the track.")
 @click.option("--json", type=OUTPUT, help="Write pulses, how both models end, and extremes.")
 @carry_options("the end")

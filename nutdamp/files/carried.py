@@ -117,9 +117,8 @@ def carried_notes(spacecraft: Spacecraft, time: float, source: Source) -> Iterat
 
 def _edits(tree: Node, moved_on: Later) -> Edits:
     before, after = moved_on.before, moved_on.after
-    moved = [*motion_edits(tree, moved_on)]
     same = after.inertia.moments == before.inertia.moments
-    yield from ((path, text) for path, text in moved if not (same and path[0] == "inertia"))
+    yield from (edit for edit in motion_edits(tree, moved_on) if not (same and edit[0][0] == "inertia"))
     if after.mass is not None and after.mass != before.mass:
         yield ("mass",), as_before(tree.get("mass"), after.mass, "mass", "kg")
     if after.center_of_mass is not None and before.center_of_mass is not None:

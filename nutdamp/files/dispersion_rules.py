@@ -31,23 +31,20 @@ def _correlations(facts: Facts) -> Iterator[Finding]:
     path = ("dispersions", "correlation")
     pairs: dict[frozenset[str], Pair] = {}
     drawn, sound = _drawn(facts), True
-    for index, node in facts.children(*path):
-        names = [facts.text(*path, index, place) for place in (0, 1)]
-        size = facts.number("ratio", *path, index, 2)
-        if len(node.value if isinstance(node.value, list) else ()) != 3 or None in names or size is None:
+    for row in facts.below(*path):
+        first, second, size = facts.text(*row, 0), facts.text(*row, 1), facts.number("ratio", *row, 2)
+        if len(facts.below(*row)) != 3 or first is None or second is None or size is None:
             sound = False
             continue  # reported already
-        first, second = (name or "" for name in names)
         for place, name in enumerate((first, second)):
-            problem = _unknown(name, drawn)
-            if problem:
-                yield Finding((*path, index, place), problem)
+            if problem := _unknown(name, drawn):
+                yield Finding((*row, place), problem)
         if first == second:
-            yield Finding((*path, index, 1), f"{shown(first)} again; expected two different inputs")
+            yield Finding((*row, 1), f"{shown(first)} again; expected two different inputs")
         elif frozenset((first, second)) in pairs:
-            yield Finding((*path, index), f"{first} and {second} are given before; keep one of the two")
+            yield Finding(row, f"{first} and {second} are given before; keep one of the two")
         elif abs(size) == 1.0:
-            yield Finding((*path, index, 2), f"{size:g}: one would follow from the other; expected less than 1 in size")
+            yield Finding((*row, 2), f"{size:g}: one would follow from the other; expected less than 1 in size")
         elif abs(size) < 1.0:
             pairs[frozenset((first, second))] = (first, second, size)
             continue

@@ -210,22 +210,19 @@ def edited(text: str, values: Mapping[KeyPath, str], renamed: Mapping[str, str] 
 
 
 def _with(text: str, path: KeyPath, value: str) -> str:
-    root = _root(text)
+    nodes: list[yaml.Node] = [_root(text)]  # as far as they are there
     for length in range(1, len(path) + 1):
-        key, node = _find(root, path[:length])
-        if key is not None and node is not None and node.start_mark.index < key.end_mark.index:
-            raise BadRequest(f"{dotted(path[:length])} is an alias: write its value out, for it to be changed")
-        anchor = None if node is None or not length else re.match(r"&(\S+)", text[node.start_mark.index :])
+        key, node = _find(nodes[0], path[:length])
+        if node is None:
+            return _added(text, nodes[-1], path[length - 1 :], value)
+        nodes.append(node)
+        where, begins = dotted(path[:length]), node.start_mark.index
+        if key is not None and begins < key.end_mark.index:
+            raise BadRequest(f"{where} is an alias: write its value out, for it to be changed")
+        anchor = re.match(r"&(\S+)", text[begins:])
         if anchor and f"*{anchor[1]}" in text:
-            problem = f"has the alias *{anchor[1]}: write that out, for it to be changed"
-            raise BadRequest(f"{dotted(path[:length])} {problem}")
-    for length in range(len(path), 0, -1):
-        _, node = _find(root, path[:length])
-        if node is not None and length == len(path):
-            return text[: node.start_mark.index] + value + text[_end(node) :]
-        if node is not None:
-            return _added(text, node, path[length:], value)
-    return _added(text, root, path, value)
+            raise BadRequest(f"{where} has the alias *{anchor[1]}: write that out, for it to be changed")
+    return text[: nodes[-1].start_mark.index] + value + text[_end(nodes[-1]) :]
 
 
 def _added(text: str, parent: yaml.Node, path: KeyPath, value: str) -> str:

@@ -166,12 +166,20 @@ def _read(annotation: Any, value: Any, problems: Problems, path: KeyPath) -> Any
     if origin is Annotated:
         return _ruled(parts[0], parts[1:], value, problems, path)
     if origin in (Union, UnionType):
-        if (expected := _either(parts)) and not isinstance(value, list | dict):
+        kinds = [part for part in parts if part is not NoneType]
+        if (expected := _either(kinds)) and not isinstance(value, list | dict):
             problems.append((path, _mismatch(value, expected)))
             return None
-        return _read(_meant(parts, value), value, problems, path)
+        # A section is meant by a mapping, the other type by all else.
+        meant = next((kind for kind in kinds if isinstance(value, dict) == (section_of(kind) is kind)), kinds[0])
+        return _read(meant, value, problems, path)
     if origin is Literal:
-        return _chosen(parts, value, problems, path)
+        if value in parts:
+            return value
+        close = nearest(value, parts) if isinstance(value, str) else None
+        expected = _mismatch(value, listed([f"'{choice}'" for choice in parts], "or"))
+        problems.append((path, expected + (f"; did you mean {shown(close)}?" if close else "")))
+        return None
     section = section_of(annotation)
     if section is annotation:
         return section.read(value, problems, path)
@@ -203,27 +211,12 @@ def _ruled(annotation: Any, rules: tuple[Rule, ...], value: Any, problems: Probl
         return None
 
 
-def _meant(parts: tuple[Any, ...], value: Any) -> Any:
-    """The type of a union that a value is of: a section for a mapping, else the other; None is for a key left out."""
-    types = [part for part in parts if part is not NoneType]
-    return next((kind for kind in types if isinstance(value, dict) == (section_of(kind) is kind)), types[0])
-
-
-def _either(parts: tuple[Any, ...]) -> str:
+def _either(parts: list[Any]) -> str:
     """Words for what a union of a list and a mapping expects; empty for another union."""
-    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts if part is not NoneType]
+    kinds = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if {"dict" if section_of(kind) is kind else get_origin(kind) for kind in kinds} == {"dict", list}:
         return f"{_WORDS[list]} or {_WORDS[dict]}"
     return ""
-
-
-def _chosen(choices: tuple[str, ...], value: Any, problems: Problems, path: KeyPath) -> Any:
-    if value in choices:
-        return value
-    meant = nearest(value, choices) if isinstance(value, str) else None
-    expected = _mismatch(value, listed([f"'{choice}'" for choice in choices], "or"))
-    problems.append((path, expected + (f"; did you mean {shown(meant)}?" if meant else "")))
-    return None
 
 
 SMALLEST = 1e-15  # smaller values that must be above zero count as zero, in SI: a division by them could overflow
@@ -248,10 +241,10 @@ class Quantity(Rule):
         result = parse(value, self.kind)
         if not self._allows(result):
             # An angle without unit that would be in range in degrees, or a share that would be in %.
-            meant, hint = {"angle": "deg", "ratio": "%"}.get(self.kind), ""
-            if meant and not isinstance(value, str) and self._allows(parse(f"{value} {meant}", self.kind)):
-                radians, percent = f" (read as radians; write {value} deg)", f"; write {value} % if that is meant"
-                hint = radians if meant == "deg" else percent
+            hints = {"angle": f" (read as radians; write {value} deg)", "ratio": f"; write {value} % if that is meant"}
+            unit, hint = "deg" if self.kind == "angle" else "%", hints.get(self.kind, "")
+            if hint and (isinstance(value, str) or not self._allows(parse(f"{value} {unit}", self.kind))):
+                hint = ""
             raise ValueError(f"{shown(value)} is out of range; expected {self.range}{hint}")
         if result < self.bounds.get("exclusiveMinimum", -math.inf) + SMALLEST:
             least = f"in SI at least {SMALLEST:g}"

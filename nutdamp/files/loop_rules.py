@@ -34,8 +34,6 @@ UNITS_OF = {"gyro": "a gyro: rad/s, deg/s or rpm", "accelerometer": "an accelero
 def loop_findings(root: Node) -> Iterator[Finding]:
     """All faults of ``loop``."""
     facts = Facts(root)
-    if not facts.has("loop"):
-        return
     start, stop = (facts.number("angle", "loop", key) for key in ("start", "stop"))
     if start is not None and stop is not None and stop >= start > 0.0:
         problem = f"{math.degrees(stop):g} deg is not below start; expected less than {math.degrees(start):g} deg"

@@ -167,7 +167,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
     torquer = steerable if thrusters else steerable or Steerable()
     asked = contents.requirement
     asks_nothing = asked is None or (asked.nutation is None and asked.momentum_shift is None)
-    loss, per_kg, limits, orbit = contents.dissipation, contents.center_of_mass_per_kg, contents.limits, contents.orbit
+    loss, per_kg, limits = contents.dissipation, contents.center_of_mass_per_kg, contents.limits
     spacecraft = Spacecraft(
         name=contents.name,
         inertia=inertia,
@@ -175,7 +175,7 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         mass=contents.mass,
         center_of_mass=None if contents.center_of_mass is None else center,
         center_of_mass_per_kg=axes.T @ np.array(per_kg) if per_kg and any(per_kg) else None,
-        attitude=_attitude(contents.attitude, inertia, omega0, sunward),
+        attitude=_given(contents.attitude, _attitude, inertia, omega0, sunward),
         channels=tuple(Channel(name, tuple(map(thrusters.__getitem__, members))) for name, members in channels.items()),
         steerable=steerable,
         requirement=None if asks_nothing else _part(Requirement, asked),
@@ -185,16 +185,14 @@ def read_spacecraft(text: str, name: str, settings: Sequence[Setting] = (), warn
         nutation_grows=None if loss is None or loss.nutation is None else loss.nutation == "grows",
         dispersions=dispersions(contents.dispersions, thrusters.values(), torquer),
         object_id=contents.object_id,
-        orbit=None
-        if orbit is None
-        else Orbit(np.array(orbit.position), np.array(orbit.velocity), orbit.center.upper()),
+        orbit=_given(contents.orbit, lambda at: Orbit(np.array(at.position), np.array(at.velocity), at.center.upper())),
         cold=_part(Cold, contents.cold),
-        tank=_tank(contents.tank),
+        tank=_given(contents.tank, _tank),
         sun=sunward,
         keep=tuple(_cones(contents, sunward)),
-        sun_sensor=_sun_sensor(contents.sun_sensor, axes),
-        commands=_commands(contents.commands),
-        loop=_loop(contents.loop, axes, center),
+        sun_sensor=_given(contents.sun_sensor, _sun_sensor, axes),
+        commands=_given(contents.commands, _commands),
+        loop=_given(contents.loop, _loop, axes, center),
     )
     return replace(spacecraft, goal=_goal(contents.goal, spacecraft))
 
@@ -238,6 +236,11 @@ def _part(kind: type[Part], section: Section | None, **others: object) -> Part |
     return kind(**{**given, **others})
 
 
+def _given(section: Section | None, make: Callable[..., Part], *others: object) -> Part | None:
+    """The object that ``make`` makes of a section, where it is given."""
+    return None if section is None else make(section, *others)
+
+
 def _rates(contents: keys.SpacecraftFile, inertia: Inertia) -> Vector:
     """Body rates at t = 0 in principal axes, rad/s; from a state by tan θ = |(I1ω1, I2ω2)|/|H3|, Magnus 1970 (19).
 
@@ -273,9 +276,7 @@ def _thruster(entry: keys.ThrusterSection, axes: Vector, every: keys.ValveSectio
     return Thruster(entry.name, torque, force, thrust, entry.isp, least, most, position, valve)
 
 
-def _tank(section: keys.TankSection | None) -> Tank | None:
-    if section is None:
-        return None
+def _tank(section: keys.TankSection) -> Tank | None:
     isp, shed = section.isp, section.inertia_per_kg
     rows = (shed.A, shed.A, shed.C) if isinstance(shed, keys.ShedSection) else tuple(shed or ())
     return _part(Tank, section, isp=isp and tuple(map(tuple, isp)), inertia_per_kg=rows if any(rows) else None)
@@ -308,14 +309,11 @@ def _disturbance(entry: keys.DisturbanceSection, inertia: Inertia, spin: float) 
     return Disturbance(complex(torque[0], torque[1]), float(torque[2]), rate, entry.name or "")
 
 
-def _attitude(
-    section: keys.AttitudeSection | None, inertia: Inertia, omega0: Vector, sunward: Vector | None
-) -> Attitude | None:
+def _attitude(section: keys.AttitudeSection, inertia: Inertia, omega0: Vector, sunward: Vector | None) -> Attitude:
     """Attitude of the axes of the file; ``omega0`` (3,) rad/s in principal axes tells spin axis and H in the body."""
-    if section is None:
-        return None
     if section.quaternion is not None:
-        return _part(Attitude, section, quaternion=np.array(section.quaternion) / math.hypot(*section.quaternion))
+        given = np.array(section.quaternion) / math.hypot(*section.quaternion)
+        return Attitude(given, section.epoch, section.frame)
     assert section.spin_axis is not None
     along = np.array([0.0, 0.0, math.copysign(1.0, inertia.axial(float(omega0[2])))])
     if section.of == "momentum":
@@ -363,9 +361,7 @@ def _cones(contents: keys.SpacecraftFile, sunward: Vector | None) -> Iterator[Ke
         yield Keep("H", None, 0.0, contents.requirement.nutation_during)
 
 
-def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSensor | None:
-    if section is None:
-        return None
+def _sun_sensor(section: keys.SunSensorSection, axes: Vector) -> SunSensor | None:
     azimuth = section.azimuth
     if not np.array_equal(axes, np.eye(3)):
         first, second, _ = axes.T @ np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -373,9 +369,7 @@ def _sun_sensor(section: keys.SunSensorSection | None, axes: Vector) -> SunSenso
     return _part(SunSensor, section, azimuth=azimuth)
 
 
-def _commands(section: keys.CommandsSection | None) -> Commands | None:
-    if section is None:
-        return None
+def _commands(section: keys.CommandsSection) -> Commands:
     given, step = section.width, None
     if isinstance(given, list):
         widths = np.unique(given)
@@ -386,9 +380,7 @@ def _commands(section: keys.CommandsSection | None) -> Commands | None:
     return Commands(section.delay_step, section.delay_max, widths, section.max_count, every, step)
 
 
-def _loop(section: LoopSection | None, axes: Vector, center: Vector) -> Loop | None:
-    if section is None:
-        return None
+def _loop(section: LoopSection, axes: Vector, center: Vector) -> Loop | None:
     given = section.sensor
     along = np.array([0.0, 0.0, 1.0] if given.axis is None else given.axis)
     position = axes.T @ (np.array(given.position or center) - center)

@@ -157,12 +157,10 @@ def dispersions(
     thrusts = {thruster.name: thruster.thrust for thruster in thrusters}
     if torquer is not None:
         thrusts[STEERABLE] = thrust_behind(torquer.torque, torquer.lever_arm)
-    entries: dict[str, Any] = {}
-    for key in (field.name for field in fields(Dispersions)):
+    entries: dict[str, Any] = {"correlation": tuple(map(tuple, section.correlation))}
+    for key in QUANTITIES:
         entry = getattr(section, key)
-        if key == "correlation":
-            entries[key] = tuple((first, second, size) for first, second, size in entry)
-        elif isinstance(entry, ToleranceSection):
+        if isinstance(entry, ToleranceSection):
             entries[key] = entry.tolerance(key)
         elif isinstance(entry, list | tuple):  # by axis
             entries[key] = tuple(None if part is None else part.tolerance(key) for part in entry)
@@ -189,10 +187,7 @@ class Reading(Quantity):
 
     def read(self, value: Any, inner: Callable[[Any], Any]) -> float:  # noqa: ARG002
         """SI value; raises ValueError with the values allowed."""
-        try:
-            result = parse(value, "acceleration")
-        except ValueError:
-            result = parse(value, self.kind)
+        result, _ = size_of(value, READING)
         if not self._allows(result):
             raise ValueError(f"{shown(value)} is out of range; expected at least {self.bounds['minimum']:g}")
         return result

@@ -54,10 +54,9 @@ def write_whole(path: str, content: str | bytes | Callable[[IO[bytes]], object])
 
 @contextmanager
 def whole_file(path: str) -> Iterator[IO[bytes]]:
-    """A file to write piece by piece, which takes its place at ``path`` when the block ends well, or never.
+    """A file to write piece by piece, temporary until the block ends well; raises CannotWrite.
 
-    Until then it is a temporary file in the same folder. What is no plain file (a pipe, /dev/null, standard output
-    as ``-``) is written to directly. Raises CannotWrite.
+    What is no plain file (a pipe, /dev/null, standard output as ``-``) is written to directly.
     """
     try:
         if path == STDOUT:
@@ -105,10 +104,9 @@ def make_folder(path: str) -> None:
     """Make the folder ``path`` unless it is there. Raises CannotWrite."""
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
-    except FileExistsError as reason:
-        raise CannotWrite(path, "it is there, and no directory") from reason
     except (OSError, ValueError) as reason:
-        raise CannotWrite(path, _reason(reason)) from reason
+        there = "it is there, and no directory" if isinstance(reason, FileExistsError) else ""
+        raise CannotWrite(path, there or _reason(reason)) from reason
 
 
 @contextmanager

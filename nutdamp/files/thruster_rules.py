@@ -128,9 +128,8 @@ def thrust_findings(root: Node) -> Iterator[Finding]:
             yield Finding((*path, "impulse_bit"), "given together with valve; keep one of the two", True)
         valve = _valve_path(facts, path)
         if valve is not None:
-            for finding in _opens(facts, path, valve):
-                if finding.path not in reported:
-                    yield finding
+            for finding in (each for each in _opens(facts, path, valve) if each.path not in reported):
+                yield finding
                 reported.add(finding.path)
         elif facts.has(*path, "impulse_bit"):
             yield from _table(facts, path, named.get(facts.text(*path, "name") or ""))
@@ -148,10 +147,10 @@ def _valve_path(facts: Facts, path: KeyPath) -> KeyPath | None:
 
 def _opens(facts: Facts, path: KeyPath, valve: KeyPath) -> Iterator[Finding]:
     opened, closed = (facts.number("time", *valve, key) or 0.0 for key in VALVE_TIMES[:2])
-    longest = facts.number("time", *path, "max_on_time")
-    if facts.text(*valve, "on_time_is") != "effective" and longest is not None and longest + closed <= opened:
-        name, least = facts.text(*path, "name") or "a thruster", f"{longest + closed:g} s"
-        problem = f"{opened:g} s is not less than max_on_time + close_delay = {least} of {name}: its valve closes"
+    longest = on_times_of(facts, path)[1] + closed
+    if facts.text(*valve, "on_time_is") != "effective" and longest <= opened:
+        name = facts.text(*path, "name") or "a thruster"
+        problem = f"{opened:g} s is not less than max_on_time + close_delay = {longest:g} s of {name}: its valve closes"
         yield Finding((*valve, "open_delay"), f"{problem} before it opens, and no command gives thrust")
 
 

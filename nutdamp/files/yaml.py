@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import yaml
 from yaml.parser import Parser
@@ -244,11 +244,11 @@ class _Builder:
         self.next()
         event = self.next()
         if not isinstance(event, yaml.StreamEndEvent):
-            raise self.fatal(_start(event), f"a second document begins; {single}")
+            raise self.fatal(_at(event.start_mark), f"a second document begins; {single}")
         return root
 
     def node(self, event: yaml.Event, path: KeyPath) -> Node:
-        place = _start(event)
+        place = _at(event.start_mark)
         if isinstance(event, yaml.AliasEvent):
             node = self.alias(event, path)
             self.count(node.size, place, path)
@@ -281,23 +281,23 @@ class _Builder:
         if node is not None:
             return node
         problem = "lies inside the value it repeats" if name in self.anchors else f"has no anchor &{name} above it"
-        raise self.fatal(_start(event), f"alias {shown('*' + name)} {problem}", path)
+        raise self.fatal(_at(event.start_mark), f"alias {shown('*' + name)} {problem}", path)
 
     def sequence(self, event: yaml.SequenceStartEvent, path: KeyPath) -> Node:
-        self.check_tag(event.tag, ("seq",), _start(event), path)
+        self.check_tag(event.tag, ("seq",), _at(event.start_mark), path)
         entries: list[Node] = []
         while not isinstance(entry := self.next(), yaml.SequenceEndEvent):
             entries.append(self.node(entry, (*path, len(entries))))
-        return Node(entries, _start(event), size=1 + sum(entry.size for entry in entries))
+        return Node(entries, _at(event.start_mark), size=1 + sum(entry.size for entry in entries))
 
     def mapping(self, event: yaml.Event, path: KeyPath) -> Node:
         """A mapping, up to its end event; a key that comes again is reported and its value dropped."""
         assert isinstance(event, yaml.MappingStartEvent)
-        self.check_tag(event.tag, ("map",), _start(event), path)
+        self.check_tag(event.tag, ("map",), _at(event.start_mark), path)
         values: dict[str, Node] = {}
         keys: dict[str, Place] = {}
         while not isinstance(key := self.next(), yaml.MappingEndEvent):
-            place = _start(key)
+            place = _at(key.start_mark)
             if not isinstance(key, yaml.ScalarEvent):
                 raise self.fatal(place, "a key must be a plain text", path)
             text = self.characters(key.value, place, path)
@@ -310,11 +310,11 @@ class _Builder:
                 self.faults.append(place.fault(self.name, dotted((*path, text)), problem))
             else:
                 values[text], keys[text] = value, place
-        return Node(values, _start(event), keys, 1 + sum(node.size for node in values.values()))
+        return Node(values, _at(event.start_mark), keys, 1 + sum(node.size for node in values.values()))
 
     def scalar(self, event: yaml.ScalarEvent, path: KeyPath) -> Scalar:
         """Text, number, boolean or None: a plain scalar by the core schema, unless a core tag overrides it."""
-        place = _start(event)
+        place = _at(event.start_mark)
         text = self.characters(event.value, place, path)
         if event.tag is None:
             return text if event.style else resolve(text)
@@ -398,12 +398,12 @@ def _syntax_fault(error: yaml.MarkedYAMLError) -> tuple[Place, str]:
     """Place and wording of a syntax error: own words for the frequent slips, PyYAML's for the rest."""
     problem = " ".join(str(error.problem).split())
     _, cure, at_beginning = next((slip for slip in _SYNTAX if re.search(slip[0], problem)), ("", problem, False))
-    mark = error.context_mark if at_beginning else error.problem_mark
-    return Place() if mark is None else Place(mark.line + 1, mark.column + 1), f"not YAML: {cure}"
+    return _at(error.context_mark if at_beginning else error.problem_mark), f"not YAML: {cure}"
 
 
-def _start(event: yaml.Event) -> Place:
-    return Place(event.start_mark.line + 1, event.start_mark.column + 1)
+def _at(mark: Any) -> Place:
+    """Place of a mark, which PyYAML counts from 0; (0, 0) where it gave none."""
+    return Place() if mark is None else Place(mark.line + 1, mark.column + 1)
 
 
 def _place(text: str, position: int) -> Place:

@@ -113,7 +113,10 @@ def apm(plan: Plan, reference: Reference, created: Epoch) -> Message:
         spin = spin_values(body.inertia, *(values[None] for values in motion))
         values = {name: float(value[0]) for name, value in spin.items() if name not in MOMENTUM}
         blocks.append(_block("SPIN", {**frames, **values}))
-    blocks.append(_block("INERTIA", _inertia(body)))
+    # The products are minus the entries off the diagonal (annex F6).
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
+    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
+    blocks.append(_block("INERTIA", {"INERTIA_REF_FRAME": BODY_FRAME, **parts}))
     blocks += [
         _block("MAN", _apm_manoeuvre(pulse, number, body, reference), *_notes_on(pulse, number, reference))
         for number, pulse in enumerate(sorted(plan.pulses, key=lambda pulse: pulse.start), start=1)
@@ -157,13 +160,6 @@ def _notes_on(pulse: Pulse, number: int, reference: Reference) -> list[str]:
         comments.append(f"Commanded: {on_time:.9g} s from {reference.epoch.plus(max(start, 0.0)).text} on.")
         comments.append(f"Start and duration below are those of the thrust: {pulse.on_time:.9g} s at the torque given.")
     return comments
-
-
-def _inertia(body: Spacecraft) -> Values:
-    """Moments and products; the products are minus the entries off the diagonal (annex F6)."""
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tensor.tolist()
-    parts: Values = {"IXX": xx, "IYY": yy, "IZZ": zz, "IXY": -xy, "IXZ": -xz, "IYZ": -yz}
-    return {"INERTIA_REF_FRAME": BODY_FRAME, **parts}
 
 
 def _apm_manoeuvre(pulse: Pulse, number: int, body: Spacecraft, reference: Reference) -> Values:
